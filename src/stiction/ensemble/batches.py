@@ -259,7 +259,6 @@ def _result(future: Future[Table], span: Span) -> Table:
     if table.versions != versions():
         raise WorkerError(
             f"a worker has {table.versions}, the run has {versions()}. Install the same versions"
-            " there, or end that worker"
         )
     return table
 

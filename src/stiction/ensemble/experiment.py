@@ -147,9 +147,9 @@ class Experiment:
             for name, field in member.properties.items():
                 if not field.modes(self.problem.interface).ranks.size:
                     warn_user(
-                        f"{name}: its correlation length is so long for this interface that each"
-                        " sample is uniform. Check its unit, and give scatter between specimens"
-                        " as between= of st.RandomInterface",
+                        f"{name}: its correlation length is so long that each sample is uniform."
+                        " Check its unit, and give scatter between specimens as between= of"
+                        " st.RandomInterface",
                         UnitWarning,
                     )
             check_residual(self.problem, member)

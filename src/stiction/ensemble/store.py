@@ -158,10 +158,7 @@ class Store:
             self.warn(f"{CHUNKS}/{name}: {text}. Its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
         for version in sorted({*self.versions} - {versions()}):
-            self.warn(
-                f"was begun with {version}, not {versions()}. Their samples may differ in the last"
-                " digits"
-            )
+            self.warn(f"was begun with {version}, not {versions()}. Last digits may differ")
 
     def warn(self, text: str) -> None:
         """Issue a warning about this run."""
@@ -267,10 +264,7 @@ def read_json(file: Path) -> dict[str, Any]:
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise Damaged(
-            f"{file}: is damaged or of another program. Run the study again into the folder to"
-            " repair it"
-        ) from None
+        raise Damaged(f"{file}: is damaged. Run the study again into the folder") from None
     raise StoreError(
         f"{file}: is of format {describe(body['format'])}, but this version reads {FORMAT}."
         " Install the version of stiction that wrote it"
@@ -282,10 +276,7 @@ def read_study(folder: Path) -> dict[str, Any]:
     study = read_json(folder / STUDY)
     ensemble = study.get("ensemble")
     if not isinstance(ensemble, dict) or not isinstance(ensemble.get("samples"), int):
-        raise Damaged(
-            f"{folder / STUDY}: is damaged: it is another file of a run. Run the study again to"
-            " repair it"
-        )
+        raise Damaged(f"{folder / STUDY}: is damaged. Run the study again to repair it")
     return study
 
 

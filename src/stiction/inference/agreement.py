@@ -226,8 +226,7 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array
     event, peak = names.get(curves.unit, ("", ""))
     if event not in prediction:
         raise InputError(
-            f"prediction: has no events in {curves.unit}, the unit of the curves. Give curves of"
-            " force, and the thickness of the specimen"
+            f"prediction: has no events in {curves.unit}. Give curves of force, and a thickness"
         )
     if int(prediction["arrested_events"].max()) > prediction.sizes["event"]:
         raise InputError(
@@ -294,8 +293,7 @@ def _with_posterior(
     fitted = posterior.peaks
     if measured.unit != fitted.unit or not {*measured.lengths} <= {*fitted.lengths}:
         raise InputError(
-            f"peaks: the posterior predicts {fitted} in {fitted.unit}. Got {measured} in"
-            f" {measured.unit}"
+            f"peaks: the posterior has {fitted} in {fitted.unit}, not {measured} in {measured.unit}"
         )
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():

@@ -35,10 +35,7 @@ def levels_of(rows: Sequence[Array]) -> Array:
     """Return the means of the records of different specimens, (records,)."""
     levels = np.array([row.mean() for row in rows])
     if levels.min() <= 0.0:
-        raise InputError(
-            f"between: needs records of positive mean. Got means from {levels.min():g} to"
-            f" {levels.max():g}"
-        )
+        raise InputError(f"between: needs records of positive mean. Got {levels.min():g}")
     return levels
 
 

@@ -235,8 +235,7 @@ def read_curve(
                     tests.append(_curve(full, columns, chosen, noise))
     if len({(curve.unit, curve.travel_unit) for curve in tests}) > 1:
         raise InputError(
-            "source: tests measure different quantities, such as force over travel and stress over"
-            " time. Read them in separate calls"
+            "source: units of force or travel differ between tests. Read them in separate calls"
         )
     if ends := [curve.name for curve in tests if math.isnan(curve.plateau)]:
         warn_accuracy(
@@ -307,8 +306,7 @@ def _columns(
             missing = "force" if column is None else "travel or time"
             names = ", ".join(map(repr, table.data_vars))
             raise InputError(
-                f"no column is clearly the {missing}. Pass force= and travel= with names or numbers"
-                f" of these columns: {names}"
+                f"no column is clearly the {missing}. Choose force= and travel= among {names}"
             )
         if texts := [c.attrs["text"] for c in (along, column) if c.attrs.get("text")]:
             raise InputError(texts)
@@ -378,9 +376,8 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
     back = np.flatnonzero(np.maximum.accumulate(travel) - travel > allowed)
     if back.size:
         raise InputError(
-            f"line {lines[back[0]]}: travel or time goes back to {travel[back[0]]:.6g}"
-            f" {columns.travel_unit}. Read one cycle at a time. Separate tests by an empty line or"
-            " number them in a column 'test'"
+            f"line {lines[back[0]]}: travel or time goes back. Read one cycle at a time, and"
+            " separate tests by an empty line or number them in a column 'test'"
         )
     if -force.min() > force.max():
         warn_accuracy(f"{name}: forces are negative. Their signs are changed")

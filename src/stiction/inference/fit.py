@@ -229,9 +229,8 @@ class FieldFit(Result):
         """Return likely fields from all families in proportion to their weights (step 6)."""
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
-                f"interfaces: need a strength, but the fit is of {self.quantity}. Fit"
-                " quantity='strength' or 'friction_coefficient', or put the `repetitions` into"
-                " random interfaces"
+                f"interfaces: need a strength, but the fit is of {self.quantity}. Put the"
+                " `repetitions` into random interfaces"
             )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
@@ -527,8 +526,7 @@ def _judged(
                 f"{len(rows)} specimen(s) leave the coefficient of variation between specimens at"
                 f" {low:.2g} to {high:.2g}, mostly by its prior, and it decides small"
                 f" probabilities. Measure at least {FEW_SPECIMENS}, or state it, as in"
-                " RandomInterface(strength=fit.field, between={'strength': Lognormal(mean=1.0,"
-                " cv=0.1)})"
+                " RandomInterface(fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
             )
     return {
         "parameters": parameters, "interval": ends, "p_values": p_values, "doubts": tuple(doubts)
@@ -564,8 +562,7 @@ def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
         for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [
-        f"the p-value of the {name} is {p:.2g}, below {MIN_P_VALUE:g}. {ADVICE[name]}, or look at"
-        " st.plot.fit"
+        f"the p-value of the {name} is {p:.2g}. {ADVICE[name]}, or look at st.plot.fit"
         for name, p in p_values.items()
         if p <= MIN_P_VALUE
     ]

@@ -256,8 +256,7 @@ def infer(
         raise InputError(refused)
     if grid is None or u is None:
         raise InputError(
-            "peaks: no point of the prior can produce all of them. Widen the prior, or give"
-            " load_cell_error= if they are not exact"
+            "peaks: no point of the prior can produce all. Widen it, or give load_cell_error="
         )
     error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
@@ -340,6 +339,5 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
         return []
     return [
         f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
-        f" {PRIOR_END:.0%} of the prior. Check the unit of the peaks, and widen the prior if its"
-        " end is a guess"
+        f" {PRIOR_END:.0%} of it. Check the unit of the peaks, and widen the prior if it is a guess"
     ]

@@ -130,8 +130,7 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
         return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
     if isinstance(random, Posterior):
         raise InputError(
-            "random: is a posterior, which contains its peaks. Give its profiles or interfaces, and"
-            " all peaks together"
+            "random: is a posterior. Give its fit or interfaces, and all peaks together"
         )
     given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
     members = as_random(given).members
@@ -217,10 +216,7 @@ def simulated_onsets(
         start = number * SPECIMEN + place * samples
         relative = simulate(experiments, simulation, start, of) / strengths[:, None]
         if not np.isfinite(relative).all() or relative.min() <= 0.0:
-            raise InputError(
-                "method: some simulated specimens have no positive onset, so their peaks do not"
-                " depend on the strength"
-            )
+            raise InputError("method: some simulated specimens have no positive onset")
         bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
         return relative, tabulate(relative, np.maximum(bounds, 0.0))
 
@@ -255,9 +251,8 @@ def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list
     notes = []
     if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
         notes.append(
-            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Tests, profiles or"
-            " model miss something, and a force by both does, too. Check units, method and"
-            " surfaces, and design by the lower force of profiles alone and tests alone"
+            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. A force by both is"
+            " then wrong. Check units, method and surfaces, and design by the lower of both alone"
         )
     if profiles.levels.size + tests < 2:
         notes.append("one specimen has no scatter between specimens: its prior decides")

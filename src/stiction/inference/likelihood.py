@@ -226,8 +226,7 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
         raise InputError(
-            "peaks: are forces, which need the area of the interface. Give Blocks(thickness=...),"
-            " or Interface(width=...) for a line"
+            "peaks: forces need an area. Give Blocks(thickness=...) or Interface(width=...)"
         )
     pressed = problem.given_pressure is not None or "normal_pressure" in random.names
     if variable == "friction_coefficient" and not pressed:
@@ -439,8 +438,8 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
     if seconds > WARN_SECONDS:
         warn_user(
             f"the likelihood takes about {duration(seconds)}: {samples:,} onsets by"
-            f" {experiment.method.label} of {duration(per_onset)} each. Fewer samples, nodes or"
-            " unknown parameters take less. LocalCriterion() takes seconds if it applies",
+            f" {experiment.method.label} of {duration(per_onset)} each. Take fewer samples or"
+            " unknown parameters, or LocalCriterion() if it applies",
             UserWarning,
         )
 

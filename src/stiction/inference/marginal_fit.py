@@ -210,8 +210,7 @@ class Family:
             raise InputError(
                 f"marginal: {outside} of {values.size} values, from {values.min():.6g} to"
                 f" {values.max():.6g}, lie outside the bounds of {self.name!r}, {low:.6g} and"
-                f" {high:.6g}. Give other bounds, as in {{'type': {self.name!r}, 'low': ...}}, or"
-                " noise=True if measurement noise carries them there"
+                f" {high:.6g}. Give others, {{'type': {self.name!r}, 'low': ...}}, or noise=True"
             )
 
 
@@ -241,8 +240,7 @@ def table_of(given: Any) -> dict[str, Any]:
         return dict(given)
     if not isinstance(given, str):
         raise InputError(
-            "must be a name, or a table such as {'type': 'beta', 'low': 0.0} with the parameters"
-            f" to keep. Got {describe(given)}"
+            f"must be a name, or a table such as {{'type': 'beta', ...}}. Got {describe(given)}"
         )
     return {"type": given}
 

@@ -104,8 +104,7 @@ def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
         for name, field in interface.properties.items():
             if field.conditions is not None:
                 raise InputError(
-                    f"random: {name} is conditioned on one specimen, but the peaks are of other"
-                    " specimens. Pass it without `given`"
+                    f"random: {name} is conditioned on another specimen. Pass it without `given`"
                 )
 
 
@@ -130,8 +129,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         distributions = distributions_of(given)
     if not isinstance(random, RandomField | RandomInterface):
         raise InputError(
-            "prior: needs one random field or interface. Leave the prior out if random is a fit or"
-            " a list of interfaces"
+            "prior: needs one random field or interface. Leave it out with a fit or a list"
         )
     random = as_random_interface(random)
     refuse_conditioned([random])

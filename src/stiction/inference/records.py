@@ -100,8 +100,7 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
         raise InputError(f"must be numbers or a DataArray; {error}") from None
     if interface is None:
         raise InputError(
-            f"an array of shape {array.shape} has no point spacing. Give the interface, or a"
-            " DataArray over 'x' (m)"
+            "an array has no point spacing. Give the interface, or a DataArray over 'x' (m)"
         )
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):
@@ -125,8 +124,7 @@ def _spacing(x: Array, name: str) -> float:
     uneven = off.max() > 10.0 * UNEVEN or np.median(off) > UNEVEN
     if uneven or np.diff(np.round(place)).min() < 1:
         raise InputError(
-            f"{name} is not equally spaced: the point at {x[off.argmax()]:.6g} m is off by"
-            f" {off.max():.2g} of the mean spacing. First interpolate, as in"
+            f"{name} is not equally spaced at {x[off.argmax()]:.6g} m. First interpolate, as in"
             " st.read_profile(..., interface=..., interpolate=True, gaps='skip')"
         )
     return spacing
@@ -141,25 +139,22 @@ def _checked(record: Record, quantity: str) -> Record:
     if values.size < MIN_RECORD_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
             f"holds {values.size} measured points, too few for a spectrum. It needs at least"
-            f" {MIN_RECORD_POINTS}, at least {NARROWEST} in each direction, and about ten"
-            " correlation lengths"
+            f" {MIN_RECORD_POINTS}, {NARROWEST} in each direction, and ten correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
     if quantity in POSITIVE and (values <= 0.0).any():
         entry = int(np.argmax(record.values.ravel() <= 0.0))
         raise InputError(
-            f"{quantity} must be positive, but entry {entry} is {record.values.flat[entry]:.6g} ("
-            f"{int((values <= 0.0).sum())} such values). Make missing values NaN, or read the file"
-            " with st.read_profile(..., missing=...)"
+            f"{quantity} must be positive, but entry {entry} is {record.values.flat[entry]:.6g}."
+            " Make missing values NaN, or read the file with st.read_profile(..., missing=...)"
         )
     aside = np.abs(values - np.median(values))
     far = aside > OUTLYING * 1.4826 * np.median(aside)
     if np.median(aside) > 0.0 and far.any():
         warn_accuracy(
-            f"{int(far.sum())} of {values.size} values are outliers, more than {OUTLYING:g} robust"
-            f" standard deviations from the median, such as {values[aside.argmax()]:.4g}. If they"
-            " are not real, make them NaN, which leaves them out"
+            f"{int(far.sum())} of {values.size} values are outliers, such as"
+            f" {values[aside.argmax()]:.4g}. If they are not real, make them NaN to leave them out"
         )
     else:
         _doubt_jumps(record)
@@ -187,9 +182,8 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     if scores[lags - 1].max() < CORRELATED:
         raise InputError(
             f"profiles: neighbouring points, {max(windows[0].spacings):.4g} m apart, are not"
-            f" correlated: {sums[0] / counts[0]:.2g} +- {counts[0] ** -0.5:.2g}. The correlation"
-            " length lies below the spacing, or noise hides it. Measure at a smaller spacing, or"
-            " take the values as independent"
+            f" correlated: {sums[0] / counts[0]:.2g} +- {counts[0] ** -0.5:.2g}. Measure at a"
+            " smaller spacing or with less noise, or take the values as independent"
         )
 
 
@@ -211,6 +205,5 @@ def _doubt_jumps(record: Record) -> None:
         warn_accuracy(
             f"{int(far.sum())} of {record.values.size} values differ from their neighbours by more"
             f" than {JUMPING:g} times the usual difference, such as {middle.flat[entry]:.4g} beside"
-            f" {record.values[:-2].flat[entry]:.4g}. The field and the noise of the record do not"
-            " explain them. If they are dropouts, make them NaN, which leaves them out"
+            f" {record.values[:-2].flat[entry]:.4g}. Make dropouts NaN to leave them out"
         )

@@ -105,8 +105,7 @@ class FactorPrior(NamedTuple):
         low, high = prior.scatter.cdf([0.0, MOST_CV])
         if not low < high:
             raise InputError(
-                f"prior: {SCATTER_KEY}: is a coefficient of variation between 0 and {MOST_CV:g},"
-                " but this distribution has no mass there"
+                f"prior: {SCATTER_KEY}: is a coefficient of variation between 0 and {MOST_CV:g}"
             )
         return prior
 

@@ -64,10 +64,7 @@ def expected_widths(
     else:
         profiles = profiles_of(random, None, None, seed)
         if not profiles.levels.size:
-            raise InputError(
-                "random: must be a fit or a posterior of `infer`, which hold measurements, if prior"
-                " is left out"
-            )
+            raise InputError("random: must be a fit or a posterior of `infer` without a prior")
         variable = variable_of(problem, profiles.fields[0], si_of(unit))
         onsets = simulated_onsets(
             profiles, problem, simulation, None, np.zeros(0), 0, error, variable

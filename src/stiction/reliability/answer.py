@@ -360,8 +360,7 @@ def prepare(
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
         problems.append(
-            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
-            " load.pressing_force, N)"
+            "friction_coefficient: needs load.normal_pressure or load.pressing_force"
         )
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
@@ -422,8 +421,7 @@ def few_members(random: Any, estimate: Answer | Estimate, target_cv: float) -> l
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
         f" {CARRIED_SHARE:.0%} of the mean. By this alone the coefficient of variation is"
-        f" {by_list:.2g} (target {target_cv:g}). {advice}. More profiles or tests make them more"
-        " alike"
+        f" {by_list:.2g} (target {target_cv:g}). {advice}, or measure more"
     ]
 
 
@@ -472,7 +470,6 @@ def exact_doubts(
     there = min(probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
     return [
         f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
-        f" {failed_exactly} by {exact.label}. By {exact.label} the probability of failure is"
-        f" {'about' if failed_exactly else 'below'} {there:.2g} instead of {probability:.2g}. Use"
-        " method=st.Equilibrium()"
+        f" {failed_exactly} by {exact.label}. The probability by st.Equilibrium() is"
+        f" {'about' if failed_exactly else 'below'} {there:.2g}, not {probability:.2g}. Use it"
     ]

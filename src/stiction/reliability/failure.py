@@ -267,8 +267,7 @@ def _check_unit(state: LimitState, name: str, given: float, stress: float) -> No
     if ratio > 0.0:
         text = (
             f"{name}: {given:g}{unit} is {ratio:.2g} times the mean strength,"
-            f" {in_words(CURVE[name].units, given / ratio)}. Check the units (stress in Pa, force"
-            " in N, friction_coefficient without unit)"
+            f" {in_words(CURVE[name].units, given / ratio)}. Check the unit (Pa, N or none)"
         )
         doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
 
@@ -533,9 +532,8 @@ def _quantile(
     if bound.probability >= probability:
         estimate, asked["stress"] = bound, lowest
         doubts.append(
-            f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa,"
-            f" within the accuracy of the method. The stress at P = {probability:g} is the bound"
-            " itself"
+            f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa, within"
+            f" the accuracy of the method. The stress at P = {probability:g} is the bound itself"
         )
     doubts += imprecise(estimate.sampling_cv, target_cv, tail.spent)
     if tail.algorithm != "two_level":
