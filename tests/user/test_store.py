@@ -188,7 +188,7 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
         make_study(samples=40).run(out=tmp_path / "run")
     with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, not stiction"):
         make_study(samples=60).run(out=tmp_path / "run")
-    with pytest.raises(WorkerError, match="install the same versions"):
+    with pytest.raises(WorkerError, match="Install the same versions"):
         make_study(samples=40).run(executor=Counting(versions="stiction 99.0"))
 
 

@@ -409,14 +409,14 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
 
 def few_members(random: Any, estimate: Answer | Estimate, target_cv: float) -> list[str]:
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
-    by_list, source = estimate.members_cv, random.source
+    by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
     members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
     advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
-    if source is not None:
+    if random.source is not None:
         advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
     return [
         f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
