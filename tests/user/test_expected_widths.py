@@ -29,12 +29,8 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
         # Eight times as many tests: a third of the width, less where eight leave heavy tails.
         assert 0.15 * now < many < 0.5 * now
     assert found.design_low[1] < found.design_stress[1] < found.design_high[1]
-    refuses(
-        "need a fit",
-        lambda: st.design_of_tests(
-            PROBLEM, posterior, designs={"more": {"profiles": 2}}, **GIVEN
-        ),
-    )
+    more = {"more": {"profiles": 2}}
+    refuses("need a fit", lambda: st.design_of_tests(PROBLEM, posterior, designs=more, **GIVEN))
     assert found.design_stress[1] > found.design_stress[0]  # what is known better carries more
 
 
@@ -43,31 +39,17 @@ def test_a_fit_is_taken_and_what_is_refused():
         factor * FIELD.sample(PROBLEM.interface, seed=k)[0]
         for k, factor in enumerate((1.0, 0.9, 1.1, 1.04, 0.97))
     ]
-    fit = st.fit_field(
-        records,
-        PROBLEM.interface,
-        marginal="gamma",
-        noise=False,
-        between=True,
-        bootstrap=20,
-        progress=False,
-    )
-    found = st.design_of_tests(
-        PROBLEM,
-        fit,
-        designs={"few": 5, "profiles": {"profiles": 6}},
-        repetitions=10,
-        samples=100,
-        **GIVEN,
-    )
+    options = {"marginal": "gamma", "noise": False, "between": True, "bootstrap": 20}
+    fit = st.fit_field(records, PROBLEM.interface, progress=False, **options)
+    designs = {"few": 5, "profiles": {"profiles": 6}}
+    numbers = {"repetitions": 10, "samples": 100}
+    found = st.design_of_tests(PROBLEM, fit, designs=designs, **numbers, **GIVEN)
     for name in ("few", "profiles"):
         assert np.all(found.width.sel(design=name) < found.width.sel(design="now"))
-    refuses("hold measurements", lambda: st.design_of_tests(PROBLEM, FIELD, **GIVEN))
-    refuses(
-        "designs: few: tests and profiles must be whole",
-        lambda: st.design_of_tests(PROBLEM, fit, designs={"few": {"tests": 0}}, **GIVEN),
-    )
-    refuses(
-        "did you mean 'profiles'",
-        lambda: st.design_of_tests(PROBLEM, fit, designs={"few": {"profile": 2}}, **GIVEN),
-    )
+    refuses("must be a fit", lambda: st.design_of_tests(PROBLEM, FIELD, **GIVEN))
+    for words, few in (
+        ("designs: few: tests and profiles must be whole", {"tests": 0}),
+        ("did you mean 'profiles'", {"profile": 2}),
+    ):
+        given = GIVEN | {"designs": {"few": few}}
+        refuses(words, lambda given=given: st.design_of_tests(PROBLEM, fit, **given))

@@ -131,10 +131,7 @@ def test_profiles_and_peaks_are_joined():
     assert 0.2 < told.mean("between.strength") < 0.21
     assert told.mean("strength.mean") == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
-    refuses(
-        "State the unit",
-        lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL),
-    )
+    refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL))
 
 
 def test_what_joining_refuses():

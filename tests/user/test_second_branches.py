@@ -54,14 +54,12 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
         "progress": False,
     }  # fmt: skip
     guided = st.infer(PROBLEM, FIELD, PEAKS, **given)
-    alike = np.corrcoef(
-        *(
-            st.monte_carlo(
-                PROBLEM, FIELD, method=method, samples=300, progress=False, pilot=False
-            ).critical_stress.values
-            for method in (Mixed(share), LOCAL)
-        )
-    )[0, 1]
+    options = {"samples": 300, "progress": False, "pilot": False}
+    onsets = [
+        st.monte_carlo(PROBLEM, FIELD, method=method, **options).critical_stress.values
+        for method in (Mixed(share), LOCAL)
+    ]
+    alike = np.corrcoef(*onsets)[0, 1]
     assert 0.1 < alike < 0.8
     monkeypatch.setattr(likelihoods, "no_single_length", lambda *_: "no guide")
     alone = st.infer(PROBLEM, FIELD, PEAKS, **given)
@@ -93,16 +91,9 @@ def test_the_estimate_is_told_the_threads_of_the_call(workers, prior, monkeypatc
 
     monkeypatch.setattr(likelihoods, "warn_if_long", stop)
     monkeypatch.setattr("stiction.inference.joined.warn_if_long", stop)
+    options = {"prior": prior, "method": st.Equilibrium(), "workers": workers}
     with pytest.raises(RuntimeError):
-        st.infer(
-            PROBLEM,
-            FIELD,
-            PEAKS,
-            prior=prior,
-            method=st.Equilibrium(),
-            workers=workers,
-            progress=False,
-        )
+        st.infer(PROBLEM, FIELD, PEAKS, progress=False, **options)
     assert seen == [workers]
 
 
@@ -113,22 +104,15 @@ def test_agreement_takes_every_kind_of_peaks():
     area = 0.05 * 0.013
     error = 1e4
     posterior = st.infer(PROBLEM, FIELD, 1.01 * PEAKS[::-1], **options)
-    in_stress = [
-        (PEAKS, {}),
-        (1e-3 * PEAKS, {"unit": "kPa"}),
-        (make_peaks(1e-6 * PEAKS, "MPa"), {}),
-    ]
+    in_stress = [(PEAKS, {}), (1e-3 * PEAKS, {"unit": "kPa"}), (make_peaks(PEAKS), {})]
     found = [st.statistics.agreement(predicted, peaks, **more) for peaks, more in in_stress]
     found += [st.statistics.agreement(predicted, 1e-3 * area * PEAKS, unit="kN")]
     found += [st.statistics.agreement(predicted, make_peaks(area * PEAKS, "N"))]
     for other in found[1:]:
         assert other.p_values == found[0].p_values
     with_error = [
-        st.statistics.agreement(predicted, PEAKS, load_cell_error=error),
-        st.statistics.agreement(
-            predicted, 1e-3 * PEAKS, unit="kPa", load_cell_error=1e-3 * error
-        ),
-        st.statistics.agreement(predicted, make_peaks(PEAKS), load_cell_error=error),
+        st.statistics.agreement(predicted, peaks, load_cell_error=scale * error, **more)
+        for (peaks, more), scale in zip(in_stress, (1.0, 1e-3, 1.0), strict=True)
     ]
     assert with_error[0].cramer_von_mises != found[0].cramer_von_mises
     for other in with_error[1:]:

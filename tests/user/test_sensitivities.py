@@ -43,7 +43,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
     assert "weibull to lognormal" in text
     assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
     refuses(
-        "sensitivities: problem.load.weight: is no constant",
+        "sensitivities: problem.load.weight: is not a constant",
         lambda: st.design_stress(
             PROBLEM, RANDOM, **given | {"sensitivities": {"problem.load.weight": (1, 2)}}
         ),

@@ -267,7 +267,7 @@ def test_wrong_content_under_a_right_digest_is_damage(tmp_path, run, forged):
     whole = st.open_run(run).dataset()
     resealed(folder, **FORGED[forged])
     (damage,) = st.open_run(folder).status().damaged
-    assert "fit the study" in damage or "no chunk" in damage
+    assert "fit the study" in damage or "not a chunk" in damage
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         again = st.Study.from_dict(STUDY).run(out=folder, workers=1, progress=False)

@@ -96,7 +96,7 @@ class Experiment:
 
     @property
     def given(self) -> Any:
-        """The random interface, or the list of equally likely ones."""
+        """The random interface, or the list of equally likely interfaces."""
         members = self.random.members
         return list(members) if len(members) > 1 else members[0]
 

@@ -10,7 +10,7 @@ whole or not at all, they never change, and no file lists them.
 Limits. A digest finds damage, but not forgery, because whoever can write to a folder can write
 other numbers with a new digest. A folder may come from a stranger. Links, pipes, devices and
 folders in place of its files are an `InputError`. Content that does not fit the study counts as
-damage, whatever its digest says.
+damage, with any digest.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Store:
     """The folder of a run with the samples of a study, which is given in plain form.
 
     After reading, `damage` has the defects of damaged chunks by name. `seconds` (of one
-    core) and `versions` are those of the intact chunks.
+    core) and `versions` belong to the intact chunks.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:

@@ -1,7 +1,9 @@
 """From measurements to random fields: fits of profiles, parameters from peaks, designs of tests.
 
-Profiles: read `fit` and `estimate`, then `records` and `window` (what was measured), `whittle` (its
-likelihood), `marginal_fit`, `bootstrap` (errors) and `between` (specimens). Peaks: read `infer`,
-then `prior`, `likelihood` with `scaling` and `density`, `grid` and `posterior`; `joined` weighs
-interfaces that a fit leaves. `agreement` tests a prediction, `design` plans tests.
+Profiles: begin with `fit` and `estimate`. Then read `records` and `window` (measured values),
+`whittle` (their likelihood), `marginal_fit`, `bootstrap` (errors) and `between` (specimens).
+
+Peaks: begin with `infer`. Then read `prior`, `likelihood` with `scaling` and `density`, `grid` and
+`posterior`. `specimens` and `joined` combine profiles and peaks. `agreement` tests a prediction,
+and `design` and `widths` plan tests.
 """

@@ -2,7 +2,7 @@
 
 Problem. n peaks have the empirical distribution F_n. The prediction has the distribution F, given
 by a sample or by a posterior. Find the probability that n peaks from F lie as far from F as the
-measured ones, for two distances:
+measured peaks, for two distances:
 
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
@@ -24,7 +24,7 @@ Steps for a posterior. The peaks of one campaign share the unknown parameters.
 4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of the posterior.
 5. Draw each simulated campaign from one of these distributions. Take distances from their mean.
    Campaigns with several kinds of specimens add W^2 and take the largest D.
-6. The p-value is the share of campaigns that are at least as far away as the measured one.
+6. The p-value is the share of campaigns that are at least as far away as the measured campaign.
 """
 
 from collections.abc import Mapping
@@ -142,7 +142,7 @@ def agreement(
     ----------
     prediction : Dataset or Posterior
         Result of `stiction.monte_carlo`, or of `stiction.infer`, whose uncertainty then
-        counts. Neither may have been fitted to these peaks.
+        counts. It must not have been fitted to these peaks.
     peaks : array, mapping of arrays, Peaks or Curves
         As in `stiction.infer`. Precursors are compared too if curves are given and the
         prediction has events, such as the events of ``Equilibrium(events=20)``.

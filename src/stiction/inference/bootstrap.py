@@ -16,8 +16,9 @@ Steps:
    proportion to the square root of the correlation length, because a record holds few of these.
 4. Subtract the quantiles of the error, times the width, from the estimate: a first interval.
 5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its first
-   interval. Take the upper end of each interval from the longer one, and the lower end from the
-   shorter one. Exchange them for parameters whose estimates fall with the correlation length.
+   interval. Take the upper end of each interval from the field with the longer length, and the
+   lower end from the other field. Exchange them for parameters whose estimates fall with the
+   correlation length.
 6. Bounds of the marginal end outside of the values, and other parameters at their ranges.
 7. A likely field is the estimate less the error of one repetition, times the width.
 

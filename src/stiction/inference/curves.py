@@ -406,7 +406,8 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
 
 
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number of precursors, largest size, and force at the first one or else the peak."""
+    """Return number of precursors, largest size, and force at the first precursor or else the
+    peak."""
     starts, ends = turning_points(force, threshold)
     before = starts < int(np.argmax(force))
     sizes = force[starts[before]] - force[ends[before]]

@@ -1,6 +1,6 @@
 """Density of a measured peak: the density of the onset, with the error of the load cell.
 
-Problem. Onsets T_1, ..., T_N were simulated, none of them below the bound b. Wanted is the density
+Problem. Onsets T_1, ..., T_N were simulated, all of them above the bound b. Wanted is the density
 
     p(y) = int f(T) phi((y - T)/e)/e dT
 
@@ -22,7 +22,7 @@ Steps:
    sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the logarithm in steps of `STEP`.
 5. Interpolate this logarithm between steps and nodes. Beyond the table it falls like a parabola.
 6. Integrate over v by the midpoint rule. It converges faster than any power of the step, once the
-   step is below the narrower one of error and density.
+   step is below the narrower of error and density.
 """
 
 import math

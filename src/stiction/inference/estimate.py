@@ -271,7 +271,7 @@ class Goodness(NamedTuple):
     the best family: 0 for the best family, negative for others. Differences below 2 do
     not distinguish families. `weight` is the share of fields that `FieldFit.interfaces`
     draws from the family. It is in proportion to the likelihood of its fields, whose
-    logarithm is on average half a unit for each parameter below the greatest one, because
+    logarithm is on average half a unit for each parameter below the greatest value, because
     the fields scatter about the estimate.
     """
 
@@ -302,8 +302,7 @@ def compare(
 ) -> tuple[list[Estimate], dict[str, Goodness], float]:
     """Return the estimates, best family first, their qualities, and the number of values (step 5).
 
-    Families that cannot be fitted are left out. An `InputError` says so if none can be
-    fitted.
+    Families that cannot be fitted are left out. If all fail, an `InputError` says so.
     """
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []

@@ -138,13 +138,13 @@ class FieldFit(Result):
         Number of independent values in the scores of families.
     p_values : dict of str to float
         Probability that records of the fitted ``marginal`` and ``spectrum`` lie as far
-        from their fits as the data do. A small one means that the family does not fit.
-        For several records without `between`, ``level`` is the probability that their
-        means scatter as much.
+        from their fits as the data do. A small probability means that the family does not
+        fit. For several records without `between`, ``level`` is the probability that
+        their means scatter as much.
     missing : (int, int)
         Number of points without a value, which are left out, and number of all points.
     doubts : tuple of str
-        Reasons not to trust the fit. Empty if there are none.
+        Reasons not to trust the fit. Empty without doubts.
     """
 
     field: RandomField
@@ -175,7 +175,7 @@ class FieldFit(Result):
 
     @property
     def tied(self) -> tuple[str, ...]:
-        """Names of the families that the records do not distinguish from the best one."""
+        """Names of the families that the records do not distinguish from the best family."""
         return tuple(name for name, one in self.families.items() if one.score > -TOLD)
 
     @cached_property
@@ -196,7 +196,7 @@ class FieldFit(Result):
         Parameters
         ----------
         count : int
-            Number of interfaces. A family has at most as many different ones as
+            Number of interfaces. A family has at most as many different fields as
             repetitions.
         seed : int
             Not negative.

@@ -98,7 +98,7 @@ class SpecimenPosterior(Posterior):
         Parameters
         ----------
         count : int
-            Number of interfaces. A longer list does not begin with a shorter one.
+            Number of interfaces. A longer list does not begin with a shorter list.
         seed : int
             Not negative.
         """

@@ -93,7 +93,8 @@ def make_axes(
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
-    """Return the parameters at all nodes, (nodes, parameters). Scaling ones are at `reference`."""
+    """Return the parameters at all nodes, (nodes, parameters). Scaling parameters are at
+    `reference`."""
     steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
     result[:, [axis.parameter for axis in axes]] = steps
@@ -151,8 +152,8 @@ def experiment_on(
 class Simulation(NamedTuple):
     """How onsets are simulated.
 
-    `done` holds the onsets of an interrupted call by experiment and samples. New ones are
-    added.
+    `done` holds the onsets of an interrupted call by experiment and samples. New onsets
+    are added.
     """
 
     method: Any
@@ -222,7 +223,7 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
-    """Return the variable that tests measure in a unit, or refuse what the problem lacks for it."""
+    """Return the variable that tests measure in a unit, if the problem has all that it needs."""
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
         raise InputError(

@@ -180,7 +180,7 @@ def read_peaks(
         a name, the peaks are the only column with a suitable unit. A column ``length
         [mm]`` may hold the length of the specimen. Other columns are not read.
     unit : str, optional
-        Unit of the peaks if the file states none.
+        Unit of the peaks if the file does not state it.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`. Tests without a peak are left out.
 

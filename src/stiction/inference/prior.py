@@ -119,7 +119,7 @@ def _tails(distribution: Any) -> tuple[float, float]:
 
 
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
-    """Return the prior of these arguments, or raise one `InputError` with all mistakes."""
+    """Return the prior of these arguments, or raise an `InputError` with all mistakes."""
     if not isinstance(given, Mapping) or not given:
         raise InputError(
             "prior: must map parameters to distributions or ranges, such as"

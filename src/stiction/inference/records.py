@@ -171,13 +171,12 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
     for window, row in zip(windows, rows, strict=True):
-        values = np.zeros(window.measured.shape)
-        values[window.measured] = (row - row.mean()) / row.std()
-        for axis in range(values.ndim):
-            turned, known = np.moveaxis(values, axis, 0), np.moveaxis(window.measured, axis, 0)
-            for lag in range(1, min(lags[-1], len(turned) // 4) + 1):
-                sums[lag - 1] += float(np.sum(turned[lag:] * turned[:-lag]))
-                counts[lag - 1] += float(np.sum(known[lag:] & known[:-lag]))
+        products = window.products((row - row.mean()) / row.std())
+        for axis, size in enumerate(window.shape):
+            last = min(lags[-1], size // 4)
+            along = tuple(slice(1, last + 1) if axis == k else 0 for k in range(products.ndim))
+            sums[:last] += products[along]
+            counts[:last] += window.pairs[along]
     scores = np.cumsum(sums) / np.sqrt(np.maximum(np.cumsum(counts), 1.0))
     if scores[lags - 1].max() < CORRELATED:
         raise InputError(

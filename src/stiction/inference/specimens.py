@@ -79,7 +79,7 @@ def factor_of_family(family: str, cv: float) -> Any:
 
 
 def families_of(given: Any) -> tuple[str, ...]:
-    """Return families of factors: all for True, or the named ones."""
+    """Return families of factors: all for True, or the named families."""
     names = (given,) if isinstance(given, str) else given
     names = tuple(FACTOR_FAMILIES) if given is True else names
     if not isinstance(names, list | tuple) or not names:

@@ -76,8 +76,8 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in Hermite orders 0, 1, ..., and a last one for the
-    rest."""
+    """Return the shares of the variance in Hermite orders 0, 1, ..., and the rest as the last
+    share."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
@@ -309,7 +309,7 @@ class Whittle(NamedTuple):
         """Return the variance of the noise, which may be negative, and its standard error.
 
         The error assumes independent ordinates. It is too small, but in proportion to the
-        true one.
+        true error.
         """
         state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)

@@ -15,13 +15,13 @@ Statistical Society B 84, 1526, for planes with gaps.
 
 Steps:
 
-1. Fit orthonormal polynomials to the measured points: P is one less their projection.
+1. Fit orthonormal polynomials to the measured points: P is the identity less their projection.
 2. For most wavenumbers the taper hides the trend, and a_k is the autocorrelation of h. One
    transform gives the expectation at all of them.
 3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
 4. The correlation comes from a transform of the spectrum on a period of `ROOM` records. Add the
-   density at all wavenumbers that look alike on the grid, the nearest exactly and the farther ones
-   at few wavenumbers, because they are smooth.
+   density at all wavenumbers that look alike on the grid, the nearest exactly and the farther
+   aliases at few wavenumbers, because they are smooth.
 
 Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
 """
@@ -81,9 +81,9 @@ class RecordWindow:
         # 1. orthonormal polynomials of the trend, (points, terms)
         self.basis = _polynomials(measured, degree)
         ones = np.ones(int(measured.sum()))
-        self.pairs = self._pairs(ones)  # number of pairs of measured points by lag
+        self.pairs = self.products(ones)  # number of pairs of measured points by lag
         trend = np.zeros_like(self.pairs)
-        self._of_trend = sum((self._pairs(one) for one in self.basis.T[1:]), start=trend)
+        self._of_trend = sum((self.products(one) for one in self.basis.T[1:]), start=trend)
         # 2.
         tapers = np.ix_(*[tukey(2 * n + 1, TAPERED)[1::2] for n in self.shape])  # nowhere zero
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
@@ -105,7 +105,7 @@ class RecordWindow:
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0
 
-    def _pairs(self, weights: Array) -> Array:
+    def products(self, weights: Array) -> Array:
         """Return the sum of w_i w_j over pairs of measured points at each lag."""
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights

@@ -82,7 +82,7 @@ class Estimate:
 
     @cached_property
     def members(self) -> Array:
-        """Probability of each of the equally likely interfaces. Empty for a single one."""
+        """Probability of each of the equally likely interfaces. Empty for a single interface."""
         if not self.state.several:
             return np.zeros(0)
         lows, highs = np.array(self.state.bounds_of_members()).T
@@ -100,7 +100,7 @@ class Answer(Result):
         Stress, Pa, and probability of an onset below it. One is given, and the other
         estimated.
     interval : tuple of float
-        95 % confidence interval of the estimated one.
+        95 % confidence interval of the estimated number.
     cv : float
         Coefficient of variation of the probability: estimated standard error over the
         estimate. Infinite without a failure, and zero if exact.
@@ -122,7 +122,7 @@ class Answer(Result):
         Share of plain samples in which the event does not happen at any stress. Behind a
         stiff machine an interface may stay stable, and it may carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer. Empty if there are none.
+        Reasons not to trust the answer. Empty without doubts.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
@@ -218,7 +218,7 @@ class Answer(Result):
 
     @property
     def band(self) -> tuple[float, float]:
-        """90 % band of the probability over equally likely interfaces, NaN for a single one.
+        """90 % band of the probability over equally likely interfaces, NaN for a single interface.
 
         5 % of them have at most the first number, and 95 % at most the second. More tests
         make the band narrower. It is too wide by the sampling error of each interface,
@@ -306,19 +306,15 @@ class Answer(Result):
         effects = self.sensitivities
         if not effects.sizes.get("source"):
             return []
-        unit = "Pa" if math.isnan(self.area) else "N"
-        area = 1.0 if math.isnan(self.area) else self.area
+        unit, area = ("Pa", 1.0) if math.isnan(self.area) else ("N", self.area)
         lines = [
-            "  the interval holds the error of the computation only; what moves the design:",
-            *(
-                f"    {name}: {low} to {high}: {in_words(unit, area * at_low)} to"
-                f" {in_words(unit, area * at_high)}"
-                for name, low, high, at_low, at_high in zip(
-                    effects.source.values, effects.low.values, effects.high.values,
-                    effects.stress_at_low.values, effects.stress_at_high.values, strict=True,
-                )
-            ),
-        ]  # fmt: skip
+            "  the interval holds the error of the computation only; what moves the design:"
+        ]
+        for row in effects.to_dataframe().itertuples():
+            ends = [
+                in_words(unit, area * end) for end in (row.stress_at_low, row.stress_at_high)
+            ]
+            lines.append(f"    {row.Index}: {row.low} to {row.high}: {' to '.join(ends)}")
         families = [
             f"{name.removeprefix('stress by ')} {in_words(unit, area * value)}"
             for name, value in effects.attrs.items()
@@ -389,7 +385,7 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
 
 
 def bounded(lowest: float) -> bool:
-    """Return whether a least stress is a bound, neither zero nor infinite."""
+    """Return whether a least stress is a bound: finite and above zero."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 

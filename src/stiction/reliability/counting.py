@@ -55,7 +55,8 @@ class Counted(NamedTuple):
         return math.sqrt(held / (self.failures - last))
 
     def interval(self) -> tuple[float, float]:
-        """Return the interval of Clopper and Pearson, or the negative binomial one (step 2)."""
+        """Return the interval of Clopper and Pearson, or the negative binomial interval (step
+        2)."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]

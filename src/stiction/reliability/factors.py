@@ -88,7 +88,7 @@ class Counts(NamedTuple):
     def characteristic(self, confidence: float) -> float:
         """Return the 5 % quantile that a share `confidence` of the interfaces exceeds, Pa.
 
-        Onsets of an interface are those of a mean and a factor of 1 in its group, times
+        Onsets of an interface are onsets at a mean and a factor of 1 in its group, times
         its mean and factors at equal shares of its law.
         """
         random = self.state.experiment.random

@@ -14,7 +14,7 @@ Steps, with the same draws everywhere, so that differences are accurate:
    posterior given the family.
 3. For each constant solve the same samples at both ends of its range: a stated range, the 5 and 95
    % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its value.
-4. Multiply the design by the ratios of these quantiles to the first one.
+4. Multiply the design by the ratios of these quantiles to the first.
 """
 
 from collections.abc import Mapping

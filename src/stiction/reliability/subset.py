@@ -13,7 +13,7 @@ Steps. A level is the set of z with g(z) below its ceiling.
 2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. If this is
    below the requested threshold, take the threshold. If it is at the floor of g, take the number
    just above the floor.
-3. The probability of the next level is that of the last one times the share of its samples
+3. The probability of the next level is the probability of this level times the share of its samples
    strictly below the ceiling.
 4. Stop if the threshold, the floor or the requested probability is reached. Stop without having
    reached it if no sample goes on, after `MOST_LEVELS`, or if evaluations do not suffice.
@@ -176,7 +176,7 @@ def grow(
     step: float,
     rng: np.random.Generator,
 ) -> tuple[Array, Array, float, float]:
-    """Return states and values of chains, the given ones first, acceptance and last step size.
+    """Return states and values of chains, the given states first, acceptance and last step size.
 
     All chains move together (step 5). The step size follows their acceptance, ever more
     slowly.
@@ -214,8 +214,8 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` takes draws (k, dimension) to values (k,), of which low ones are rare and
-    at least `floor`. Each level has `samples`. It begins only if it does not exceed
+    `function` takes draws (k, dimension) to values (k,), where low values are rare and at
+    least `floor`. Each level has `samples`. It begins only if it does not exceed
     `max_evaluations`. `label` returns the number of the equally likely interface of each
     sample.
     """

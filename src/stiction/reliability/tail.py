@@ -133,7 +133,7 @@ class Tail(NamedTuple):
         It is NaN if fewer than `RESOLVED` samples of an interface are so low. For plain
         samples it is the share among the samples of that interface, because their number
         is random and makes most of the error near P = 1. Repetitions are added up, since
-        one may have few samples of an interface.
+        some have few samples of an interface.
         """
         chances, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -225,10 +225,10 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    Either all of them are complete, or there is a single incomplete one. `make` takes
-    (samples, number, evaluations left). `judge` returns the coefficient of variation, or
-    zero to stop. Many repetitions of moderate size, `first` to `largest`, bound the
-    memory.
+    Either all of them are complete, or there is a single incomplete repetition. `make`
+    takes (samples, number, evaluations left). `judge` returns the coefficient of
+    variation, or zero to stop. Many repetitions of moderate size, `first` to `largest`,
+    bound the memory.
     """
     done: list[Any] = []
     spent, size = 0, first

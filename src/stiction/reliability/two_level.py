@@ -1,4 +1,4 @@
-"""Two levels: an inexpensive limit state guides down the tail, and the exact one ends it.
+"""Two levels: an inexpensive limit state guides down the tail, and the exact limit state ends it.
 
 Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help of the
 guide's stress L, which is not. By the definition of conditional probabilities, for any
@@ -81,7 +81,7 @@ def bridge(
     floor: float = -math.inf,
     label: Label = lambda draws: np.zeros(len(draws), np.int64),
 ) -> Descent:
-    """Sample the exact lower tail near a threshold, or near a probability if none is given.
+    """Sample the exact lower tail near a threshold, or else near a probability.
 
     `samples` are exact evaluations for the middle factor. As many again walk in the
     failure set, and `max_evaluations` limits both. Without a failure the estimate is
