@@ -1,14 +1,14 @@
 """Samples computed in batches by threads or any executor, with the same numbers from each.
 
-Problem. Solve spans of samples on workers that come and go, in bounded memory, so that results do
-not depend on the workers.
+Problem. Solve spans of samples on workers that come and go, in bounded memory, so that
+results do not depend on the workers.
 
 Steps:
 
-1. While a worker is free, cut a piece off the first waiting span: about half a second of work at
-   the pace of the latest piece (`piece_size`).
-2. Submit the piece. An executor that runs it at once returns a finished future. Hand its table over
-   before the next piece begins.
+1. While a worker is free, cut a piece off the first waiting span: about half a second of
+   work at the pace of the latest piece (`piece_size`).
+2. Submit the piece. An executor that runs it at once returns a finished future. Hand its
+   table over before the next piece begins.
 3. Wait for the first futures, at most a second, because workers come and go.
 4. Yield each table, and take its pace.
 """

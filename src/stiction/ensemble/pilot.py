@@ -1,14 +1,15 @@
 """A pilot: some samples of an approximate method solved by its exact counterpart, too.
 
-Problem. How far are onsets by an approximate method, such as the local criterion, from the exact
-onsets of the same samples?
+Problem. How far are onsets by an approximate method, such as the local criterion, from
+the exact onsets of the same samples?
 
 Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
 
 1. Take the first samples, and the weakest among the first `MAX_RANKED_SAMPLES`.
-2. Ask the method by a quick test whether they may differ from the exact onset. If not, stop.
-3. Solve them exactly. The difference, over the mean of the exact onset, has a mean (bias) and a
-   standard deviation (scatter). Take the largest values of all points.
+2. Ask the method by a quick test whether they may differ from the exact onset. If not,
+   stop.
+3. Solve them exactly. The difference, over the mean of the exact onset, has a mean (bias)
+   and a standard deviation (scatter). Take the largest values of all points.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,30 +1,35 @@
 """Whether measured peaks agree with a prediction: tests whose p-values hold for few peaks.
 
-Problem. n peaks have the empirical distribution F_n. The prediction has the distribution F, given
-by a sample or by a posterior. Find the probability that n peaks from F lie as far from F as the
-measured peaks, for two distances:
+Problem. n peaks have the empirical distribution F_n. The prediction has the distribution
+F, given by a sample or by a posterior. Find the probability that n peaks from F lie as
+far from F as the measured peaks, for two distances:
 
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
 
-Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates) are in Davison and
-Hinkley, Bootstrap Methods and their Application (1997), sections 4.2 and 4.3. The sum for W^2 is in
-Anderson and Darling (1952), Annals of Mathematical Statistics 23, 193.
+Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates) are in
+Davison and Hinkley, Bootstrap Methods and their Application (1997), sections 4.2 and 4.3.
+The sum for W^2 is in Anderson and Darling (1952), Annals of Mathematical Statistics 23,
+193.
 
 Steps for a predicted sample:
 
-1. Under the hypothesis, each choice of n values from all measured and predicted values together is
-   equally likely. This is exact for any numbers of values, and for equal values. F is then the
-   distribution of the remaining values, and the integral is over all values.
-2. Choose n values at random, and compute both distances between them and the remaining values.
-3. The p-value is the share of choices that are at least as far apart as the measured choice.
+1. Under the hypothesis, each choice of n values from all measured and predicted values
+   together is equally likely. This is exact for any numbers of values, and for equal
+   values. F is then the distribution of the remaining values, and the integral is over
+   all values.
+2. Choose n values at random, and compute both distances between them and the remaining
+   values.
+3. The p-value is the share of choices that are at least as far apart as the measured
+   choice.
 
 Steps for a posterior. The peaks of one campaign share the unknown parameters.
 
 4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of the posterior.
-5. Draw each simulated campaign from one of these distributions. Take distances from their mean.
-   Campaigns with several kinds of specimens add W^2 and take the largest D.
-6. The p-value is the share of campaigns that are at least as far away as the measured campaign.
+5. Draw each simulated campaign from one of these distributions. Take distances from their
+   mean. Campaigns with several kinds of specimens add W^2 and take the largest D.
+6. The p-value is the share of campaigns that are at least as far away as the measured
+   campaign.
 """
 
 from collections.abc import Mapping

@@ -1,20 +1,20 @@
 """The scatter between specimens, and records without it.
 
-Problem. Records k = 1, ..., n of different specimens have means with logarithms L_k. A field alone
-would give L_k the variance v_k. Estimate the variance s between specimens, and scale the records as
-if all came from one specimen.
+Problem. Records k = 1, ..., n of different specimens have means with logarithms L_k. A
+field alone would give L_k the variance v_k. Estimate the variance s between specimens,
+and scale the records as if all came from one specimen.
 
-Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of Standards 87, 377.
-Viechtbauer (2007), Statistics in Medicine 26, 37.
+Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of Standards
+87, 377. Viechtbauer (2007), Statistics in Medicine 26, 37.
 
 Steps:
 
-1. With weights 1/(s + v_k), take the mean m(s) of the logarithms and
-   Q(s) = sum (L_k - m(s))^2/(s + v_k). At the true s it is chi-square distributed with n - 1
-   degrees of freedom.
+1. With weights 1/(s + v_k), take the mean m(s) of the logarithms and Q(s) = sum (L_k -
+   m(s))^2/(s + v_k). At the true s it is chi-square distributed with n - 1 degrees of
+   freedom.
 2. Estimate s by Q(s) = n - 1, the mean of this distribution. Take s = 0 if Q(0) is smaller.
-3. Draw the logarithms together until Q(0) = n - 1, and scale the records to these means. Equal
-   means would lack the variance that a field itself has from record to record.
+3. Draw the logarithms together until Q(0) = n - 1, and scale the records to these means.
+   Equal means would lack the variance that a field itself has from record to record.
 """
 
 import math

@@ -1,28 +1,30 @@
 """Intervals of a fit, and fields as likely as the fit, from fits to simulated records.
 
-Problem. A fit estimates parameters theta from records. Find intervals that contain the true theta
-with a given probability, and fields that are as likely as the estimate.
+Problem. A fit estimates parameters theta from records. Find intervals that contain the
+true theta with a given probability, and fields that are as likely as the estimate.
 
-Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their Application (1997),
-section 5.2. Ends by test inversion: Carpenter (1999), Journal of the Royal Statistical Society B
-61,
-159.
+Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their
+Application (1997), section 5.2. Ends by test inversion: Carpenter (1999), Journal of the
+Royal Statistical Society B 61, 159.
 
 Steps:
 
 1. Simulate records from the estimate, and fit each of them from the estimate as a start.
 2. Bring each parameter to a scale on which its error is about normal (`Scale`).
-3. The error of a repetition is (estimate of the repetition - estimate)/width. The width is in
-   proportion to the square root of the correlation length, because a record holds few of these.
-4. Subtract the quantiles of the error, times the width, from the estimate: a first interval.
-5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its first
-   interval. Take the upper end of each interval from the field with the longer length, and the
-   lower end from the other field. Exchange them for parameters whose estimates fall with the
-   correlation length.
+3. The error of a repetition is (estimate of the repetition - estimate)/width. The width
+   is in proportion to the square root of the correlation length, because a record holds
+   few of these.
+4. Subtract the quantiles of the error, times the width, from the estimate: a first
+   interval.
+5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its
+   first interval. Take the upper end of each interval from the field with the longer
+   length, and the lower end from the other field. Exchange them for parameters whose
+   estimates fall with the correlation length.
 6. Bounds of the marginal end outside of the values, and other parameters at their ranges.
 7. A likely field is the estimate less the error of one repetition, times the width.
 
-Departures. One step of the inversion is made, with the correlation length for all parameters.
+Departures. One step of the inversion is made, with the correlation length for all
+parameters.
 """
 
 import math

@@ -1,23 +1,25 @@
 """Measured curves of force against travel or time: peak, precursors and plateau of each test.
 
-Problem. Readings F_i carry white noise of standard deviation s. Find the peak, the drops before it
-(precursors: a part of the interface slips and comes to rest) and the plateau after it.
+Problem. Readings F_i carry white noise of standard deviation s. Find the peak, the drops
+before it (precursors: a part of the interface slips and comes to rest) and the plateau
+after it.
 
-Source. The range of white noise is in David and Nagaraja, Order Statistics (2003), section 10.5.
-The choice of thresholds and turning points is our own.
+Source. The range of white noise is in David and Nagaraja, Order Statistics (2003),
+section 10.5. The choice of thresholds and turning points is our own.
 
 Steps:
 
-1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line, and have the
-   variance 6 s^2. Their median gives s, because drops are too rare to change a median. A load cell
-   that reads in steps q has at least s = q/sqrt(12).
-2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n). Only a larger
-   fall is a drop.
-3. Turning points. Keep the highest reading since the last drop. A drop begins at this reading when
-   the force lies more than the threshold below it. Then keep the lowest reading. The drop ends at
-   this reading when the force lies more than the threshold above it.
-4. The peak is the largest force. Drops that begin before the peak are precursors. The plateau
-   follows the drop at the peak.
+1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line, and have
+   the variance 6 s^2. Their median gives s, because drops are too rare to change a
+   median. A load cell that reads in steps q has at least s = q/sqrt(12).
+2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n). Only
+   a larger fall is a drop.
+3. Turning points. Keep the highest reading since the last drop. A drop begins at this
+   reading when the force lies more than the threshold below it. Then keep the lowest
+   reading. The drop ends at this reading when the force lies more than the threshold
+   above it.
+4. The peak is the largest force. Drops that begin before the peak are precursors. The
+   plateau follows the drop at the peak.
 """
 
 from __future__ import annotations
@@ -406,8 +408,8 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
 
 
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number of precursors, largest size, and force at the first precursor or else the
-    peak."""
+    """Return number of precursors, largest size, and force at the first precursor or else
+    the peak."""
     starts, ends = turning_points(force, threshold)
     before = starts < int(np.argmax(force))
     sizes = force[starts[before]] - force[ends[before]]

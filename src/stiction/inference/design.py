@@ -1,7 +1,8 @@
 """Designs of tests: the expected information before any test is made.
 
-Problem. Parameters theta have a prior. Compute how much a design, such as ten tests, is expected to
-tell about each parameter: the mean over campaigns of the divergence of posterior from prior,
+Problem. Parameters theta have a prior. Compute how much a design, such as ten tests, is
+expected to tell about each parameter: the mean over campaigns of the divergence of
+posterior from prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
@@ -11,9 +12,9 @@ Steps, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
 2. Draw the peaks from the same simulated onsets that give the likelihood.
-3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`). Known
-   parameters keep their drawn values. If the posterior lies between the points of a coarse grid,
-   draw the box closer around the true parameters.
+3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`).
+   Known parameters keep their drawn values. If the posterior lies between the points of a
+   coarse grid, draw the box closer around the true parameters.
 4. Take the divergence of each marginal posterior. I is the mean over campaigns.
 
 `stiction.inference.widths` answers the same question for a fit or a posterior.

@@ -1,25 +1,29 @@
 """A random field from measured profiles, with intervals and doubts.
 
-Problem. Records are samples of one random field with noise. Find the field, and how well the
-records determine it.
+Problem. Records are samples of one random field with noise. Find the field, and how well
+the records determine it.
 
-Sources. The parts are in `records`, `window`, `whittle`, `marginal_fit`, `estimate`, `bootstrap`,
-`between` and `specimens`, with their sources.
+Sources. The parts are in `records`, `window`, `whittle`, `marginal_fit`, `estimate`,
+`bootstrap`, `between` and `specimens`, with their sources.
 
 Steps:
 
-1. Turn profiles into records at equal distances, and refuse white noise (`records`, `window`).
+1. Turn profiles into records at equal distances, and refuse white noise (`records`,
+   `window`).
 2. Fit each family of marginals together with the spectrum, and order them by their scores
    (`estimate`).
 3. Fit records that are simulated from the best family, and from others that may be true
-   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and go on with 2.
-4. Take intervals from the repetitions. If records are of different specimens, take the intervals of
-   mean and scatter from the posterior by the levels of the records (`specimens`).
+   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and go on
+   with 2.
+4. Take intervals from the repetitions. If records are of different specimens, take the
+   intervals of mean and scatter from the posterior by the levels of the records
+   (`specimens`).
 5. Compare the distances of the data from marginal and spectrum with the distances of the
-   repetitions. Logarithms of these distances are about normal, which gives p-values by Student's
-   distribution.
-6. Draw likely fields from the families in proportion to their weights, evenly by a sequence of
-   Niederreiter (Random Number Generation and Quasi-Monte Carlo Methods, 1992, chapter 3).
+   repetitions. Logarithms of these distances are about normal, which gives p-values by
+   Student's distribution.
+6. Draw likely fields from the families in proportion to their weights, evenly by a
+   sequence of Niederreiter (Random Number Generation and Quasi-Monte Carlo Methods, 1992,
+   chapter 3).
 """
 
 import math

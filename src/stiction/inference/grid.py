@@ -3,16 +3,16 @@
 Problem. The prior is uniform in the unit cube. Compute the posterior density L(u)/Z of the
 parameters u from the likelihood L, with the evidence Z = int L du. L may be narrow.
 
-Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013), section 10.1.
-Closing in is our own.
+Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013), section
+10.1. Closing in is our own.
 
 Steps:
 
 1. Divide a box into equal cells, and compute log L in the middle of each cell.
-2. The mass of a cell is L over the sum of L. Z is the sum of L times the volume of a cell (midpoint
-   rule). The outside of the box is neglected.
-3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each parameter, and keep
-   one more cell on either side.
+2. The mass of a cell is L over the sum of L. Z is the sum of L times the volume of a cell
+   (midpoint rule). The outside of the box is neglected.
+3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each
+   parameter, and keep one more cell on either side.
 4. Repeat until no side of the box shrinks by a tenth, at most `MAX_GRID_ZOOMS` times.
 """
 

@@ -1,18 +1,22 @@
 """Parameters of a random interface from the peaks of repeated tests.
 
-Problem. Find the posterior p(theta | y) of parameters theta with a prior from measured peaks y.
+Problem. Find the posterior p(theta | y) of parameters theta with a prior from measured
+peaks y.
 
-Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis (2013), section
-10.1. The choice of the box is our own.
+Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis (2013),
+section 10.1. The choice of the box is our own.
 
 Steps:
 
-1. If only mean and scatter between specimens are unknown, go to `stiction.inference.joined`.
+1. If only mean and scatter between specimens are unknown, go to
+   `stiction.inference.joined`.
 2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
-3. For an expensive method, find the posterior by the local criterion first, if it applies. Its box,
-   slightly widened, is the relevant part of the prior. Otherwise take the whole prior.
+3. For an expensive method, find the posterior by the local criterion first, if it
+   applies. Its box, slightly widened, is the relevant part of the prior. Otherwise take
+   the whole prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on a grid (`grid`).
-5. If the posterior reaches an end of the box, widen the box on this side, and repeat step 4.
+5. If the posterior reaches an end of the box, widen the box on this side, and repeat step
+   4.
 """
 
 import itertools

@@ -1,7 +1,7 @@
 """Profiles and peaks joined: onsets of the fields within, their posterior, and its agreement.
 
-See `stiction.inference.specimens` for the model, its sources and the steps. This file has step 1,
-the simulation, and the result with its notes.
+See `stiction.inference.specimens` for the model, its sources and the steps. This file has
+step 1, the simulation, and the result with its notes.
 """
 
 import math

@@ -5,24 +5,26 @@ variance its expectation is E_k. Find the parameters with the greatest likelihoo
 
     L = -sum_k w_k (log E_k + I_k/E_k).
 
-Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation for a finite window
-it is the debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika
-106, 251, and on planes of Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
-Statistical Society B 84, 1526. Correlations of mapped fields: Grigoriu, Applied Non-Gaussian
-Processes (1995), section 3.1.
+Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation for a
+finite window it is the debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and
+Early (2019), Biometrika 106, 251, and on planes of Guillaumin, Sykulski, Olhede and
+Simons (2022), Journal of the Royal Statistical Society B 84, 1526. Correlations of mapped
+fields: Grigoriu, Applied Non-Gaussian Processes (1995), section 3.1.
 
 Steps:
 
 1. Average the periodograms of all records of one geometry (`window`).
-2. The correlation of the values is a power series in the correlation of z, whose coefficients are
-   the squared Hermite coefficients of the map. White noise adds its share at zero lag.
-3. E_k follows from this correlation exactly for the window. The variance is a free parameter, so
-   that its error in a short record does not disturb the shape of the spectrum.
-4. Add a floor of a thousandth of the highest power to I_k and E_k. A spectrum that is cut off has
-   almost no power at high wavenumbers, where rounding and higher orders of the map would decide.
-   The score stays unbiased, and power below the floor ceases to count.
-5. Take the best point of a coarse grid of parameters, and climb by scoring (`marginal_fit.climb`).
-   Fisher's information is sum w d d^T with d = d log E/d theta.
+2. The correlation of the values is a power series in the correlation of z, whose
+   coefficients are the squared Hermite coefficients of the map. White noise adds its
+   share at zero lag.
+3. E_k follows from this correlation exactly for the window. The variance is a free
+   parameter, so that its error in a short record does not disturb the shape of the
+   spectrum.
+4. Add a floor of a thousandth of the highest power to I_k and E_k. A spectrum that is cut
+   off has almost no power at high wavenumbers, where rounding and higher orders of the
+   map would decide. The score stays unbiased, and power below the floor ceases to count.
+5. Take the best point of a coarse grid of parameters, and climb by scoring
+   (`marginal_fit.climb`). Fisher's information is sum w d d^T with d = d log E/d theta.
 
 Departures. The map v, the noise and the floor are our own.
 """
@@ -65,7 +67,7 @@ FLOOR = 1e-3
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
 """Hermite orders of the map of a marginal, and steps of z that give them to 1e-4."""
-REPORTED = ("correlation_length", "exponent", "anisotropy")
+REPORTED_AT_END = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
 """Largest distance of an estimate at an end of a range, as a share of the range."""
 LOG_STEP = 1e-4
@@ -76,8 +78,8 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in Hermite orders 0, 1, ..., and the rest as the last
-    share."""
+    """Return the shares of the variance in Hermite orders 0, 1, ..., and the rest as the
+    last share."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
@@ -220,7 +222,7 @@ class SpectrumFamily:
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
         pairs = zip(self.of(model).items(), near, strict=True)
-        return {name: value for (name, value), end in pairs if end and name in REPORTED}
+        return {name: value for (name, value), end in pairs if end and name in REPORTED_AT_END}
 
 
 class Whittle(NamedTuple):

@@ -1,7 +1,7 @@
 """Expected widths of intervals and of the design after further tests or profiles.
 
-Problem. Specimens were measured, and their mean, scatter and fields have a posterior. How wide will
-the intervals and the design stress be after further measurements?
+Problem. Specimens were measured, and their mean, scatter and fields have a posterior. How
+wide will the intervals and the design stress be after further measurements?
 
 Source. Expectations over simulated campaigns, as in Lindley (1956), Annals of Mathematical
 Statistics 27, 986, with a width in place of information.
@@ -11,8 +11,8 @@ Steps, for each design and each simulated campaign:
 1. Draw a truth (field, family, s and mean) from the posterior of the present measurements.
 2. Draw further peaks and levels of profiles from this truth.
 3. Compute the posterior of all measurements together (`stiction.inference.specimens`).
-4. Take the width of the 90 % interval of each parameter, and the design stress of the predictive
-   distribution. The result holds their means over campaigns.
+4. Take the width of the 90 % interval of each parameter, and the design stress of the
+   predictive distribution. The result holds their means over campaigns.
 
 Departure. Only the `MAX_FIELDS` fields with the largest mass are kept.
 """

@@ -1,27 +1,28 @@
 """The exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
-Problem. A record is not a period of the interface. Find the expectation of its periodogram after
-taper h (zero at gaps) and removal of a trend by the projection P. It is linear in the correlation
-C:
+Problem. A record is not a period of the interface. Find the expectation of its
+periodogram after taper h (zero at gaps) and removal of a trend by the projection P. It is
+linear in the correlation C:
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
-with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing and the loss of
-low wavenumbers to the trend.
+with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing and the
+loss of low wavenumbers to the trend.
 
-Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, section 3, for a
-line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
-Statistical Society B 84, 1526, for planes with gaps.
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251,
+section 3, for a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
+Journal of the Royal Statistical Society B 84, 1526, for planes with gaps.
 
 Steps:
 
-1. Fit orthonormal polynomials to the measured points: P is the identity less their projection.
+1. Fit orthonormal polynomials to the measured points: P is the identity less their
+   projection.
 2. For most wavenumbers the taper hides the trend, and a_k is the autocorrelation of h. One
    transform gives the expectation at all of them.
 3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
-4. The correlation comes from a transform of the spectrum on a period of `ROOM` records. Add the
-   density at all wavenumbers that look alike on the grid, the nearest exactly and the farther
-   aliases at few wavenumbers, because they are smooth.
+4. The correlation comes from a transform of the spectrum on a period of `ROOM` records.
+   Add the density at all wavenumbers that look alike on the grid, the nearest exactly and
+   the farther aliases at few wavenumbers, because they are smooth.
 
 Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
 """

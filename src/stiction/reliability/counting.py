@@ -1,19 +1,19 @@
 """Plain Monte Carlo: count the failures among the samples of the ensemble.
 
-Problem. Estimate P(T < s) from independent samples of the onset T, so that the coefficient of
-variation is at most a target.
+Problem. Estimate P(T < s) from independent samples of the onset T, so that the
+coefficient of variation is at most a target.
 
-Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With limits on the number of
-samples: Girshick, Mosteller and Savage (1946), Annals of Mathematical Statistics 17, 13. Intervals:
-Clopper and Pearson (1934), Biometrika 26, 404.
+Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With limits on the
+number of samples: Girshick, Mosteller and Savage (1946), Annals of Mathematical
+Statistics 17, 13. Intervals: Clopper and Pearson (1934), Biometrika 26, 404.
 
 Steps:
 
-1. Fix the number r of failures from the target: the error falls like 1/sqrt(r - 1). A rule that
-   stopped at a precise estimate would favour early failures.
+1. Fix the number r of failures from the target: the error falls like 1/sqrt(r - 1). A
+   rule that stopped at a precise estimate would favour early failures.
 2. Draw samples until there are r failures, within the limits on samples.
-3. If the last failure ended the count, the unbiased estimate is (r - 1)/(n - 1) for n samples up to
-   this failure. Otherwise it is the share of failures.
+3. If the last failure ended the count, the unbiased estimate is (r - 1)/(n - 1) for n
+   samples up to this failure. Otherwise it is the share of failures.
 """
 
 import math
@@ -55,8 +55,8 @@ class Counted(NamedTuple):
         return math.sqrt(held / (self.failures - last))
 
     def interval(self) -> tuple[float, float]:
-        """Return the interval of Clopper and Pearson, or the negative binomial interval (step
-        2)."""
+        """Return the interval of Clopper and Pearson, or the negative binomial interval
+        (step 2)."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]

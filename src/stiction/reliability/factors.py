@@ -1,9 +1,9 @@
 """Counting with many specimens for each solved field.
 
-Problem. Estimate the lower tail of the onset T of specimens whose strength is m b f(x): a mean m,
-a factor b between specimens and a field f within. A handful of parameters (m and the law of b)
-differs between equally likely interfaces of one field, and T is m b R(f) if the onset is in
-proportion to the strength. The solver is needed for R only.
+Problem. Estimate the lower tail of the onset T of specimens whose strength is m b f(x): a
+mean m, a factor b between specimens and a field f within. A handful of parameters (m and
+the law of b) differs between equally likely interfaces of one field, and T is m b R(f) if
+the onset is in proportion to the strength. The solver is needed for R only.
 
 Source. Conditional Monte Carlo (Hammersley, 1956, Mathematical Proceedings of the Cambridge
 Philosophical Society 52, 73; Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
@@ -12,14 +12,16 @@ Steps:
 
 1. Draw plain samples, as `stiction.monte_carlo` does, and solve them.
 2. Divide each onset by the factor and the mean of its own sample.
-3. Multiply it by the means of other interfaces of the same field, evenly spread over these, and by
-   factors at stratified shares of their laws: `FACTORS` specimens in all.
-4. Specimens of one solved sample are one family. The error follows from the shares of families
-   among the failures (`uncertainty.ancestral_variance`), as in subset simulation.
+3. Multiply it by the means of other interfaces of the same field, evenly spread over
+   these, and by factors at stratified shares of their laws: `SPECIMENS_PER_SAMPLE` specimens in
+   all.
+4. Specimens of one solved sample are one family. The error follows from the shares of
+   families among the failures (`uncertainty.ancestral_variance`), as in subset
+   simulation.
 5. Solve more samples until the error is small enough.
 
-Departures. Stratified sampling replaces the integral over b. If the onset is not in proportion to
-the strength, each sample has one specimen, and this is plain counting.
+Departures. Stratified sampling replaces the integral over b. If the onset is not in
+proportion to the strength, each sample has one specimen, and this is plain counting.
 """
 
 import math
@@ -36,7 +38,7 @@ from stiction.reliability.subset import Descent, Population
 from stiction.reliability.tail import Goal, Tail
 from stiction.reliability.uncertainty import generator
 
-FACTORS = 128
+SPECIMENS_PER_SAMPLE = 128
 """Specimens for each solved sample."""
 CHARACTERISTIC = 0.05
 """Share of the specimens below the characteristic value."""
@@ -100,7 +102,7 @@ class Counts(NamedTuple):
         for number in np.unique(law[first]):
             rows = np.flatnonzero(law[first] == number)
             ratios[rows] /= laws[number].distribution.ppf(self.shares[rows, 0])
-        steps = (np.arange(FACTORS) + 0.5) / FACTORS
+        steps = (np.arange(SPECIMENS_PER_SAMPLE) + 0.5) / SPECIMENS_PER_SAMPLE
         factors = np.array([one.distribution.ppf(steps) for one in laws])
         quantiles = []
         for number, group in enumerate(random.groups):
@@ -150,14 +152,18 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
         ratios[rows] /= from_normal(laws[number], draws[rows, column])
     # 3.
     rng = generator(experiment.seed, 5, first)
-    steps = (np.arange(FACTORS) + rng.random((samples, FACTORS))) / FACTORS
-    chosen = np.empty((samples, FACTORS), np.int64)
+    steps = (
+        np.arange(SPECIMENS_PER_SAMPLE) + rng.random((samples, SPECIMENS_PER_SAMPLE))
+    ) / SPECIMENS_PER_SAMPLE
+    chosen = np.empty((samples, SPECIMENS_PER_SAMPLE), np.int64)
     group = random.groups[members]
     for number in np.unique(group):
         alike, rows = np.flatnonzero(random.groups == number), np.flatnonzero(group == number)
         chosen[rows] = alike[(steps[rows] * alike.size).astype(np.int64)]
     shares = rng.permuted(
-        (np.arange(FACTORS) + rng.random((samples, FACTORS))) / FACTORS, axis=1
+        (np.arange(SPECIMENS_PER_SAMPLE) + rng.random((samples, SPECIMENS_PER_SAMPLE)))
+        / SPECIMENS_PER_SAMPLE,
+        axis=1,
     )
     factors = np.empty(shares.shape)
     for number in np.unique(law[chosen]):

@@ -1,20 +1,21 @@
 """Failure probability, design stress and the curve of both, by counting or by the tail.
 
-Problem. The onset T of a random interface has the distribution P(T < s). Estimate it at a stress s,
-or the stress of a probability, with a given coefficient of variation.
+Problem. The onset T of a random interface has the distribution P(T < s). Estimate it at a
+stress s, or the stress of a probability, with a given coefficient of variation.
 
-Sources. Each algorithm has its own file: `counting`, `factors`, `subset`, `two_level`, `tail`.
+Sources. Each algorithm has its own file: `counting`, `factors`, `subset`, `two_level`,
+`tail`.
 
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
 2. Count with many specimens for each solved field, if this costs less (`factors`).
-3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the method is too
-   slow for chains (`counting`). Sample the tail if they are rare (`tail`).
-4. If interfaces are drawn from a fit or a posterior, draw more of them until the error by their
-   number is small enough, and repeat steps 1 to 3.
-5. Solve some samples near the stress exactly, if the method is approximate, and warn if more or
-   fewer of them fail (`answer.exact_doubts`).
+3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the
+   method is too slow for chains (`counting`). Sample the tail if they are rare (`tail`).
+4. If interfaces are drawn from a fit or a posterior, draw more of them until the error by
+   their number is small enough, and repeat steps 1 to 3.
+5. Solve some samples near the stress exactly, if the method is approximate, and warn if
+   more or fewer of them fail (`answer.exact_doubts`).
 """
 
 import math

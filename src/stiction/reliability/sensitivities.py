@@ -1,7 +1,8 @@
 """Effects of families of the factor and of assumed constants on a design.
 
-Problem. The interval of a design contains the error of the computation. Assumptions move the design
-more: constants of the problem that were not measured, and the family of the factor. How much?
+Problem. The interval of a design contains the error of the computation. Assumptions move
+the design more: constants of the problem that were not measured, and the family of the
+factor. How much?
 
 Source. Local sensitivities with common random numbers, as in Asmussen and Glynn, Stochastic
 Simulation (2007), chapter VII.
@@ -10,10 +11,11 @@ Steps, with the same draws everywhere, so that differences are accurate:
 
 1. Solve `SAMPLES_PER_END` samples, and take the quantile at the probability of the design
    (`factors.solve`).
-2. For each family take the quantile over the interfaces with this family. They are draws from the
-   posterior given the family.
-3. For each constant solve the same samples at both ends of its range: a stated range, the 5 and 95
-   % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its value.
+2. For each family take the quantile over the interfaces with this family. They are draws
+   from the posterior given the family.
+3. For each constant solve the same samples at both ends of its range: a stated range, the
+   5 and 95 % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its
+   value.
 4. Multiply the design by the ratios of these quantiles to the first.
 """
 

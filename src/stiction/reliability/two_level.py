@@ -6,12 +6,12 @@ ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-If L follows E closely, the last factor is near one and the middle factor is not small. Then a few
-hundred exact evaluations replace thousands.
+If L follows E closely, the last factor is near one and the middle factor is not small.
+Then a few hundred exact evaluations replace thousands.
 
-Source. Subset simulation with less expensive models on its first levels is due to Ullmann and
-Papaioannou (2015), Multilevel estimation of rare events. The choice of b and the walks that
-measure the last factor are our own.
+Source. Subset simulation with less expensive models on its first levels is due to Ullmann
+and Papaioannou (2015), Multilevel estimation of rare events. The choice of b and the
+walks that measure the last factor are our own.
 
 Steps:
 
@@ -19,11 +19,12 @@ Steps:
    level. Its levels are candidates for L < b, each with its P(L < b).
 2. From the rarest level on, solve some of its samples exactly. The share with E < s is the
    middle factor. If a probability is requested, s is the quantile of these that meets it.
-3. From failures among these, walk among the failures E < s (`subset.grow`), and forget the
-   first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is the last factor.
-   `_covered` estimates its error, with one observation for each family of walkers.
-4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise go on with 2 at the
-   next less rare level, as far as evaluations and levels with draws allow.
+3. From failures among these, walk among the failures E < s (`subset.grow`), and forget
+   the first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is the last
+   factor. `_covered` estimates its error, with one observation for each family of
+   walkers.
+4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise go on with 2 at
+   the next less rare level, as far as evaluations and levels with draws allow.
 
 Failures that L misses and that no short walk reaches are never found:
 `stiction.reliability.tail` compares beforehand how L and E rank samples.

@@ -1,8 +1,8 @@
 """Errors of estimated probabilities: intervals, and the variance of correlated chains.
 
-Sources. Intervals of a count: Clopper and Pearson (1934), Biometrika 26, 404. Variance of chains by
-their genealogy: Chan and Lai (2013), Annals of Statistics 41, 2877; Lee and Whiteley (2018),
-Biometrika 105, 609.
+Sources. Intervals of a count: Clopper and Pearson (1934), Biometrika 26, 404. Variance of
+chains by their genealogy: Chan and Lai (2013), Annals of Statistics 41, 2877; Lee and
+Whiteley (2018), Biometrika 105, 609.
 """
 
 import math
