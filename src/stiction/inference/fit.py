@@ -53,7 +53,7 @@ from stiction.inference.bootstrap import (
 )
 from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
 from stiction.inference.marginal_fit import Family, family_of
-from stiction.inference.records import records_of
+from stiction.inference.records import records_of, refuse_uncorrelated
 from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
@@ -447,6 +447,7 @@ def fit_field(
     windows, rows = windowed(records, detrend)
     with prefixed("fit_field"):
         factor_prior = FactorPrior.of(prior)
+    refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:
         # 2.

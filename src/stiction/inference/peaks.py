@@ -92,7 +92,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
         return peaks
     if isinstance(peaks, Curves):
         return make_peaks(peaks.peaks, peaks.unit)
-    if hasattr(peaks, "columns"):
+    if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
         with prefixed("peaks"):
             return _of_table(table_of_frame(peaks), None, Options())
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
