@@ -294,7 +294,7 @@ def _statistics(axes, table, end) -> None:
     for place in (_PLACES[0] + 0.6, _PLACES[-1] - 0.6):
         axes.text(place, 0, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
                   fontsize=9)  # fmt: skip
-    axes.set_xlabel(XI)
+    axes.set(xlabel=XI, xlim=common.span(_PLACES))  # also without a limit at infinity
 
 
 def figure_6(d: Data):
