@@ -90,7 +90,7 @@ def test_a_function_cannot_be_written_down(tmp_path):
 
     field = dataclasses.replace(BASE.random.strength, spectrum=st.CustomSpectrum(bell, 8e3))
     own = in_python(random=field)
-    words = "cannot be written down: spectrum.function is the Python function 'bell'; use"
+    words = "cannot be written down: spectrum.function is the Python function 'bell'"
     refuses(words, lambda: own.to_toml(tmp_path / "study.toml"))
     assert "bell" in own.run().attrs["study_incomplete"]
     pair = in_python(

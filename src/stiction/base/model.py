@@ -123,7 +123,7 @@ def as_numbers(value: Any) -> Array:
     try:
         return real_array(value)
     except (TypeError, OverflowError) as error:
-        raise InputError(f"must be numbers; {error}") from None
+        raise InputError(f"must be numbers, {error}") from None
 
 
 def is_unplaced(value: Any) -> bool:
@@ -527,5 +527,5 @@ def check_memory(name: str, needed: float, advice: str = "take fewer") -> None:
     if needed > there:
         raise InputError(
             f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
-            f" {there / 2**30:,.1f} GiB of this machine; {advice}"
+            f" {there / 2**30:,.1f} GiB of this machine: {advice}"
         )

@@ -150,17 +150,18 @@ class Interface:
         Number of nodes in each direction, even and at least 8, at most 2^24 in all.
         Powers of two are fastest.
     width : float, optional
-        Width of a line, m, which turns its stresses into forces, N. A plane has its area,
-        and a specimen its thickness.
+        Width of a line, m, which turns its stresses into forces, N. A plane has its
+        area, and a specimen its thickness.
     ends : {"periodic", "free"}
-        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the centres
-        of cells, x_i = (i + 1/2) length/nodes, and the interface stops at its ends.
+        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the
+        centres of cells, x_i = (i + 1/2) length/nodes, and the interface stops at
+        its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
-        Part of the interface that can break, by default all of it. Beyond, both solids
-        are a single piece, which never slips. A line takes its two ends (m, or text such
-        as "0.5 km"), a plane two pairs (along x and y) or an `Ellipse`. Both take a mask:
-        a boolean array of shape (*shape), in a study file the path of a ``.npy``. Nodes
-        at the ends can break.
+        Part of the interface that can break, by default all of it. Beyond, both
+        solids are a single piece, which never slips. A line takes its two ends (m,
+        or text such as "0.5 km"), a plane two pairs (along x and y) or an
+        `Ellipse`. Both take a mask: a boolean array of shape (*shape), in a study
+        file the path of a ``.npy``. Nodes at the ends can break.
 
     Notes
     -----

@@ -94,8 +94,8 @@ class GradientLoad(LoadShape):
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
 
-    The profile is proportional to 1 + excess exp(-distance/decay). Both sides of the edge
-    are loaded, like a specimen and its mirror image.
+    The profile is proportional to 1 + excess exp(-distance/decay). Both sides of
+    the edge are loaded, like a specimen and its mirror image.
 
     Parameters
     ----------

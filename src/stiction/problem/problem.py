@@ -90,17 +90,19 @@ class Problem:
     load : Load, optional
         By default uniform and without initial stress.
     mode : {"II", "III"}
-        In-plane or anti-plane shear. A plane is in-plane along x and anti-plane along y.
+        In-plane or anti-plane shear. A plane is in-plane along x and anti-plane
+        along y.
     specimen : Blocks, optional
-        Finite blocks instead of half-spaces. Their drive makes the load profile, the
-        interface ends with them (`interface.ends` is "free"), and tau_0 is the drive: the
-        mean stress that the drive would cause without slip.
+        Finite blocks instead of half-spaces. Their drive makes the load profile,
+        the interface ends with them (`interface.ends` is "free"), and tau_0 is the
+        drive: the mean stress that the drive would cause without slip.
 
     Raises
     ------
     InputError
-        If an array has another shape than the interface, fewer than four nodes span the
-        nucleation length, or another argument is invalid. The message lists every problem.
+        If an array has another shape than the interface, fewer than four nodes span
+        the nucleation length, or another argument is invalid. The message lists
+        every problem.
 
     Examples
     --------
@@ -485,22 +487,23 @@ class Problem:
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or profiles
-            by name: 'strength' and any others in `PROFILES`, but only 'weakening_rate',
-            'critical_slip' or 'fracture_energy'. Give each profile here or in the
-            problem, not in both. All but the strength may also be (samples, 1) or a
-            number. Such a 'normal_pressure' is a mean, which glued blocks distribute. A
-            'friction_coefficient' in place of the strength, or a DataArray that states
-            the unit 1, is multiplied by the pressure.
+            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or
+            profiles by name: 'strength' and any others in `PROFILES`, but only
+            'weakening_rate', 'critical_slip' or 'fracture_energy'. Give each
+            profile here or in the problem, not in both. All but the strength may
+            also be (samples, 1) or a number. Such a 'normal_pressure' is a mean,
+            which glued blocks distribute. A 'friction_coefficient' in place of the
+            strength, or a DataArray that states the unit 1, is multiplied by the
+            pressure.
         accept : collection of {"overstress"}
             Extreme profiles that the method accepts: initial stress above the strength.
 
         Raises
         ------
         InputError
-            If a name, shape or value is invalid, a strength is not above the initial
-            stress, no strength is above the residual strength, or a `Sample` was made by
-            another problem. The message lists every problem.
+            If a name, shape or value is invalid, a strength is not above the
+            initial stress, no strength is above the residual strength, or a
+            `Sample` was made by another problem. The message lists every problem.
 
         Notes
         -----
@@ -620,7 +623,8 @@ class Problem:
         rates = self._rates(strength, residual, scale, value)
         constant = strength <= residual
         if constant.any():
-            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no consequence.
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no
+            # consequence.
             residual = np.minimum(residual, strength)
             along = self.interface.axes
             slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)

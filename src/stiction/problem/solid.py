@@ -65,7 +65,8 @@ class Solid:
         ratio: Any = named.get("poisson_ratio")
         named = dict(named)
         modulus = check("youngs_modulus", named.pop("youngs_modulus"), Positive)
-        # Without a usable ratio any modulus will do: the ratio is what is complained of.
+        # Without a usable ratio any modulus will do: the ratio is what is
+        # complained of.
         usable = is_finite(ratio) and ratio > -1.0
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
         return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named

@@ -42,12 +42,12 @@ class Platen:
     Parameters
     ----------
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, N/m. 0 is dead load
-        (the force is controlled), ``float("inf")`` a rigid machine (the travel is
-        controlled).
+        Stiffness of the machine between the grips of the two blocks, N/m. 0 is dead
+        load (the force is controlled), ``float("inf")`` a rigid machine (the travel
+        is controlled).
     mass : float
-        Mass of the platen and the grip that move with a block, kg. It counts in ruptures
-        with inertia only.
+        Mass of the platen and the grip that move with a block, kg. It counts in
+        ruptures with inertia only.
     """
 
     stiffness: Stiffness = 0.0
@@ -67,11 +67,12 @@ class Pusher:
     width : float
         Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
-        The trailing side, from which slip is driven. Pushers on both sides take half of
-        the force each: the shear of a lap joint, whose bending and change of pressure are
-        not modelled.
+        The trailing side, from which slip is driven. Pushers on both sides take
+        half of the force each: the shear of a lap joint, whose bending and change
+        of pressure are not modelled.
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, N/m (see `Platen`).
+        Stiffness of the machine between the grips of the two blocks, N/m (see
+        `Platen`).
     mass : float
         Mass that moves with the pushers of a block, kg (see `Platen`).
     """
@@ -102,12 +103,13 @@ class Blocks:
     height : float
         Height of each block, m. Its length is the length of the interface.
     thickness : float, optional
-        Depth, m, which turns stresses into forces, N. A machine of finite stiffness needs
-        it.
+        Depth, m, which turns stresses into forces, N. A machine of finite stiffness
+        needs it.
     drive : Platen or Pusher
     pressing : {"frictionless", "glued"}
-        How the blocks are pressed: by a uniform pressure, or between plates on which the
-        top faces do not slide. Between plates, ``Load(normal_pressure=...)`` is the mean.
+        How the blocks are pressed: by a uniform pressure, or between plates on
+        which the top faces do not slide. Between plates,
+        ``Load(normal_pressure=...)`` is the mean.
     quality_factor : float
         Q of the slowest shear wave along a block, at the frequency f = c_s/(2 L).
         Momentum is lost at the rate 2 pi f/Q, in ruptures with inertia only. 25 is the

@@ -97,7 +97,7 @@ def _interfaces(given: Any) -> Any:
     """Return interfaces of a fit or a posterior, and anything else as it is."""
     if isinstance(given, Likely):
         raise InputError(
-            "random: has uncertain parameters; give them as uncertain= of the study"
+            "random: has uncertain parameters. Give them as uncertain= of the study"
         )
     return given.interfaces(FIRST_MEMBERS) if isinstance(given, Source) else given
 

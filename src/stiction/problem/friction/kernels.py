@@ -16,8 +16,8 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_allocating
 from stiction.problem.friction.parameters import Linear
 
-# numba compares the names of arguments with their annotations, so functions by type have none.
-# mypy: disable-error-code="no-untyped-def"
+# numba compares the names of arguments with their annotations, so functions by type
+# have none. mypy: disable-error-code="no-untyped-def"
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:

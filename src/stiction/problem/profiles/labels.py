@@ -1,9 +1,9 @@
 """A profile from anything that has labels: the right variable, its coordinates, its values in SI.
 
-A source is a file, an xarray object, a table of pandas, a surface, a quantity with a unit
-or an array. It may hold many variables, under names and in units that nobody agreed on. A
-wrong choice would be a wrong number, so every choice is either clear or refused.
-`labelled` takes these steps:
+A source is a file, an xarray object, a table of pandas, a surface, a quantity with
+a unit or an array. It may hold many variables, under names and in units that nobody
+agreed on. A wrong choice would be a wrong number, so every choice is either clear
+or refused. `labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
 2. Take a table without headings for a map if its comments, `rows` or `spacing` say so.
@@ -251,7 +251,7 @@ def labelled(
         place = in_si(array[dim], dim, "m", x_unit)
         if not np.all(np.isfinite(place)):
             where = _place(int(np.argmin(np.isfinite(place))), lines, place.size)
-            raise InputError(f"{dim} must be finite; {where} is not")
+            raise InputError(f"{dim} must be finite, and {where} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     return array.copy(data=values)
 
@@ -264,7 +264,7 @@ def _of_array(values: Any, source: Any) -> Any:
         array = real_array(values)
     except TypeError as error:
         raise InputError(
-            f"must be a path, an array, or a table with labels, got {describe(source)}; {error}"
+            f"must be a path, an array, or a table with labels, got {describe(source)}: {error}"
         ) from None
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")

@@ -1,8 +1,8 @@
 """Values put on the nodes of a line or a plane, and their gaps.
 
-The nodes are x_i = i L/n in each direction. The interface is periodic, so points may come
-in any order and begin anywhere. On a specimen, the nodes are x_i = (i + 1/2) L/n, and the
-profile stops at its ends. The steps are:
+The nodes are x_i = i L/n in each direction. The interface is periodic, so points
+may come in any order and begin anywhere. On a specimen, the nodes are x_i = (i +
+1/2) L/n, and the profile stops at its ends. The steps are:
 
 1. Find by how much of a spacing all points lie beside nodes, and warn of such an offset.
    Refuse points that do not lie on nodes, unless the caller wants to interpolate.

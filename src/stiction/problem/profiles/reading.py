@@ -1,8 +1,9 @@
 """Measured profiles: read in SI, and put on the nodes of an interface.
 
-A profile enters in three ways: through `read_profile`, as an argument of a call or an
-object (`at_nodes`), or by its name in a study file (`profile_in_file`). `read_profile`, to
-which study files lead, takes these steps, and `at_nodes` takes steps 1 and 4:
+A profile enters in three ways: through `read_profile`, as an argument of a call or
+an object (`at_nodes`), or by its name in a study file (`profile_in_file`).
+`read_profile`, to which study files lead, takes these steps, and `at_nodes` takes
+steps 1 and 4:
 
 1. Find the quantity in the source, in SI (`labels.py`).
 2. Turn heights or grey values into strengths, if the caller gives a map.
@@ -81,18 +82,18 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas and units of pint and astropy count. An ``.npy`` file
-        has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or
-        ``.xlsx`` file has columns, with or without a line of names such as ``x (mm),
-        strength (MPa)``. A ``.nc`` file has variables with `units`, and x as a
-        coordinate. A map over 'x' and 'y' is a table with both as columns, a matrix
-        without headings, a grey image (``.png``, ``.tif``), or a binary file or object
-        that SurfaceTopography reads.
+        Labels of xarray and pandas and units of pint and astropy count. An ``.npy``
+        file has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``, ``.dat``,
+        ``.tsv`` or ``.xlsx`` file has columns, with or without a line of names such
+        as ``x (mm), strength (MPa)``. A ``.nc`` file has variables with `units`,
+        and x as a coordinate. A map over 'x' and 'y' is a table with both as
+        columns, a matrix without headings, a grey image (``.png``, ``.tif``), or a
+        binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
-        Name, heading or number (from 0) of the column, coordinate or variable. By default
-        a name such as ``x`` or ``position``, and ``strength`` or ``tau_p``, decides, else
-        a single column in a unit of length or of `quantity`. Of two columns without
-        headings, the first is x.
+        Name, heading or number (from 0) of the column, coordinate or variable. By
+        default a name such as ``x`` or ``position``, and ``strength`` or ``tau_p``,
+        decides, else a single column in a unit of length or of `quantity`. Of two
+        columns without headings, the first is x.
     unit, x_unit : str, optional
         Units of the values and of positions if the source states none; SI by default.
     quantity : str
@@ -100,11 +101,13 @@ def read_profile(
         'critical_slip', 'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or
         'friction_coefficient' (1).
     strength : callable, optional
-        Map from heights (m, an array), or from the grey values of an image, to strengths
-        (Pa): ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
+        Map from heights (m, an array), or from the grey values of an image, to
+        strengths (Pa): ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then
+        read.
     missing : float, str or sequence of them, optional
-        Numbers and words that stand for a missing value, such as ``-9999`` or ``"Bad"``.
-        Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
+        Numbers and words that stand for a missing value, such as ``-9999`` or
+        ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always
+        do.
     decimal : {".", ","}, optional
         Decimal mark of a text, if the file does not tell it from a mark of thousands.
     skip : int
@@ -112,9 +115,11 @@ def read_profile(
     sheet : int or str
         Number (from 0) or name of the sheet of a workbook.
     record : int, optional
-        Number (from 0) of the record, if empty lines or repeated headings separate several.
+        Number (from 0) of the record, if empty lines or repeated headings separate
+        several.
     spacing : float or (float, float), optional
-        Distance of the points of an array, a matrix or an image along x, and along y, m.
+        Distance of the points of an array, a matrix or an image along x, and along
+        y, m.
     rows : {"x", "y"}, optional
         Direction in which the lines of a matrix in a text follow each other. It is y if
         comments state the width and height of the map, as Gwyddion writes them.
@@ -126,10 +131,10 @@ def read_profile(
     interpolate : bool
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
-        Refuse missing values (NaN, empty cells, missing points), fill them with straight
-        lines (on planes with triangles), or leave NaN, for `stiction.fit_field` and
-        `RandomField.given`, which draws equally likely values. Without an interface,
-        missing values always stay.
+        Refuse missing values (NaN, empty cells, missing points), fill them with
+        straight lines (on planes with triangles), or leave NaN, for
+        `stiction.fit_field` and `RandomField.given`, which draws equally likely
+        values. Without an interface, missing values always stay.
 
     Returns
     -------

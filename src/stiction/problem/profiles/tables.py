@@ -1,9 +1,9 @@
 """Tables of numbers, as instruments, spreadsheets and colleagues write them.
 
-A table is text or a sheet of a workbook. Its dialect is unknown: what separates columns,
-which mark is decimal, where headings end, where units stand. A wrong guess could change a
-value by a factor of a thousand, so the reader refuses a table wherever two readings of it
-differ. The steps are:
+A table is text or a sheet of a workbook. Its dialect is unknown: what separates
+columns, which mark is decimal, where headings end, where units stand. A wrong guess
+could change a value by a factor of a thousand, so the reader refuses a table
+wherever two readings of it differ. The steps are:
 
 1. Split lines into cells. The last lines that contain numbers show the separator.
 2. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
@@ -67,7 +67,8 @@ _EMPTY = {
     "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
 }  # fmt: skip
 """Words for a missing value, in lower case. A row of stars is another."""
-# Patterns never return to letters that they have passed: time grows linearly with the file.
+# Patterns never return to letters that they have passed: time grows linearly with
+# the file.
 _WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
 _NUMBER = re.compile(
     r"[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
@@ -133,9 +134,10 @@ class Table(NamedTuple):
 def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
     """Read a table of numbers from a text file or a sheet of a workbook.
 
-    Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#`` are
-    comments. The last line above the numbers names the columns, or gives their units below
-    a line of names. If there is no such line, the last comment may name the columns.
+    Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#``
+    are comments. The last line above the numbers names the columns, or gives their
+    units below a line of names. If there is no such line, the last comment may name
+    the columns.
 
     Columns become variables along 'row', with NaN in empty cells. A column without a name
     is called by its number, from 0. The attributes are `lines` (number of the line of
@@ -277,7 +279,8 @@ def _separator(lines: Sequence[str]) -> str:
         if ends and 2 * sum(mark in line for line in ends) >= len(ends):
             return mark
     last = ends[-1] if ends else ""
-    # Blanks separate numbers with decimal commas, '0,1 1000,5', but commas '0.1, 1000.5'.
+    # Blanks separate numbers with decimal commas, '0,1 1000,5', but commas '0.1,
+    # 1000.5'.
     between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
     return " " if "," not in last or between else ","
 
@@ -522,7 +525,8 @@ def _decimal_mark(
             f"{example[',']}, and {example['.']}: two decimal marks. Pass decimal=',' if points"
             " mark thousands, and decimal='.' if commas do"
         )
-    # Programs write the same number of decimals in a column: 980 above 1.020 means 1020.
+    # Programs write the same number of decimals in a column: 980 above 1.020 means
+    # 1020.
     whole = any(
         any(map(str.isdigit, columns[i])) and any("." in cell for cell in columns[i])
         for i in numeric
