@@ -17,7 +17,9 @@ from stiction.base.jit import jit, jit_allocating
 from stiction.problem.friction.parameters import Linear
 
 # numba compares the names of arguments with their annotations, so functions by type
-# have none. mypy: disable-error-code="no-untyped-def"
+# have none.
+
+# mypy: disable-error-code="no-untyped-def"
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:
