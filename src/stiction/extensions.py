@@ -32,3 +32,7 @@ __all__ = [
     "onset_variables",
     "register",
 ]
+
+
+def __dir__() -> list[str]:  # what completion lists
+    return __all__

@@ -21,6 +21,10 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 __all__ = ["limit_state", "simulator", "write_scec"]
 
 
+def __dir__() -> list[str]:  # what completion lists
+    return __all__
+
+
 @checked
 def simulator(
     problem: Problem,

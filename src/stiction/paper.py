@@ -10,6 +10,12 @@ from typing import Literal
 import stiction as st
 from stiction.base.model import Positive, checked
 
+__all__ = ["problem", "strength"]
+
+
+def __dir__() -> list[str]:  # what completion lists
+    return __all__
+
 
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
     """Return the problem of Albertini, Karrer, Grigoriu and Kammer (2020).

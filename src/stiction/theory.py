@@ -10,3 +10,7 @@ __all__ = [
     "nucleation_statistics",
     "nucleation_stress",
 ]
+
+
+def __dir__() -> list[str]:  # what completion lists
+    return __all__

@@ -6,6 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from checks import python
 from refusals import refuses
 
@@ -31,8 +32,12 @@ def test_imports_run_downwards():
 
 def test_public_modules_show_their_functions():
     """In `dir`, which completion asks, and in stubs, which editors read."""
-    for module in (st.external, st.plot, st.statistics, st.theory):
-        assert {*module.__all__} <= {*dir(module)}
+    for module in (st.extensions, st.external, st.paper, st.plot, st.statistics, st.theory):
+        assert sorted(module.__all__) == dir(module)
+    with pytest.raises(AttributeError, match="did you mean 'quantiles'"):
+        _ = st.statistics.quantile
+    with pytest.raises(AttributeError, match="did you mean 'monte_carlo'"):
+        _ = st.montecarlo
     stub = (SOURCES / "statistics" / "__init__.pyi").read_text()
     assert sorted(re.findall(r" as (\w+)", stub)) == st.statistics.__all__ == dir(st.statistics)
 

@@ -251,6 +251,12 @@ def _result(future: Future[Table], span: Span) -> Table:
     except InputError:
         raise
     except Exception as error:
+        if "pickle" in str(error):  # a PicklingError, AttributeError or TypeError
+            raise InputError(
+                f"executor: its processes cannot be sent a part of the study: {error}. Define"
+                " functions with def at the top of a module, not as a lambda or inside a"
+                " function, or leave out the executor, for threads"
+            ) from error
         last = span.first + span.samples - 1
         raise WorkerError(
             f"the worker on items {span.first} to {last} of point {span.point} was lost:"

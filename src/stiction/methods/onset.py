@@ -139,6 +139,11 @@ def onset(
     >>> found = st.onset(problem, tau_p, method=st.LocalCriterion())
     >>> bool(found.critical_stress.item() > tau_p.min())
     True
+
+    A table for pandas has a row for each sample:
+
+    >>> len(found.to_dataframe())
+    1
     """
     if refused := refusals(problem, method):
         raise InputError(refused)

@@ -36,3 +36,7 @@ __all__ = [
     "sensitivities",
     "specimen",
 ]
+
+
+def __dir__() -> list[str]:  # what completion lists
+    return __all__

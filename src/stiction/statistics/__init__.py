@@ -6,6 +6,7 @@ public in `stiction.theory`. `agreement` comes from `stiction.inference`. Each f
 on first use.
 """
 
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -21,7 +22,8 @@ __all__ = ["agreement", "density", "quantiles"]
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'stiction.statistics' has no attribute {name!r}")
+    near = "".join(f"; did you mean {other!r}?" for other in get_close_matches(name, _HOMES, 1))
+    raise AttributeError(f"module 'stiction.statistics' has no attribute {name!r}{near}")
 
 
 def __dir__() -> list[str]:

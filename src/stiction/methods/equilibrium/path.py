@@ -116,6 +116,12 @@ def equilibrium_path(
     >>> path = st.equilibrium_path(problem, tau_p[0], [0.5e6, 2e6])
     >>> path.sliding.values
     array([False,  True])
+
+    A table for pandas holds variables over the same dimensions: here 2 loads by 512 nodes, and
+    2 loads. ``path.drop_dims(["load", "x"]).to_dataframe()`` has a row for each event.
+
+    >>> len(path[["slip", "stress"]].to_dataframe()), len(path.mean_stress.to_dataframe())
+    (1024, 2)
     """
     given = _check_loads(loads)
     check("problem", problem, Problem)
