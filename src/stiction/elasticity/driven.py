@@ -56,6 +56,10 @@ class Driven:
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
 
+    def block(self, nodes: Any) -> Array:
+        """Return K between some nodes, Pa/m."""
+        return self.stiffness[np.ix_(nodes, nodes)]
+
     def mean_relief(self, slip: Array) -> Array:
         """Return h <q, d>/n, by which slip (..., n) lowers the mean stress, Pa."""
         mean: Array = self.relief * (slip * self.shear).mean(axis=-1)

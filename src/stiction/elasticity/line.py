@@ -81,6 +81,11 @@ class Line:
     relief: float = 0.0
     positive: float = 0.0
 
+    def block(self, nodes: Array) -> Array:
+        """Return K between some nodes, Pa/m."""
+        block: Array = self.entries.column[np.abs(np.subtract.outer(nodes, nodes))]
+        return block
+
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""
         (length,), (modulus,) = self.half_spaces

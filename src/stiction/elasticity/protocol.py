@@ -126,6 +126,9 @@ class Elasticity(Protocol):
         If it is not zero, slip at one node can stop another.
         """
 
+    def block(self, nodes: NDArray[np.int64]) -> Array:
+        """Return K between some nodes, Pa/m."""
+
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 

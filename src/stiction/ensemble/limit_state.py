@@ -117,7 +117,7 @@ class LimitState:
         profiles, values = self.experiment.solve(draws)
         stress: Array = values[self.event]
         if self._random_pressure:
-            pressure = profiles["normal_pressure"].reshape(draws.shape[0], -1).mean(axis=1)
+            pressure = self.experiment.problem.interface.mean(profiles["normal_pressure"])
             stress = stress * self.experiment.pressure / pressure
         self.meter.advance(draws.shape[0])
         return stress

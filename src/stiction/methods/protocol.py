@@ -153,7 +153,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
     def solve(sample: Sample) -> Values:
         values = {name: np.asarray(value) for name, value in solver(sample).items()}
         _check_values(method.label, values, variables, sample)
-        pressure = sample.normal_pressure.mean(axis=sample.axes)
+        pressure = sample.mean(sample.normal_pressure)
         if not np.isnan(pressure).all():
             values["friction_coefficient"] = values["critical_stress"] / pressure
         return values if problem.area is None else values | forces(values, problem.area)

@@ -253,7 +253,7 @@ class Problem:
 
     def doubt(self, sample: Sample) -> None:
         """Doubt the units of given profiles, as `warn_of_units` does."""
-        pressure = float(sample.normal_pressure.mean())
+        pressure = float(sample.mean(sample.normal_pressure).mean())
         self.warn_of_units(
             sample.mean_strength,
             float(sample.residual_strength.mean()),
@@ -321,6 +321,26 @@ class Problem:
     def has_machine(self) -> bool:
         """Whether a machine of finite stiffness drives a specimen, which slip unloads."""
         return self.specimen is not None and self.specimen.drive.stiffness > 0.0
+
+    def released_stress(self, slip: Array) -> Array:
+        """Return the stress K d that a slip (*shape), m, takes off the interface, Pa."""
+        if self.specimen is not None:
+            return np.asarray(self.blocks.stiffness @ slip)
+        symbol = self.half_spaces.symbol(self.interface.shape)
+        return self.interface.inverse_transform(symbol * self.interface.transform(slip))
+
+    def relief(self, slip: Array) -> float:
+        """Return by how much a flat slip, m, lowers the mean stress below the load factor, Pa.
+
+        A machine gives, and nodes beyond the extent of the interface take over stress. The mean is
+        the mean over the nodes that can break, over the mean of their load profile.
+        """
+        interface = self.interface
+        if interface.breakable is None:
+            return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
+        profile = np.broadcast_to(self.load_profile, interface.shape)
+        released = self.released_stress(slip.reshape(interface.shape))
+        return float(interface.mean(released) / interface.mean(profile))
 
     @property
     def half_spaces(self) -> HalfSpaces:

@@ -22,6 +22,7 @@ at jumps of the strength. Values are therefore cut at these bounds.
 """
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_allocating
 from stiction.elasticity.operator import Transform, convolve, make_transform
-from stiction.methods.criterion.windows import Window
+from stiction.methods.criterion.windows import Window, places_of
 from stiction.problem.interface import Interface
 
 STENCIL = 10  # nodes of a polynomial
@@ -48,13 +49,26 @@ def averages(
     """Yield for each sample <s, y>/<p, y> over each window y, centred at every node, (*shape).
 
     Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
+    Averages are infinite where a window reaches beyond the extent of the interface.
     """
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
+    if interface.breakable is not None:
+        excess = np.where(
+            interface.breakable, excess, 0.0
+        )  # whatever is finite: it has no effect
+        places = (places_of(interface, y) for y in windows)
+        p_y = [np.where(at, scale, 0.0) for at, scale in zip(places, p_y, strict=True)]
     for strength in excess:
         waves = interface.transform(strength)
         pairs = zip(windows, p_y, strict=True)
-        yield (interface.inverse_transform(waves * y.spectrum) / scale for y, scale in pairs)
+        yield (
+            np.divide(
+                interface.inverse_transform(waves * y.spectrum), scale,
+                out=np.full(interface.shape, np.inf), where=scale > 0.0,
+            )
+            for y, scale in pairs
+        )  # fmt: skip
 
 
 def least_average(
@@ -63,24 +77,24 @@ def least_average(
     """Return the least average of each sample over places and windows, as in `averages`.
 
     Returns the averages (Pa), their places in nodes, and the numbers of their windows. On a line
-    the minimum may lie between the nodes. On a plane the average is taken at the nodes, and only
-    its place is interpolated.
+    the minimum may lie between the nodes. On a plane, and if the interface ends, the average is
+    taken at the nodes, and only its place is interpolated.
     """
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
-    if not interface.is_plane:
+    if not interface.is_plane and interface.breakable is None:
         transform, multiplier = make_transform(interface.shape), np.array(windows[0].spectrum)
         reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
         _minimum_of_rows(transform, excess, profile, multiplier, reach, load, place)
         return load, place, chosen
-    place = np.zeros((count, 2))
+    place = np.zeros((count, len(interface.shape)))
     for i, fields in enumerate(averages(interface, windows, excess, profile)):
         bound = np.min(excess[i] / profile)  # round-off of the transforms may fall below it
         for window, average in enumerate(fields):
             least = max(average.min(), bound)
             if least < load[i]:
                 load[i], place[i], chosen[i] = least, _between_nodes(average), window
-    return load, place, chosen
+    return load, place if interface.is_plane else place[:, 0], chosen
 
 
 def _between_nodes(average: Array) -> Array:
@@ -90,11 +104,12 @@ def _between_nodes(average: Array) -> Array:
     """
     node = np.unravel_index(int(average.argmin()), average.shape)
     place = np.array(node, dtype=np.float64)
-    for axis in (0, 1):
-        line = np.take(average, node[1 - axis], axis=1 - axis)
+    for axis in range(average.ndim):
+        through: Any = (*node[:axis], slice(None), *node[axis + 1 :])
+        line = average[through]
         before, middle, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
         bend = before - 2.0 * middle + after
-        if bend > 0.0:
+        if 0.0 < bend < np.inf:
             place[axis] += 0.5 * (before - after) / bend
     return np.mod(place, average.shape)
 

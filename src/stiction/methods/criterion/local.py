@@ -17,7 +17,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import checked, model
 from stiction.base.variables import Variable
-from stiction.elasticity.driven import Driven
 from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.onset_bracket import rms_difference
@@ -60,6 +59,9 @@ class LocalCriterion:
     `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A law that
     steepens raises an error.
 
+    If the interface ends, patches lie within its extent. Between half-spaces stresses leave out
+    what the slip of the patch hands to the nodes beyond, and are slightly high.
+
     On a plane the average is over critical ellipses with five aspect ratios. Each is the smallest
     ellipse on which the stiffness K - W of the discrete problem is unstable, and its eigenvector is
     the weight. The minimum is taken over nodes and ellipses. `critical_aspect`,
@@ -96,8 +98,6 @@ class LocalCriterion:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         friction, reasons = problem.friction, []
-        if problem.interface.breakable is not None:
-            reasons.append("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
@@ -115,17 +115,20 @@ class LocalCriterion:
 
         From below: the weights are positive, but behind a machine the criterion neglects the slip
         of other patches. From above: load <g, p> <= <g, tau_p - tau_i> at each place, and the mean
-        over all places between half-spaces is load <p> <= <tau_p - tau_i>.
+        over all places between half-spaces is load <p> <= <tau_p - tau_i>. An interface that ends
+        has no bounds.
         """
-        return not problem.has_machine, problem.specimen is None
+        everywhere = problem.interface.breakable is None
+        return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether exact onsets may differ by more than 1 % in mean or scatter.
 
-        The quick test is for lines between half-spaces. Otherwise it returns True.
+        The quick test is for lines between half-spaces without ends. Otherwise it returns True.
         """
-        half_spaces = problem.specimen is None and not problem.interface.is_plane
-        if not (half_spaces and problem.friction.linear):
+        interface = problem.interface
+        half_spaces = problem.specimen is None and not interface.is_plane
+        if not (half_spaces and problem.friction.linear and interface.breakable is None):
             return True
         return rms_difference(problem, sample, stress) > MAX_RMS_DIFFERENCE
 
@@ -202,11 +205,16 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                 np.inf,
                 allowed,
             )
+            if not np.isfinite(load[i]):
+                raise InputError(
+                    "interface.extent: no part of it becomes unstable by itself, so the local"
+                    " criterion does not hold; use st.Equilibrium()"
+                )
             width[i] = windows.widths[c]
-            if blocks.relief > 0.0:  # 3.
+            if blocks.relief > 0.0 or problem.interface.breakable is not None:  # 3.
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
-                relief[i] = _relief_of_patch(blocks, rate, run, drive)
+                relief[i] = _relief_of_patch(problem, rate, run, drive)
     stress = sample.mean_stress(load - relief)
     return {
         "critical_load": load,
@@ -217,7 +225,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     }
 
 
-def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> float:
+def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) -> float:
     """Step 3: return by how much a patch's slip lowers the mean stress before its instability.
 
     Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the unstable mode. An
@@ -225,12 +233,12 @@ def _relief_of_patch(blocks: Driven, rate: float, run: slice, drive: Array) -> f
     end slip does not vanish in truth, and takes off more.
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
-    matrix[:-1, :-1] = blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
+    matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
     # The last row and column are the added equation and its unknown force, scaled like the others.
     matrix[[0, -2], -1] = matrix[-1, [0, -2]] = rate
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]
-    return float(blocks.mean_relief(np.maximum(slip, 0.0)))
+    return problem.relief(np.maximum(slip, 0.0))
 
 
 @checked
@@ -316,12 +324,7 @@ def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
 
 
 def excess_of(sample: Sample) -> Array:
-    """Return tau_p - tau_i, Pa, or raise an `InputError` if the strength is not finite."""
-    if not np.isfinite(sample.strength).all():
-        raise InputError(
-            "strength: must be finite everywhere for the local criterion, which averages it. End"
-            " the interface at nodes that cannot break (interface.extent), and use st.Rupture()"
-        )
+    """Return tau_p - tau_i, Pa."""
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 
 

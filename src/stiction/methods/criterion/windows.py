@@ -39,6 +39,7 @@ from stiction.base.errors import InputError
 from stiction.elasticity.operator import lowest_eigenvector, make_operator
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.criterion.eigenfunction import around, grid_weights
+from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 
 # Aspects of the ellipses, relative to the middle ellipse. With the paper's strength nine shapes
@@ -86,7 +87,7 @@ def windows_of(
                 f" interface ({interface.measure:.4g} m). {advice} or st.Rupture()"
             )
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
-        return [Window(1.0, (length,), length, rate, *weights)]
+        return _within_extent(interface, [Window(1.0, (length,), length, rate, *weights)])
     middle = float(1.0 / np.sqrt(1.0 - solid.poisson_ratio))
     windows = []
     for aspect in (middle * stretch for stretch in stretches):
@@ -98,7 +99,27 @@ def windows_of(
                 f" direction it takes nearly twice the nucleation length, {length:.4g} m. {advice}"
             )
         windows.append(window)
-    return windows
+    return _within_extent(interface, windows)
+
+
+def places_of(interface: Interface, window: Window) -> Any:
+    """Return the nodes at which a window lies within the extent of an interface, (*shape)."""
+    if interface.breakable is None:
+        return True
+    beyond = interface.transform(1.0 * ~interface.breakable)
+    under = interface.transform(1.0 * (window.weight > 0.0)).conj()
+    return interface.inverse_transform(beyond * under) < 0.5  # a number of nodes, to round-off
+
+
+def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
+    """Return the windows that lie within the extent at some place; refuse if there is none."""
+    if fitting := [y for y in windows if np.any(places_of(interface, y))]:
+        return fitting
+    extents = " x ".join(f"{length:.4g}" for length in windows[0].extents)
+    raise InputError(
+        f"interface.extent: no critical patch ({extents} m) lies within it; widen it, or use"
+        " st.Equilibrium()"
+    )
 
 
 @lru_cache(maxsize=64)

@@ -25,7 +25,6 @@ from stiction.methods.dynamics.specimens import (
 from stiction.methods.dynamics.summary import SPEEDS
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
-from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding
 from stiction.problem.problem import Problem
@@ -126,7 +125,8 @@ class EventRecord:
         problem, waves, sample = self.problem, self.event.waves, self.event.sample
         initial, load = self.rows.initial_stress[0], self.event.before.load
         pieces = present_pieces(sample, waves.slip)
-        held = initial.mean() + (load - relief_of(problem, self.event.before.slip))
+        before = self.event.before.slip
+        held = initial.mean() + (load - float(problem.blocks.mean_relief(before)))
         fields = {
             "slip": waves.slip.copy(),
             "slip_rate": waves.slip_rate.copy(),
@@ -139,10 +139,10 @@ class EventRecord:
             | {
                 "time": waves.now[NOW],
                 "load": load,
-                "mean_stress": fields["shear_stress"].mean(),
-                "mean_slip": waves.slip.mean(),
+                "mean_stress": problem.interface.mean(fields["shear_stress"]),
+                "mean_slip": problem.interface.mean(waves.slip),
                 "top_slip_rate": waves.slip_rate.max(),
-                "weakened_fraction": residual_nodes(sample, waves.slip).mean(),
+                "weakened_fraction": problem.interface.mean(residual_nodes(sample, waves.slip)),
                 "machine_stress": held + waves.now[FORCE] / problem.interface.measure,
                 "drive_travel": 2.0 * waves.now[TRAVEL],
             }

@@ -66,8 +66,6 @@ def refusals(method: Any, problem: Problem) -> list[str]:
         for name, value in vars(method).items()
         if name not in OPTIONS and value != getattr(usual, name)
     ]
-    if problem.interface.breakable is not None:
-        reasons.append("interface.extent: leave it out on specimens, which have ends")
     return reasons + refused(problem.friction)
 
 
@@ -139,7 +137,7 @@ def begin(
 
     `arrival` is the slip with which a front arrives at a node, in units of d_c.
     """
-    fall = sample.excess - sample.residual
+    fall = (sample.excess - sample.residual)[np.isfinite(sample.excess)]
     load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
     z = before.direction
     fastest = int(np.argmax(z))
@@ -176,7 +174,9 @@ class RuptureProgram(DenseProgram):
         """Return an event that is about to run from an instability."""
         return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
 
-    def jump(self, sample: StaticSample, unstable: EquilibriumState) -> Jump:
+    def jump(
+        self, sample: StaticSample, unstable: EquilibriumState, to_rest: bool = False
+    ) -> Jump:
         """Let an unstable state run until it rests or the interface slides (steps 1 to 3)."""
         event = self.event(sample, unstable)
         event.run(self.max_steps)
@@ -185,7 +185,7 @@ class RuptureProgram(DenseProgram):
         outcome: int = Outcome.SLIDING
         if not event.slides:  # 3.
             elastic, true = self._workspaces
-            slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop)
+            slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop, self.ends)
             outcome = jump(slip_state, unstable.load, np.inf, true)
         state = EquilibriumState(
             unstable.load,

@@ -85,8 +85,8 @@ def _measures(
     added = (after.slip - before.slip).reshape(interface.shape)
     # Slip elsewhere also grows a little in an event. The patch is around the largest added slip.
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
-    stress_before = before.load - relief_of(problem, before.slip)
-    stress_after = after.load - relief_of(problem, after.slip)
+    stress_before = before.load - problem.relief(before.slip)
+    stress_after = after.load - problem.relief(after.slip)
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
@@ -111,27 +111,21 @@ def _measures(
     return values
 
 
-def relief_of(problem: Problem, slip: Array) -> float:
-    """Return by how much slip lowers the mean stress below the drive of a machine, Pa.
-
-    Without a machine it is 0.
-    """
-    return 0.0 if problem.specimen is None else float(problem.blocks.mean_relief(slip))
-
-
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
     """Return the travel of a specimen's two drives together since the unloaded state, m."""
-    force = (load - relief_of(problem, slip)) * problem.interface.measure
+    force = (load - float(problem.blocks.mean_relief(slip))) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
 
 def elongation_of(problem: Problem, stress: float) -> float:
-    """Return the elongation of the machine (m) at a mean stress on the interface (Pa).
+    """Return the elongation of the machine (m) at a mean stress of the whole interface (Pa).
 
     It is NaN under a dead load, which has no far end.
     """
     assert problem.specimen is not None
-    machine, area = problem.specimen.drive.stiffness, problem.area
+    machine, depth = problem.specimen.drive.stiffness, problem.specimen.thickness
     if machine == 0.0:
         return np.nan
-    return 0.0 if area is None else stress * area / machine  # without an area it is rigid
+    if depth is None:  # it is rigid
+        return 0.0
+    return stress * (problem.interface.measure * depth) / machine

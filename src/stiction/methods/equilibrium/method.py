@@ -130,8 +130,8 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
-        if problem.interface.breakable is not None:
-            reasons.append("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
+        if problem.interface.breakable is not None and problem.interface.is_plane:
+            reasons.append("interface.extent: on planes it is taken by st.Rupture()")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append("gap: leave it out on lines, which are solved to round-off")
         return reasons
@@ -142,8 +142,11 @@ class Equilibrium:
         From below: no node slips at a load below min (tau_p - tau_i)/p. Slip lowers the mean stress
         only behind a machine, but `critical_stress` is the largest stress on the way.
         From above: stress is at most strength at every node, so its mean is at most the mean
-        strength. Behind a machine the first instability need not happen, and has no bound.
+        strength. Behind a machine the first instability need not happen, and has no bound. If
+        the interface ends, slip lowers the mean stress of the part that can break.
         """
+        if problem.interface.breakable is not None:
+            return False, False
         certain = not (problem.has_machine and event == "first_instability")
         return certain, certain
 

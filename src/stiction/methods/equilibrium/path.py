@@ -19,6 +19,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Numbers, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.equilibrium.events import (
+    ArrestedEvent,
     elongation_of,
     event_table,
     event_variables,
@@ -136,15 +137,17 @@ def equilibrium_path(
     program = make_program(problem) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
-    path = follow_to_sliding(program, sample)  # 1.
+    path = follow_to_sliding(program, sample, to_rest=True)  # 1.
     passed, end, known = path.events, path.last.load, path.known
+    if path.rest is not None:
+        passed = [*passed, ArrestedEvent(path.last, path.rest)]
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
     sliding = given > end
     state = at_rest(sample)
-    for i, load in enumerate(map(float, given[~sliding])):
+    for i, load in enumerate(map(float, given if path.rest is not None else given[~sliding])):
         if events[i]:  # 2.
             after = passed[events[i] - 1].after
             state = max(after, state, key=lambda reached: reached.load)
@@ -172,8 +175,8 @@ def equilibrium_path(
     values = {
         "slip": slip.reshape(wide),
         "stress": stress.reshape(wide),
-        "mean_stress": stress.mean(axis=1),
-        "arrested_events": events,
+        "mean_stress": interface.mean(stress.reshape(wide)),
+        "arrested_events": np.minimum(events, len(path.events)),
         "sliding": sliding,
     } | event_table(problem, rows, 0, passed)
     variables = VARIABLES | event_variables(interface)

@@ -76,7 +76,10 @@ class Outcome(IntEnum):
 
 
 class StaticSample(NamedTuple):
-    """Strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant."""
+    """Strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant.
+
+    Beyond the extent of the interface excess and d_c are infinite.
+    """
 
     excess: Array  # tau_p - tau_i, Pa
     residual: Array  # tau_r - tau_i, Pa
@@ -96,7 +99,8 @@ def make_sample(
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
     if not fall.min() > CONSTANT_STRENGTH_RTOL * largest:
-        scale = np.maximum(np.abs(excess), np.abs(residual)).mean(axis=-1, keepdims=True)
+        scale = np.maximum(np.abs(excess), np.abs(residual))
+        scale = scale.mean(axis=-1, keepdims=True, where=np.isfinite(excess))
         constant = ~(fall > CONSTANT_STRENGTH_RTOL * scale)
         residual = np.where(constant, excess, residual)
         fall, rate = np.where(constant, 0.0, (fall, rate))
@@ -195,8 +199,13 @@ class Program(Protocol):
     ) -> EquilibriumState:
         """Return the next instability from a stable state, or from rest."""
 
-    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
-        """Let an unstable state jump to another equilibrium, or to sliding."""
+    def jump(
+        self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
+    ) -> Jump:
+        """Let an unstable state jump to another equilibrium, or to sliding.
+
+        With `to_rest`, on an interface that ends, it goes on once all slips that can break.
+        """
 
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.events import ArrestedEvent, event_table, relief_of
+from stiction.methods.equilibrium.events import ArrestedEvent, event_table
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
@@ -55,7 +55,9 @@ class SamplePath(NamedTuple):
     `first` is the first instability and `last` the last equilibrium. `known` is false if a jump or
     a path was not followed to its end; the load of `last` is then a lower bound. `peak` is the
     largest mean stress on the way, divided by the mean of the load profile (Pa). With inertia,
-    `arrival` is the time at which the front of the last event reached each node (s).
+    `arrival` is the time at which the front of the last event reached each node (s). If
+    the interface ends, `last` is the last instability, and `rest` the equilibrium to which it
+    leads, if it was followed so far.
     """
 
     first: EquilibriumState
@@ -64,21 +66,27 @@ class SamplePath(NamedTuple):
     events: list[ArrestedEvent]
     known: bool
     arrival: Array | None
+    rest: EquilibriumState | None = None
 
 
-def follow_to_sliding(program: Program, sample: StaticSample) -> SamplePath:
+def follow_to_sliding(
+    program: Program, sample: StaticSample, to_rest: bool = False
+) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
     Without inertia a patch stops at the least equilibrium of the same load. A program with inertia
-    may carry it through.
+    may carry it through. An interface that ends slides in the event after which all slips that can
+    break; `to_rest` follows this event to its end.
     """
+    can_break = np.isfinite(sample.excess)
+    ends, rest = not can_break.all(), None
     # 1.
     state = program.next(sample)
     first: EquilibriumState | None = None
     events: list[ArrestedEvent] = []
     known, peak, arrival = state.known, state.highest, None
     while state.unstable:  # 2.
-        jump = program.jump(sample, state)  # 3.
+        jump = program.jump(sample, state, to_rest and ends)  # 3.
         if jump.counts:
             first = first or state
             if not jump.arrested:
@@ -86,17 +94,20 @@ def follow_to_sliding(program: Program, sample: StaticSample) -> SamplePath:
                 break
             # 4. A jump that does not count is a long step of a path that did not turn.
             events.append(ArrestedEvent(state, jump.state))
+            if ends and (jump.state.slip[can_break] > 0.0).all():
+                arrival = jump.arrival
+                break
         state = program.next(sample, jump.state)
         known, peak = state.known, max(peak, state.highest)
-    return SamplePath(first or state, state, peak, events, known, arrival)
+    if ends and events and known and (state is events[-1].before or not state.unstable):
+        state, rest = events.pop()  # the last instability, after which the others creep at most
+    return SamplePath(first or state, state, peak, events, known, arrival, rest)
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> Program:
     """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
     if reasons := refused(problem.friction):
         raise InputError(reasons)
-    if problem.interface.breakable is not None:
-        raise InputError("interface.extent: leave it out, or use st.Rupture() (half-spaces)")
     return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
 
 
@@ -139,7 +150,7 @@ class OnsetSolver:
         values = {name: np.array([row[name] for row in table]) for name in table[0]}
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
-        values["certificate_gap"] *= rows.load_profile.mean()
+        values["certificate_gap"] *= rows.mean(rows.load_profile)
         self._warn(rows, values, *np.array(flags).T)
         return values
 
@@ -157,8 +168,8 @@ class OnsetSolver:
             sliding_patch = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
             "critical_load": last.load,
-            "critical_stress": path.peak,
-            "first_instability": first.load - relief_of(self.problem, first.slip),
+            "critical_stress": self._peak(path),
+            "first_instability": first.load - self.problem.relief(first.slip),
             "certificate_gap": first.gap,
             "critical_position": patch.centre if interface.is_plane else patch.centre[0],
             "sliding_position": (
@@ -185,13 +196,23 @@ class OnsetSolver:
             derivative = np.full(first.slip.size, np.nan)
             if not stable:
                 derivative = _sensitivity(self.problem, self.program, sample, first)
-            values["sensitivity"] = derivative.reshape(shape) * rows.load_profile.mean()
+            values["sensitivity"] = derivative.reshape(shape) * rows.mean(rows.load_profile)
         if most := self.options.events:
             events = event_table(self.problem, rows, row, path.events[:most])
             for name, column in events.items():
                 values[name] = np.full((most, *column.shape[1:]), np.nan)
                 values[name][: len(column)] = column
         return values
+
+    def _peak(self, path: SamplePath) -> float:
+        """Return the largest mean stress on the way, over the mean of the load profile, Pa.
+
+        If the interface ends, it is the largest at an instability.
+        """
+        if self.problem.interface.breakable is None:
+            return path.peak
+        states = [event.before for event in path.events] + [path.last]
+        return max(state.load - self.problem.relief(state.slip) for state in states)
 
     def _warn(
         self,
@@ -235,8 +256,9 @@ class OnsetSolver:
             " NaN",
             stopped & np.isfinite(first),
         )
-        residual = rows.residual_strength.mean(axis=rows.axes)
+        residual = rows.mean(rows.residual_strength)
         falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)
+        falls = falls[:, np.isfinite(falls[0])]
         above = values["critical_stress"] - residual
         above /= np.maximum(np.median(falls, axis=1), 1e-300)
         warn_of_samples(
@@ -281,14 +303,15 @@ def _quotients(
 
     Between events paths are straight, so a small step gives the exact derivative.
     """
-    stress_before = first.load - relief_of(problem, first.slip)
-    step = STRENGTH_STEP * float(np.abs(sample.excess).mean())
-    derivative = np.empty(sample.excess.size)
-    for node in range(derivative.size):
+    stress_before = first.load - problem.relief(first.slip)
+    can_break = np.isfinite(sample.excess)
+    step = STRENGTH_STEP * float(np.abs(sample.excess[can_break]).mean())
+    derivative = np.zeros(sample.excess.size)
+    for node in np.flatnonzero(can_break):
         excess, residual = sample.excess.copy(), sample.residual.copy()
         excess[node] += step
         residual[node] += step * (sample.critical[node] == 0.0)  # its strength is constant
         raised = make_sample(excess, residual, sample.profile, sample.rate, sample.pieces)
         state = program.next(raised)
-        derivative[node] = (state.load - relief_of(problem, state.slip) - stress_before) / step
+        derivative[node] = (state.load - problem.relief(state.slip) - stress_before) / step
     return derivative

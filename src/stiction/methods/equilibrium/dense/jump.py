@@ -153,7 +153,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
     The rows of L^-1 times the drive are kept for the leading nodes whose drive has not changed
     since the step before. At the residual strength it no longer changes.
     """
-    sample, slip, Kd, workspace, may_stop = state
+    sample, slip, Kd, workspace, may_stop, _ = state
     solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
     slipping, substituted_drive = workspace.slipping, workspace.substituted_drive
     if may_stop:
@@ -259,7 +259,7 @@ def _step_with_true_pieces(
     the step ends at the solution of the linear problem, SLIDING if the step is unbounded, otherwise
     UNDECIDED.
     """
-    sample, slip, Kd, workspace, may_stop = state
+    sample, slip, Kd, workspace, may_stop, _ = state
     overload = workspace.rhs
     for i in range(slip.shape[0]):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -294,7 +294,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     A run of `unstoppable` nodes at their residual strength slides. `true_pieces` is a second
     workspace.
     """
-    sample, slip, _, workspace, _ = state
+    sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]
     tolerance = stress_tolerance(sample, load)
     n_marked = ZERO

@@ -83,7 +83,7 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
 
     The most overstressed node comes first. Overstresses within the tolerance (Pa) do not count.
     """
-    sample, slip, Kd, workspace, _ = state
+    sample, slip, Kd, workspace, _, _ = state
     count = ZERO
     for i in range(Kd.shape[0]):
         if not workspace.is_slipping[i]:
@@ -104,7 +104,8 @@ def stress_tolerance(sample: StaticSample, load: float) -> float:
     total = 0.0
     n = sample.excess.shape[0]
     for i in range(n):
-        total += abs(sample.excess[i]) + abs(load) * sample.profile[i]
+        if sample.excess[i] < np.inf:
+            total += abs(sample.excess[i]) + abs(load) * sample.profile[i]
     return OVERSTRESS_RTOL * total / n
 
 
@@ -123,7 +124,7 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
     leave a node overstressed. One step along the tangent v = d d/d load mends it. The load that is
     returned stays: the certificate shows by how much the load of the slip differs from it.
     """
-    sample, _, Kd, workspace, _ = state
+    sample, _, Kd, workspace, _, _ = state
     v, Kv = workspace.solution, workspace.Kv
     for t in range(n_slipping):
         v[t] = workspace.Linv_p[t]
@@ -163,7 +164,7 @@ def _cut(
     state: SlipState, n_factored: int, bound: float, multiplier: Array
 ) -> tuple[float, float]:
     """Step 3: return the load of the cut, and the new bound. Write the bound's multiplier."""
-    sample, _, _, workspace, _ = state
+    sample, _, _, workspace, _, _ = state
     y = workspace.direction
     singular_direction(workspace, n_factored, y)
     excess_y = 0.0
@@ -191,7 +192,7 @@ def solve_program(
     least equilibrium at this load. It is not solved if there are too many passes, or more slipping
     nodes than the workspace can hold.
     """
-    sample, slip, Kd, workspace, _ = state
+    sample, slip, Kd, workspace, _, _ = state
     top = min(bound, cap)
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
@@ -264,20 +265,20 @@ def certificate(
     """
     n = slip.shape[0]
     lower = np.inf
+    excess_y = 0.0
     count = ZERO
     for i in range(n):
         balance = sample.excess[i] + Kd[i] - sample.rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
         if multiplier[i] > 0.0:
+            excess_y += multiplier[i] * sample.excess[i]
             workspace.queue[count] = i
             workspace.solution[count] = multiplier[i]
             count += 1
     apply(workspace.stiffness, workspace.queue, count, workspace.solution, workspace.halves, Ky)
-    excess_y = 0.0
     p_y = 0.0
     infeasible = 0.0
     for i in range(n):
-        excess_y += multiplier[i] * sample.excess[i]
         p_y += multiplier[i] * sample.profile[i]
         # Round-off may leave A y slightly positive. Its effect on the bound, <A y, d>, is added.
         infeasible += max(Ky[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]

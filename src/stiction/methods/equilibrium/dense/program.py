@@ -7,7 +7,10 @@
    on this path, except from rest.
 3. Behind a machine the path is always followed: slip lowers the force, whose largest value may lie
    before the instability. If all nodes slip without one, the interface slides stably.
-4. Beyond an instability of a line, the quick test for sliding comes first (`runaway`). If it does
+4. If only part of a line or specimen can break, the other nodes have an infinite strength. They
+   hold the part, whose K is positive definite, so that each instability ends at an equilibrium. It
+   slides if all slips there that can break.
+5. Beyond an instability of a line, the quick test for sliding comes first (`runaway`). If it does
    not decide, and on specimens always, the jump is followed to its end (`jump`).
 """
 
@@ -30,6 +33,7 @@ from stiction.methods.equilibrium.dense.linear_program import (
 )
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
 from stiction.methods.equilibrium.dense.stable_path import PathStatus, follow_stable_path
+from stiction.methods.equilibrium.patches import count_patches
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
     Jump,
@@ -74,6 +78,10 @@ class DenseProgram:
             self.runs = runs_of(problem.half_spaces, self.nodes)
         else:
             self.elastic = problem.blocks
+        breakable = problem.interface.breakable
+        self.ends = breakable is not None
+        if breakable is not None and count_patches(1.0 * breakable) > 1:
+            self.runs = None  # a run of nodes stops at the end of its part
         self.driven = self.elastic.relief > 0.0
         self.may_stop = self.elastic.positive > 0.0  # slip may unload a node that slips
         self._of_thread = threading.local()
@@ -112,6 +120,8 @@ class DenseProgram:
         equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
+        if bound == cap == np.inf:  # no window fits within the extent
+            return None
         # Dense factors cost the cube of the slipping nodes, transforms little more than all nodes.
         if cap == np.inf and self.nodes > MAX_WEAK_NODES:
             weak_nodes = np.count_nonzero(sample.excess < bound * sample.profile)
@@ -175,7 +185,8 @@ class DenseProgram:
                 return instability
             by_events = not from_rest
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
-        slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop)
+        held = self.ends and target < np.inf
+        slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, held)
         end = follow_stable_path(slip_state, state.load, target, direction)
         reached = EquilibriumState(
             end.load, slip, direction, Kd,
@@ -227,12 +238,14 @@ class DenseProgram:
         reached = self.next(sample, replace(state, by_events=True), load)
         return None if reached.unstable or not reached.known else reached
 
-    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
+    def jump(
+        self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
+    ) -> Jump:
         slip, Kd = instability.slip.copy(), instability.Kd.copy()
-        outcome, unstoppable = self._run(sample, instability, slip)
+        outcome, unstoppable = self._run(sample, instability, slip, to_rest)
         if outcome == Outcome.UNDECIDED:
             elastic, true_pieces = self._workspaces
-            slip_state = SlipState(sample, slip, Kd, elastic, self.may_stop)
+            slip_state = SlipState(sample, slip, Kd, elastic, self.may_stop, to_rest)
             outcome = jump(slip_state, instability.load, unstoppable, true_pieces)
         if outcome == Outcome.ARRESTED:
             before = present_pieces(sample, instability.slip).piece
@@ -247,15 +260,15 @@ class DenseProgram:
         return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
 
     def _run(
-        self, sample: StaticSample, instability: EquilibriumState, slip: Array
+        self, sample: StaticSample, instability: EquilibriumState, slip: Array, to_rest: bool
     ) -> tuple[int, float]:
-        """Test for sliding (step 4): return the outcome and an unstoppable length.
+        """Test for sliding (step 5): return the outcome and an unstoppable length.
 
         The length is a number of residual nodes. Slip moves on to a lower bound of the next
         equilibrium.
         """
         direction = instability.direction
-        if self.runs is None:
+        if self.runs is None or to_rest:
             step = step_to_corner(sample, slip, direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
         K_direction = instability.K_direction
@@ -271,7 +284,7 @@ class DenseProgram:
         )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the multiplier y, or, behind a machine, the derivative of the mean stress.
+        """Return the multiplier y, or, where slip lowers the mean stress, its derivative.
 
         With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D, and y is the
         derivative of the largest D by the strengths s. Up to the instability (K - W) d = D p - s on
@@ -280,16 +293,27 @@ class DenseProgram:
         derivative
 
             y - (r/n) (<p, d'> y - d').
+
+        If the interface ends, the mean stress of the n nodes that can break is D - <c, d>, over the
+        mean of their p, with c = K 1/(n <p>) and 1 on these nodes. The derivative is then
+
+            y - <c, d'> y + (K - W)^-1 c.
         """
         y = multiplier_of(sample, state)
-        if not self.driven:
+        if not (self.driven or self.ends):
             return y
         rate = present_pieces(sample, state.slip).rate
-        slips, p = state.slip > 0.0, sample.profile
+        slips, p = np.flatnonzero(state.slip > 0.0), sample.profile
+        block = self.elastic.block(slips) - np.diag(rate[slips])
         slip_rate = np.zeros(y.size)  # d'
-        block = self.problem.blocks.stiffness[np.ix_(slips, slips)] - np.diag(rate[slips])
         slip_rate[slips] = np.linalg.solve(block, p[slips])
-        return y - self.elastic.relief / y.size * ((p @ slip_rate) * y - slip_rate)
+        if not self.ends:
+            return y - self.elastic.relief / y.size * ((p @ slip_rate) * y - slip_rate)
+        can_break = np.isfinite(sample.excess)
+        c = self.problem.released_stress(1.0 * can_break) / p[can_break].sum()
+        derivative = (1.0 - c @ slip_rate) * y
+        derivative[slips] += np.linalg.solve(block, c[slips])
+        return derivative
 
     def stress_released(self, state: EquilibriumState) -> Array:
         return state.Kd

@@ -116,6 +116,8 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     stress_drop = np.inf
     energy = 0.0
     for i in range(sample.excess.shape[0]):
+        if sample.excess[i] == np.inf:
+            continue
         stress_drop = min(stress_drop, load * sample.profile[i] - sample.residual[i])
         fall = sample.excess[i] - sample.residual[i]
         energy = max(energy, sample.pieces.area * fall * sample.critical[i])

@@ -133,7 +133,7 @@ def _find_slipping(
 
     Returns the number of slipping nodes, and whether a node rests that slipped before.
     """
-    sample, slip, Kd, workspace, may_stop = state
+    sample, slip, Kd, workspace, may_stop, _ = state
     n_slipping = ZERO
     some_rest = False
     atol = MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load)
@@ -247,7 +247,7 @@ def _stop_unloaded(
 @jit_inside
 def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
     """Compute slip and K d anew from the factor."""
-    _, slip, Kd, workspace, _ = state
+    _, slip, Kd, workspace, _, _ = state
     solve_slip(workspace, n_slipping, load, workspace.solution)
     multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
     for t in range(n_slipping):
@@ -261,7 +261,7 @@ def _next_event(
     state: SlipState, load: float, target: float, piece: NDArray[np.int64], n_slipping: int
 ) -> PathEvent:
     """Step 3: the first event on the way to the target."""
-    sample, slip, Kd, workspace, _ = state
+    sample, slip, Kd, workspace, _, _ = state
     p, corners = sample.profile, sample.pieces.ends
     step = target - load
     starting_node = corner = NOBODY
@@ -336,7 +336,7 @@ def _pass_corner(
 
     Returns how many nodes are factored: fewer than before if a pivot failed.
     """
-    sample, slip, _, workspace, _ = state
+    sample, slip, _, workspace, _, _ = state
     pieces = sample.pieces
     i = workspace.slipping[corner]
     slip[i] = pieces.ends[piece[i]] * sample.critical[i]
@@ -382,9 +382,12 @@ def _start(
 
 @jit_inside
 def all_slip(state: SlipState) -> bool:
-    """Return whether every node slips or has slipped."""
+    """Return whether every node that can break slips or has slipped: a path or a jump ends."""
+    if state.held:
+        return False
     for i in range(state.slip.shape[0]):
-        if not (state.workspace.is_slipping[i] or state.slip[i] > 0.0):
+        slips = state.workspace.is_slipping[i] or state.slip[i] > 0.0
+        if not slips and state.sample.excess[i] < np.inf:
             return False
     return True
 
@@ -398,7 +401,7 @@ def follow_stable_path(
     Slip and K d of the state move along. If the path ends unstable, the direction (n,) in which
     slip jumps is written to `direction`.
     """
-    sample, slip, Kd, workspace, may_stop = state
+    sample, slip, Kd, workspace, may_stop, _ = state
     n, n_corners = slip.shape[0], sample.pieces.ends.shape[0]
     v, Kv = workspace.v, workspace.Kv
     piece = np.zeros(n, np.int64)

@@ -311,7 +311,9 @@ class PlaneProgram:
             slip = np.zeros(slip.size)  # the slip that proves the bound may be beyond the turn
         return np.full(slip.size, np.nan)
 
-    def jump(self, sample: StaticSample, instability: EquilibriumState) -> Jump:
+    def jump(
+        self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
+    ) -> Jump:
         load_beyond = instability.load + instability.gap
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(

@@ -1,0 +1,114 @@
+"""Interfaces that end, beside own dense linear algebra, and beside interfaces that do not."""
+
+import numpy as np
+import pytest
+from checks import assert_same
+from setups import LOCAL, beta_strength, exact_onset, make_problem, within
+from specimens import crooked, rough
+
+import stiction as st
+
+X = st.Interface(0.05, 96).x
+LINE = make_problem(
+    96, 0.05, weakening_rate=2.2e11, residual_strength=2e5,
+    load=st.Load(profile=1.0 + 0.2 * np.cos(40.0 * np.pi * X), normal_pressure=2e6 + 1e7 * X),
+)  # fmt: skip
+PAD = crooked(nodes=64, drive=st.Pusher(height=0.008, width=0.004, stiffness=3e7))
+FIELD = beta_strength(8e-3)
+
+
+def least_slip(stiffness, sample, load, inside):
+    """The least equilibrium, from below: K d is solved for with the strengths of the moment."""
+    K = stiffness[np.ix_(inside, inside)]
+    peak, residual, rate, initial = (rows[0][inside] for rows in sample[:4])
+    drive, slip = load * sample.load_profile[inside] + initial, np.zeros(len(K))
+    for _ in range(20_000):
+        strength = np.maximum(peak - rate * slip, residual)
+        moves, before = (slip > 0.0) | (drive - K @ slip > strength), slip.copy()
+        if moves.any():
+            grown = np.linalg.solve(K[np.ix_(moves, moves)], (drive - strength)[moves])
+            slip[moves] = np.maximum(slip[moves], grown)
+        if np.abs(slip - before).max() <= 1e-13 * slip.max():
+            break
+    return slip
+
+
+@pytest.mark.parametrize(
+    ("problem", "extent", "seed"),
+    [
+        (LINE, (0.006, 0.041), 0),
+        (LINE, (X > 0.004) & (X < 0.047) & (np.abs(X - 0.026) > 0.0012), 3),
+        (PAD, (0.15 * PAD.interface.length, 0.8 * PAD.interface.length), 1),
+    ],
+    ids=["part", "hole", "pad"],
+)
+def test_the_part_that_can_break_follows_its_rows_and_columns_of_the_stiffness(
+    problem, extent, seed
+):
+    """Before and after the last instability, after which all of it slips, arrested ones or not."""
+    problem = within(problem, extent)
+    strength = FIELD.sample(problem.interface, seed=seed)[0]
+    if problem.specimen is not None:
+        stiffness, strength = problem.blocks.stiffness, rough(problem, seed)
+    else:
+        column = np.fft.irfft(problem.half_spaces.symbol((96,)), 96)
+        stiffness = column[np.subtract.outer(np.arange(96), np.arange(96)) % 96]
+    inside, sample = problem.interface.breakable, problem.sample(strength)
+    found = exact_onset(problem, strength, sensitivity=True)
+    loads = np.array([0.7, 0.95, 0.9999, 1.0001, 1.3]) * found.critical_load.item()
+    path = st.equilibrium_path(problem, strength, loads)
+    slips = [least_slip(stiffness, sample, load, inside) for load in loads]
+    assert np.all(path.slip.values[:, ~inside] == 0.0)
+    assert path.slip.values[:, inside] == pytest.approx(
+        np.array(slips), abs=1e-9 * np.max(slips)
+    )
+    assert [bool((slip > 0.0).all()) for slip in slips] == [False, False, False, True, True]
+    assert list(path.sliding) == [False, False, False, True, True]
+    mean = path.stress.values[:, inside].mean(axis=1)
+    assert path.mean_stress.values == pytest.approx(mean, rel=1e-12)
+    node, step = np.flatnonzero(inside)[20], 20.0
+    raised = exact_onset(problem, strength + step * (np.arange(inside.size) == node))
+    quotient = (raised.first_instability - found.first_instability).item() / step
+    assert found.sensitivity.values[0, node] == pytest.approx(quotient, abs=1e-6)
+    if "friction_coefficient" in found:
+        pressure = sample.normal_pressure[0, inside].mean()
+        assert found.friction_coefficient * pressure == pytest.approx(found.critical_stress)
+
+
+@pytest.mark.parametrize("method", [LOCAL, st.Equilibrium(), st.Rupture(loading_rate=3e8)])
+def test_an_extent_of_everything_is_none(method):
+    strength = FIELD.sample(LINE.interface, seed=5)
+    whole, given = (
+        st.onset(problem, strength, method=method, progress=False)
+        for problem in (LINE, within(LINE, np.ones(96, dtype=bool)))
+    )
+    assert_same(whole, given)
+
+
+def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
+    """Under slow loading; the criterion leaves out what slip hands to the nodes beyond."""
+    problem = within(LINE, (0.006, 0.041))
+    strength = FIELD.sample(problem.interface, samples=3, seed=2)
+    exact = exact_onset(problem, strength)
+    waves = st.onset(problem, strength, method=st.Rupture(loading_rate=1e6), progress=False)
+    for name in ("critical_load", "critical_stress", "first_instability"):
+        assert waves[name].values == pytest.approx(exact[name].values, rel=1e-3)
+    local = st.onset(problem, strength, method=LOCAL, progress=False)
+    first = exact.first_instability.values
+    assert local.first_instability.values == pytest.approx(first, rel=0.02)
+    half = 0.5 * problem.nucleation_length
+    assert np.all(local.critical_position > 0.006 + half - 1e-3)
+    assert np.all(local.critical_position < 0.041 - half + 1e-3)
+
+
+def test_results_depend_on_the_period_through_the_square_of_extent_over_period():
+    loads = []
+    for times in (2, 4, 8):
+        line = st.Interface(0.02 * times, 64 * times, extent=(0.0, 0.02))
+        problem = make_problem(weakening_rate=2.2e11, residual_strength=2e5)
+        problem = st.Problem(problem.solid, line, problem.friction)
+        strength = np.full(line.size, 1e6)
+        strength[:65] -= 3e5 * np.exp(-(((line.x[:65] - 0.009) / 0.005) ** 2))
+        loads.append(exact_onset(problem, strength).critical_load.item())
+    far, near = loads[1] - loads[2], loads[0] - loads[1]
+    assert near / far == pytest.approx(4.0, rel=0.15)
