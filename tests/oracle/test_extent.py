@@ -101,6 +101,42 @@ def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
     assert np.all(local.critical_position < 0.041 - half + 1e-3)
 
 
+PLANE = make_problem((48, 40), (0.03, 0.025), weakening_rate=4e11, residual_strength=2e5)
+
+
+def test_a_plane_with_a_hole_follows_its_rows_and_columns_of_the_stiffness():
+    x, y = np.meshgrid(*PLANE.interface.coordinates.values(), indexing="ij")
+    hole = (np.abs(x - 0.01) < 0.001) & (np.abs(y - 0.01) < 0.001)
+    inside = (np.abs(x - 0.015) < 0.0125) & (np.abs(y - 0.012) < 0.011) & ~hole
+    problem, nodes = within(PLANE, inside), np.indices(inside.shape).reshape(2, -1)
+    strength = beta_strength(4e-3).sample(PLANE.interface, seed=2)[0]
+    column = np.fft.irfft2(problem.half_spaces.symbol(inside.shape), inside.shape)
+    stiffness = column[tuple(nodes[:, :, None] - nodes[:, None, :])]  # wraps like the plane
+    sample = [rows.reshape(1, -1) for rows in problem.sample(strength)[:4]]
+    flat = problem.sample(strength)._replace(load_profile=np.ones(inside.size))
+    flat = flat._replace(**dict(zip(flat._fields[:4], sample, strict=True)))
+    loads = np.array([0.97, 1.0001]) * exact_onset(problem, strength).critical_load.item()
+    path = st.equilibrium_path(problem, strength, loads)
+    for load, slip, slides in zip(loads, path.slip.values, (False, True), strict=True):
+        expected = least_slip(stiffness, flat, load, inside.ravel())
+        assert slip[inside] == pytest.approx(expected, abs=3e-6 * expected.max())
+        assert bool((expected > 0.0).all()) == slides
+    assert np.all(path.slip.values[:, ~inside] == 0.0)
+
+
+def test_a_strip_across_a_plane_is_the_line():
+    line = within(
+        make_problem(64, 0.04, weakening_rate=3e11, residual_strength=2e5), (0.004, 0.03)
+    )
+    plane = make_problem((64, 8), (0.04, 0.005), weakening_rate=3e11, residual_strength=2e5)
+    plane = within(plane, ((0.004, 0.03), (0.0, 0.005)))
+    strength = FIELD.sample(line.interface, seed=4)[0]
+    along = exact_onset(line, strength)
+    across = exact_onset(plane, np.repeat(strength[:, None], 8, axis=1))
+    for name in ("critical_load", "critical_stress", "first_instability"):
+        assert across[name].item() == pytest.approx(along[name].item(), rel=2e-6)
+
+
 def test_results_depend_on_the_period_through_the_square_of_extent_over_period():
     loads = []
     for times in (2, 4, 8):

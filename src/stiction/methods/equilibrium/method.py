@@ -130,8 +130,9 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
-        if problem.interface.breakable is not None and problem.interface.is_plane:
-            reasons.append("interface.extent: on planes it is taken by st.Rupture()")
+        ends = problem.interface.breakable is not None
+        if self.sensitivity and ends and problem.interface.is_plane:
+            reasons.append("sensitivity: is not known on planes that end; leave it out")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append("gap: leave it out on lines, which are solved to round-off")
         return reasons

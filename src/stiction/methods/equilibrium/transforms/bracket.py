@@ -27,9 +27,11 @@ of steps, so it only starts `turning_point`, which closes the bracket, and takes
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.elasticity.operator import (
     NEGATIVE_CURVATURE,
     SOLVED,
+    Mask,
     Operator,
     filtered,
     inner,
@@ -48,6 +50,26 @@ LIFTING_SHARE = 0.4
 EIGENVALUE_RTOL = 1e-4
 """Residual of the lowest eigenvector, as a share of the largest W."""
 MAX_EIGENVECTOR_ITERATIONS = 200
+LIFTING_RTOL = 1e-6
+"""The same for the eigenvector by which multipliers of a part are lifted, to be positive at its
+border."""
+
+
+def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Array, Array]:
+    """As `_lifting_field`, for a part that can break: the lowest eigenvector of A on it."""
+    lifting = np.where(can_break, guess, 0.0)
+    value, _ = lowest_eigenvector(
+        operator, can_break, lifting, LIFTING_RTOL * float(operator.rate.max()),
+        MAX_EIGENVECTOR_ITERATIONS,
+    )  # fmt: skip
+    if value >= 0.0:
+        raise InputError(
+            "interface.extent: is too small to become unstable at the given weakening rates; widen"
+            " it, or check the units of lengths, shear modulus and weakening rate"
+        )
+    image = np.empty_like(lifting)
+    product(operator, lifting, image)
+    return lifting, -image
 
 
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
@@ -76,10 +98,17 @@ class Bracket:
     bound, and the multiplier, with <p, y> = 1, the upper. The first proofs are that no node slips,
     and that all nodes slide at once. K(k), W (Pa/m), strength less initial stress (Pa) and load
     profile are fields (*shape).
+    Where the strength is infinite, slip and multiplier are zero. `lifting` is then a guess of the
+    lowest eigenvector on all other nodes.
     """
 
     def __init__(
-        self, symbol: Array, rate: Array | float, excess: Array, profile: Array
+        self,
+        symbol: Array,
+        rate: Array | float,
+        excess: Array,
+        profile: Array,
+        lifting: Array | None = None,
     ) -> None:
         self.operator = make_operator(symbol, rate, excess.shape)
         self.excess, self.profile = excess.flatten(), profile.flatten()
@@ -87,7 +116,13 @@ class Bracket:
         self.inside = np.zeros(excess.size, dtype=np.bool_)
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
-        self.lifting = _lifting_field(self.operator)
+        self.can_break = np.isfinite(self.excess)
+        self.finite_excess = np.where(self.can_break, self.excess, 0.0)
+        if self.can_break.all():
+            self.lifting = _lifting_field(self.operator)
+        else:
+            guess = np.ones(excess.size) if lifting is None else lifting
+            self.lifting = _lifting_part(self.operator, self.can_break, guess)
         self.raise_multiplier(self.lifting[0])
 
     @property
@@ -100,7 +135,7 @@ class Bracket:
         """Load to which relative gaps refer: the onset, unless it is close to zero."""
         return max(
             abs(self.upper),
-            MIN_MAGNITUDE * float(np.abs(self.excess).mean() / self.profile.mean()),
+            MIN_MAGNITUDE * float(np.abs(self.finite_excess).mean() / self.profile.mean()),
         )
 
     def closed(self, gap: float) -> bool:
@@ -128,7 +163,7 @@ class Bracket:
         trial = np.maximum(y, 0.0)
         product(self.operator, trial, self.residual)
         lifting, lifted = self.lifting
-        infeasible, liftable = self.residual > 0.0, lifted > 0.0
+        infeasible, liftable = (self.residual > 0.0) & self.can_break, lifted > 0.0
         if (infeasible & ~liftable).any():
             return np.inf
         if infeasible.any():
@@ -136,7 +171,7 @@ class Bracket:
         p_y = inner(self.profile, trial)
         if not p_y > 0.0:
             return np.inf
-        load = inner(self.excess, trial) / p_y
+        load = inner(self.finite_excess, trial) / p_y
         if load < self.upper:
             self.upper, self.multiplier = load, trial / p_y
         return load

@@ -98,6 +98,16 @@ def doubled(coarse: Array) -> Array:
     return coarse
 
 
+def halved_strength(fine: Array) -> Array:
+    """Return `halved` of strengths, over the nodes of finite strength only."""
+    finite = np.isfinite(fine)
+    if finite.all():
+        return halved(fine)
+    even = finite[tuple(slice(None, None, 2) for _ in fine.shape)]
+    coarse, weight = halved(np.where(finite, fine, 0.0)), halved(1.0 * finite)
+    return np.divide(coarse, weight, out=np.full(even.shape, np.inf), where=even)
+
+
 class PlaneOnset(NamedTuple):
     """Onset of a sample: rigorous bounds of the load, and their proofs.
 
@@ -158,21 +168,26 @@ def plane_onset(
         resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
         if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
             break
-        grids.append(tuple(map(halved, grids[-1])))
+        strength, *fine = grids[-1]
+        grids.append((halved_strength(strength), *map(halved, fine)))
     coarser: Bracket | None = None
     bend = 0.0
     for number in range(len(grids) - 1, -1, -1):
         goal = gap if number == 0 else max(COARSE_GAP, gap)
         strength, load_profile, weakening, end = grids.pop()
         symbol = half_spaces.symbol(strength.shape)
-        bracket = Bracket(symbol, weakening, strength, load_profile)
+        coarse_shape = tuple(nodes // 2 for nodes in strength.shape)
+        lifting = None
+        if coarser is not None:
+            lifting = doubled(coarser.lifting[0].reshape(coarse_shape)).flatten()
+        bracket = Bracket(symbol, weakening, strength, load_profile, lifting)
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
         if coarser is not None:  # 3.
-            coarse_shape = tuple(nodes // 2 for nodes in strength.shape)
             guess = doubled(coarser.slip.reshape(coarse_shape)).flatten()
             phi = doubled(coarser.multiplier.reshape(coarse_shape)).flatten()
+            guess, phi = np.where(bracket.can_break, (guess, phi), 0.0)
             phi *= 1.0 / np.sqrt((phi**2).sum())
             closed, bend = close(bracket, phi, coarser.lower, guess, goal, bend)
         if not closed:  # 2.
@@ -248,7 +263,8 @@ class PlaneProgram:
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         passed = [(load, slip)]
-        while True:
+        can_break = np.isfinite(sample.excess)
+        while can_break.all() or not (slip[can_break] > 0.0).all():
             accuracy = max(0.1 * gap, min(STEP_RESIDUAL * step / abs(load), MAX_STEP_RESIDUAL))
             guess = slip
             if len(passed) > 1:
@@ -279,6 +295,7 @@ class PlaneProgram:
             # The last few states are enough to restart before a turn that was passed unseen.
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
+        return EquilibriumState(load, slip, np.zeros_like(slip), unstable=False)
 
     def _turn(
         self,
@@ -318,11 +335,11 @@ class PlaneProgram:
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(
             self._operator(sample), sample, load_beyond, instability.slip,
-            accuracy=0.1 * self.requested, is_unstable=True,
+            accuracy=0.1 * self.requested, is_unstable=True, to_rest=to_rest,
         )  # fmt: skip
         arrested = end.status == Outcome.ARRESTED
         # Without a turn, an arrest only shows that a stable path was hard to follow.
-        counts = not arrested or instability.multiplier is not None
+        counts = not arrested or instability.certified or instability.multiplier is not None
         after = EquilibriumState(load_beyond, end.slip, instability.direction, jumped=True)
         return Jump(arrested, end.status != Outcome.UNDECIDED, after, counts)
 

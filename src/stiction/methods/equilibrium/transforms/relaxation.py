@@ -198,7 +198,8 @@ def _bound(
     rate = (1.0 - omitted) * present.rate - omitted * DRAG * float(sample.rate.max())
     start = present.strength - (present.rate - rate) * slip
     corner = np.append(sample.pieces.ends, 1e300)[present.piece] * sample.critical
-    level = np.where(present.rate > 0.0, present.strength - present.rate * corner, -np.inf)
+    falls, level = (present.rate > 0.0) & np.isfinite(corner), np.full(slip.size, -np.inf)
+    level[falls] = present.strength[falls] - present.rate[falls] * corner[falls]
     is_level = np.zeros(slip.size, dtype=np.bool_)
     end, lowered = slip, tolerance if omitted > 0.0 else 0.0
     for _ in range(MAX_REVISIONS):
@@ -261,13 +262,17 @@ def least_equilibrium(
     slip: Array,
     accuracy: float = 1e-7,
     is_unstable: bool = False,
+    to_rest: bool = True,
 ) -> Relaxed:
     """Return the least equilibrium at a load that is not below a given slip; see (b).
 
     The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction,
     or (`is_unstable`) at an instability. The accuracy is the largest residual stress as a share of
-    the mean strength or load.
+    the mean strength or load. An interface that ends slides once all slips that can break, unless
+    it is followed `to_rest`.
     """
+    can_break = np.isfinite(sample.excess)
+    stops = not (to_rest or can_break.all())
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
     omitted = 0.0  # share of the weakening that is omitted
@@ -278,6 +283,8 @@ def least_equilibrium(
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
         if float((drive + present.rate * slip).sum()) > tolerance * slip.size:
+            return Relaxed(Outcome.SLIDING, slip)
+        if stops and (slip[can_break] > 0.0).all():
             return Relaxed(Outcome.SLIDING, slip)
         # 2.
         if is_unstable:

@@ -110,7 +110,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
     slope *= 1.0 / (stiffness * share)
     residual_of(operator, phi, slope, bracket.residual)
     # A lift of y by epsilon costs epsilon <s - tau_0 p, 1>/<p, y>.
-    cost = float(np.abs(excess - load * profile).sum())
+    cost = float(np.abs(bracket.finite_excess - load * profile)[bracket.can_break].sum())
     tolerance = accuracy * stiffness * bracket.magnitude * inner(profile, slope) / cost
     status, _ = solve_inside(operator, inside, slope, bracket.residual, tolerance)
     if status != SOLVED:
