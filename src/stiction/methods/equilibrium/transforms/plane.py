@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import (
@@ -180,7 +181,12 @@ def plane_onset(
         lifting = None
         if coarser is not None:
             lifting = doubled(coarser.lifting[0].reshape(coarse_shape)).flatten()
-        bracket = Bracket(symbol, weakening, strength, load_profile, lifting)
+        try:
+            bracket = Bracket(symbol, weakening, strength, load_profile, lifting)
+        except InputError:  # on a coarse grid a small extent may be smaller
+            if number == 0:
+                raise
+            continue
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
