@@ -86,16 +86,19 @@ def test_an_extent_of_everything_is_none(method):
 
 
 def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
-    """Under slow loading; the criterion leaves out what slip hands to the nodes beyond."""
+    """Under slow loading; the criterion bounds the load of the first, by patches that lie inside."""
     problem = within(LINE, (0.006, 0.041))
     strength = FIELD.sample(problem.interface, samples=3, seed=2)
-    exact = exact_onset(problem, strength)
+    exact = exact_onset(problem, strength, events=1)
     waves = st.onset(problem, strength, method=st.Rupture(loading_rate=1e6), progress=False)
     for name in ("critical_load", "critical_stress", "first_instability"):
         assert waves[name].values == pytest.approx(exact[name].values, rel=1e-3)
     local = st.onset(problem, strength, method=LOCAL, progress=False)
-    first = exact.first_instability.values
-    assert local.first_instability.values == pytest.approx(first, rel=0.02)
+    arrested = exact.arrested_events.values > 0
+    first = np.where(arrested, exact.event_load.values[:, 0], exact.critical_load.values)
+    assert np.all(
+        first <= 1.01 * local.critical_load.values
+    )  # a bound, to the error of the grid
     half = 0.5 * problem.nucleation_length
     assert np.all(local.critical_position > 0.006 + half - 1e-3)
     assert np.all(local.critical_position < 0.041 - half + 1e-3)

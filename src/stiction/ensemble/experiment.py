@@ -130,7 +130,9 @@ class Experiment:
         if "normal_pressure" in self.random.names:
             return float(np.mean([one.properties["normal_pressure"].mean for one in members]))
         given = self.problem.given_pressure
-        return float("nan") if given is None else float(np.mean(given))
+        if given is None:
+            return float("nan")
+        return float(self.problem.interface.mean(given) if np.ndim(given) else given)
 
     @property
     def mean_strength(self) -> float:

@@ -60,7 +60,8 @@ class LocalCriterion:
     steepens raises an error.
 
     If the interface ends, patches lie within its extent. Between half-spaces stresses leave out
-    what the slip of the patch hands to the nodes beyond, and are slightly high.
+    what slip hands to the nodes beyond before the onset. They were too high by up to 15 % on a part
+    of four nucleation lengths, and by up to 0.04 % on a part of 17.
 
     On a plane the average is over critical ellipses with five aspect ratios. Each is the smallest
     ellipse on which the stiffness K - W of the discrete problem is unstable, and its eigenvector is
