@@ -86,7 +86,7 @@ def test_an_extent_of_everything_is_none(method):
 
 
 def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
-    """Under slow loading; the criterion bounds the load of the first, by patches that lie inside."""
+    """Under slow loading; patches that lie inside bound the load of the first."""
     problem = within(LINE, (0.006, 0.041))
     strength = FIELD.sample(problem.interface, samples=3, seed=2)
     exact = exact_onset(problem, strength, events=1)
