@@ -117,7 +117,8 @@ def report(spacing: float, out: Path) -> None:
         top, slip = float(record.station_slip_rate.max()), float(record.station_slip[-1])
         print(f"  {name}: peak slip rate {top:.2f} m/s, slip at the end {slip:.2f} m")
     files = out / f"{spacing:g}m"  # as the community exchanges them
-    st.external.write_scec(found.run, files, origin=np.array(PERIOD) / 2, normal_stress=NORMAL)
+    about = {"normal_stress": NORMAL, "benchmark": "TPV3"}
+    st.external.write_scec(found.run, files, origin=np.array(PERIOD) / 2, **about)
     figure = draw(found, f"rupture time, nodes {spacing:g} m apart")
     figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=150)
 

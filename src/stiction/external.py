@@ -1,4 +1,4 @@
-"""Functions for external programs: samplers, reliability codes, and the SCEC comparison."""
+"""Functions for external programs: samplers, reliability codes, tables, the SCEC comparison."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,8 +17,9 @@ from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
+from stiction.study.run import event_table
 
-__all__ = ["limit_state", "simulator", "write_scec"]
+__all__ = ["event_table", "limit_state", "simulator", "write_scec"]
 
 
 def __dir__() -> list[str]:  # what completion lists

@@ -1,5 +1,7 @@
 """Ruptures against exact equilibrium at slow rates, and against the full history of their steps."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from oracles import largest_load
@@ -146,3 +148,19 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()
     # Behind a steep front the slip rate shows ten times that.
     assert np.abs(state.rate - rate).max() < 3e-5 * rate.max()
+
+
+def test_the_moment_of_an_event_between_ends_is_that_of_the_full_history():
+    problem = make_problem(128, 0.05, solid=st.paper.problem().solid, residual_ratio=0.5)
+    line = st.Interface(0.05, 128, extent=(0.01, 0.03))
+    problem = dataclasses.replace(problem, interface=line)
+    strength = 1e6 - 2e5 * np.exp(-(((line.x - 0.02) / 0.004) ** 2))
+    run = run_of(problem, strength, st.Rupture(loading_rate=3e8, implicit=False))
+    state = run.start(run.first_slip())
+    start = state._replace(rate=state.rate.copy(), diagnostics=state.diagnostics.copy())
+    steps, _ = run.take_steps(state, 5000)
+    slip, _ = direct_convolution(run, start, steps)
+    (event,) = run.events
+    before, after = event["slip"]
+    assert (after - before).sum() > 0.9 * slip.sum()
+    assert after.sum() == pytest.approx(slip.sum(), rel=1e-6)

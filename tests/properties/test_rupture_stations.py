@@ -46,7 +46,8 @@ test_what_no_station_is = refusals({
 
 def test_files_of_a_line_read_back(tmp_path):
     run = simulate(LINE, stations={"a": 0.0131}, fields=["slip", "slip_rate", "shear_stress"])
-    path, contours = st.external.write_scec(run, tmp_path, origin=0.004, normal_stress=-7e6)
+    about = {"origin": 0.004, "normal_stress": -7e6, "benchmark": "block"}
+    path, contours = st.external.write_scec(run, tmp_path, **about)
     rows, table = (pd.read_csv(one, comment="#", sep=r"\s+") for one in (path, contours))
     assert path.name == "faultst000dp000.txt"
     assert rows.columns[1:4].tolist() == ["h-slip", "h-slip-rate", "h-shear-stress"]
@@ -59,9 +60,7 @@ def test_files_of_a_line_read_back(tmp_path):
     np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
     np.testing.assert_allclose(table["t"], run.arrival_time.fillna(1e9), rtol=1e-6)
     with pytest.raises(st.InputError, match="lacks station_slip. Give simulate_rupture"):
-        st.external.write_scec(
-            run.drop_vars("station_slip"), tmp_path, origin=0, normal_stress=0
-        )
+        st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **about)
 
 
 def test_an_end_of_the_interface_is_its_first_node():

@@ -38,7 +38,7 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
     program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
     for strength in rough(problem, 5, samples=4):
         sample = sample_of(problem.sample(strength), program.pieces, 0)
-        for before, after in follow_to_sliding(program, sample).events:
+        for before, after, _ in follow_to_sliding(program, sample).events:
             least = overdamped.jump(sample, before)
             assert least.arrested
             assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())

@@ -238,22 +238,27 @@ def export(
     partial: Annotated[
         bool, Option("--partial", help="Write the stored part of an incomplete run.")
     ] = False,
+    events: Annotated[
+        bool, Option("--events", help="Write a table (.csv) with one row for each event.")
+    ] = False,
 ) -> None:
     """Write a run as a file over the sweep and the samples.
 
     A table (.csv) has a row for each sample and columns named `name (unit)`. It leaves
-    out profiles along the interface and events. If samples are missing, no file is
-    written and the exit code is 1. With --partial, missing samples are NaN.
+    out profiles along the interface and events; --events writes the events instead. If
+    samples are missing, no file is written and the exit code is 1. With --partial, missing
+    samples are NaN.
 
     \b
     Examples:
       stiction export run result.nc
       stiction export run samples.csv --partial
+      stiction export run events.csv --events
     """
     from stiction.study.study import open_run
 
     stored = open_run(run)
-    stored.export(out, partial=partial)
+    stored.export(out, partial=partial, events=events)
     state = stored.status()
     rest = "" if state.complete else "; the others are missing"
     echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")

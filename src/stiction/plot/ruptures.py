@@ -1,5 +1,6 @@
-"""A rupture: slip rate in space and time, its front on a plane, its film."""
+"""Ruptures: slip rate in space and time, front, film, moment rate, and sizes of many events."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,17 @@ from stiction.base.errors import InputError
 from stiction.base.model import Count, FilePath, check
 from stiction.base.progress import Meter, Show
 from stiction.base.units import unit_for
-from stiction.plot.axes import FigureAxes, need, on_axes, problem_of, with_unit
+from stiction.plot.axes import (
+    FigureAxes,
+    named,
+    need,
+    new_figure,
+    on_axes,
+    problem_of,
+    with_unit,
+)
 from stiction.plot.fields import draw_map, map_height, name_line
-from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, paper_style
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style, series
 from stiction.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -33,6 +42,8 @@ DECADES = 7.0
 """Drawn decades of slip rate below the largest."""
 BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
+SHOWN_RATE = 0.01
+"""Moment rate from which on a rupture is drawn, as a share of its largest."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
@@ -74,6 +85,145 @@ def rupture(
     with on_axes(ax, width=PAGE, height=3.4) as axes:
         _draw_space_time(axes, run, problem)
     return axes
+
+
+def moment_rate(run: xr.Dataset) -> NDArray[Any]:
+    """Draw the moment rate of a rupture and its amplitude spectrum.
+
+    Parameters
+    ----------
+    run : Dataset
+        From `simulate_rupture`.
+
+    Returns
+    -------
+    (2,) array of matplotlib.axes.Axes
+        Left the moment rate, until it stays below a hundredth of its largest value; right its
+        spectrum, which tends to the moment at low frequencies.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=128)
+    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
+    >>> method = st.Rupture(loading_rate=1e8)
+    >>> run = st.simulate_rupture(problem, tau_p[0], method=method, progress=False)
+    >>> st.plot.moment_rate(run)[1].get_xlabel()
+    'frequency (Hz)'
+    """
+    need(run, "moment_rate", "moment_rate_spectrum", "onset_time")
+    since, begin = _since_onset(run)
+    rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
+    fast = since[rate.values > SHOWN_RATE * rate.values.max()]
+    ends = (fast[0], fast[-1]) if fast.size else (since[0], since[-1])
+    beside = 0.1 * (ends[1] - ends[0])
+    shown = (since >= ends[0] - beside) & (since <= ends[1] + beside)
+    factor, unit = unit_for("s", since[shown])
+    figure = new_figure(PAGE, 2.6)
+    with paper_style():
+        left, right = figure.subplots(1, 2)
+        left.plot(since[shown] * factor, rate.values[shown], color=INK)
+        left.set(
+            xlabel=with_unit(f"time{begin}", unit),
+            ylabel=with_unit("moment rate", rate.attrs["units"]),
+            ylim=(0.0, None),
+        )
+        if spectrum.size:
+            right.loglog(run["frequency"], spectrum, color=INK)
+        right.set(xlabel="frequency (Hz)", ylabel=f"spectrum ({spectrum.attrs['units']})")
+    return np.array([left, right])
+
+
+def events(
+    result: xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset],
+    *,
+    problem: Problem | None = None,
+) -> NDArray[Any]:
+    """Draw how frequent events of each size are, and their moment over their area or length.
+
+    Parameters
+    ----------
+    result : Dataset, or list or mapping of Dataset
+        From `monte_carlo`, `onset` or a study whose method has ``events=``, or from
+        `simulate_rupture` or `equilibrium_path`. Give several as a list, or by name.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
+
+    Returns
+    -------
+    (2,) array of matplotlib.axes.Axes
+        Left the number of events per sample whose moment is at least so large; right moment over
+        area, on lines over length. Between half-spaces a line shows cracks with the median stress
+        drop: Eshelby's circular crack on planes, Starr's on lines.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=128)
+    >>> field = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.Equilibrium(events=4)
+    >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)
+    >>> st.plot.events(result)[0].get_ylabel()
+    'events per sample, at least as large'
+    """
+    results = named(result)
+    system = problem_of(next(iter(results.values())), problem)
+    plane = system.interface.is_plane
+    size = "event_area" if plane else "event_length"
+    hint = "; give the method events=, such as st.Equilibrium(events=20)"
+    for dataset in results.values():
+        need(dataset, "event_moment", size, hint=hint)
+    unit = next(iter(results.values()))["event_moment"].attrs["units"]
+    sizes = [dataset[size].values.ravel() for dataset in results.values()]
+    moments = [dataset["event_moment"].values.ravel() for dataset in results.values()]
+    drops = [dataset["event_area_stress_drop"].values.ravel() for dataset in results.values()]
+    figure = new_figure(PAGE, 2.8)
+    with paper_style():
+        left, right = figure.subplots(1, 2)
+        for number, (name, dataset) in enumerate(results.items()):
+            ordered = np.sort(moments[number][np.isfinite(moments[number])])[::-1]
+            samples = moments[number].size / max(dataset.sizes["event"], 1)
+            left.plot(
+                ordered, np.arange(1, ordered.size + 1) / samples, **series(number), label=name
+            )
+            right.plot(sizes[number], moments[number], ".", color=color(number), markersize=3.0)
+        known = np.concatenate(sizes)
+        known = known[np.isfinite(known)]
+        if system.specimen is None and known.size:
+            span = np.array([known.min(), known.max()])
+            drop = float(np.nanmedian(np.concatenate(drops)))
+            factor, stress_unit = unit_for("Pa", np.array([drop]))
+            right.plot(
+                span, crack_moment(system, drop, span), color=QUIET, linewidth=0.8,
+                label=f"cracks, {drop * factor:.2g} {stress_unit}",
+            )  # fmt: skip
+            right.legend()
+        if len(results) > 1:
+            left.legend()
+        left.set(
+            xscale="log",
+            yscale="log",
+            xlabel=f"moment ({unit})",
+            ylabel="events per sample, at least as large",
+        )
+        text = "area (m²)" if plane else "length (m)"
+        right.set(xscale="log", yscale="log", xlabel=text, ylabel=f"moment ({unit})")
+    return np.array([left, right])
+
+
+def crack_moment(problem: Problem, drop: float, sizes: Array) -> Array:
+    """Return the moment of cracks with a uniform stress drop (Pa) between half-spaces.
+
+    On a line of length 2a, pi drop a² G/G* (Starr, 1928); on a plane a circular crack of radius a,
+    16 (1 - nu)/(3 (2 - nu)) drop a³ (Eshelby, 1957).
+    """
+    solid = problem.solid
+    if problem.interface.is_plane:
+        share = 16.0 * (1.0 - solid.poisson_ratio) / (3.0 * (2.0 - solid.poisson_ratio))
+        moment: Array = share * drop * (sizes / np.pi) ** 1.5
+        return moment
+    softer = solid.shear_modulus / problem.effective_modulus
+    return np.pi * drop * softer * (0.5 * sizes) ** 2
 
 
 def film(
@@ -228,13 +378,16 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
     (line,) = above.plot(x, stress[0], color=INK, label=r"$\tau$")
     above.set_ylabel(f"stress ({unit})")
-    highest = np.nanmax(strength)
-    margin = 0.06 * (highest - min(np.nanmin(strength), stress.min()))
-    above.set_ylim(min(0.0, stress.min()) - margin, max(highest, stress.max()) + margin)
+    breaks = np.flatnonzero(np.isfinite(strength))  # barriers carry far more than what breaks
+    highest, broken = np.nanmax(strength), stress[:, breaks]
+    margin = 0.06 * (highest - min(np.nanmin(strength), broken.min()))
+    above.set_ylim(min(0.0, broken.min()) - margin, max(highest, broken.max()) + margin)
     above.legend(loc="upper right", ncols=2)
     (slip,) = below.semilogy(x, rate[0], color=ACCENT)
     below.set_ylim(10.0**-DECADES * top, 3.0 * top)
-    below.set_xlim(0.0, x[-1] + x[1] - x[0])
+    first, last = x[breaks[0]], x[breaks[-1]] + x[1] - x[0]
+    beside = 0.05 * (last - first) * (breaks.size < x.size)
+    below.set_xlim(first - beside, last + beside)
     below.set_xlabel(f"position $x$ ({length_unit})")
     below.set_ylabel("slip rate (m/s)")
     return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(above, run)]
@@ -245,7 +398,8 @@ def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     (rate, norm), stress = _rates(run["slip_rate"].values, 4.0), run["shear_stress"].values
     factor, unit = unit_for("Pa", stress)
     stress = stress * factor
-    low, high = np.quantile(stress, [0.001, 0.999])
+    breaks = np.isfinite(run["peak_strength"].values)
+    low, high = np.quantile(stress[:, breaks], [0.001, 0.999])
     figure = Figure(figsize=(PAGE * 1.15, 3.4))
     left, right = figure.subplots(1, 2, sharey=True)
     slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=COLORS)

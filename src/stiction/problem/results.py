@@ -40,6 +40,15 @@ def position(interface: Interface, variable: Variable) -> Variable:
     return replace(variable, dims=dims)
 
 
+def per_area(interface: Interface, variable: Variable) -> Variable:
+    """Return a variable for a plane, where a quantity per length of a line is a total."""
+    if not interface.is_plane:
+        return variable
+    units = {"N": "N m", "N/s": "N m/s", "J/m": "J"}.get(variable.units, variable.units)
+    name = variable.long_name.replace(" per length", "")
+    return replace(variable, units=units, long_name=name)
+
+
 def onset_variables(interface: Interface) -> dict[str, Variable]:
     """Return the variables that every method computes for each sample."""
     place = position(interface, ONSET_VARIABLES["critical_position"])

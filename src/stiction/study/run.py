@@ -171,7 +171,7 @@ class StoredRun:
         self._store.read_into(rows)
         return rows
 
-    def export(self, path: str | Path, *, partial: bool = False) -> None:
+    def export(self, path: str | Path, *, partial: bool = False, events: bool = False) -> None:
         """Write `dataset` in the format of its suffix (.nc or .csv), whole or not at all.
 
         Parameters
@@ -179,11 +179,14 @@ class StoredRun:
         path : path
         partial : bool
             Whether to write the stored part of an incomplete run.
+        events : bool
+            Whether a table (.csv) has a row for each event, as `stiction.external.event_table`,
+            instead of a row for each sample.
 
         Raises
         ------
         InputError
-            If the suffix is another.
+            If the suffix is another, or the run has no events.
         StoreError
             If the file cannot be written.
         RunError
@@ -195,20 +198,25 @@ class StoredRun:
                 f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} are there."
                 " Run the study again to compute the others, or pass partial=True"
             )
-        export(self._checked(rows), place)
+        export(self._checked(rows), place, events)
 
 
 # -- files for other programs --------------------------------------------------------------------
 
 
-def export(result: xr.Dataset, path: Path) -> None:
-    """Write a result as NetCDF (.nc) or as a table (.csv), whole or not at all."""
-    if path.suffix == ".nc":
+def export(result: xr.Dataset, path: Path, events: bool = False) -> None:
+    """Write a result as NetCDF (.nc) or as a table (.csv), whole or not at all.
+
+    With `events` the table has a row for each event.
+    """
+    if path.suffix == ".nc" and not events:
         write_result(result, path)
     elif path.suffix == ".csv":
-        frame = table_of(result)
+        frame = event_table(result) if events else table_of(result)
         # Numbers are written as the shortest text that reads back to the same bits.
         write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
+    elif events:
+        raise InputError(f"{path}: a table of events is .csv; .nc holds them without --events")
     else:
         raise InputError(f"{path}: the suffix must be .nc or .csv, got {path.suffix!r}")
 
@@ -230,6 +238,51 @@ def write_result(result: xr.Dataset, path: Path) -> None:
     )
 
 
+def event_table(result: xr.Dataset) -> pd.DataFrame:
+    """Return the events of a result as a data frame: one row an event.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        From `equilibrium_path` or `simulate_rupture`, or from `onset`, `monte_carlo` or a study
+        whose method has ``events=``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns are named ``name (unit)``: the sweep and the sample, if there are any, the number
+        of the event in its sample, and its variables (see `equilibrium_path`).
+
+    Raises
+    ------
+    InputError
+        If the result has no events. An `AccuracyWarning` says if samples have more events than it
+        keeps.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=128)
+    >>> field = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.Equilibrium(events=4)
+    >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)
+    >>> list(st.external.event_table(result).columns[:3])
+    ['sample (1)', 'event (1)', 'event_load (Pa)']
+    """
+    names = [str(name) for name, values in result.data_vars.items() if "event" in values.dims]
+    if not names:
+        raise InputError(
+            "result: has no events; give the method events=, such as st.Equilibrium(events=20), or"
+            " take st.equilibrium_path or st.simulate_rupture"
+        )
+    if "sample" in result.dims:
+        most, kept = int(result["arrested_events"].max()), result.sizes["event"]
+        if most > kept:
+            warn_accuracy(f"events: {kept} of up to {most} a sample are kept; raise events=")
+    frame = _frame_of(result[names])
+    return frame[frame["event_load (Pa)"].notna()].reset_index(drop=True)
+
+
 def table_of(result: xr.Dataset) -> pd.DataFrame:
     """Return a table with a column for each variable and a row for each sample and point.
 
@@ -246,9 +299,14 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: has several numbers for each sample and does not fit into a table."
-            " Export a .nc file to keep it"
+            " Export a .nc file to keep it, or with --events (in Python events=True) a table of"
+            " events"
         )
-    narrow = result.drop_vars(wide)
+    return _frame_of(result.drop_vars(wide))
+
+
+def _frame_of(narrow: xr.Dataset) -> pd.DataFrame:
+    """Return a column for each variable or component, named ``name (unit)``."""
     for name, values in narrow.data_vars.items():
         if DIRECTION in values.dims:  # a column for each component
             parts = {

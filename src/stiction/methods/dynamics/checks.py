@@ -1,5 +1,6 @@
 """Errors and warnings of a run: coarse grids, loading rates, loads that reverse."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ from stiction.methods.dynamics.state import Reason, RuptureState, value_at
 from stiction.problem.problem import MIN_NODES_IN_NUCLEATION, Problem
 from stiction.problem.sample import Sample
 
+FAST_RISE = 1e-3
+"""Rise of the load while shear waves cross the nucleation length, as a share of the stress scale,
+above which arrested events depend on the rate of loading."""
 # Shares of the stress scale:
 _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
@@ -88,6 +92,25 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         warn_accuracy(
             f"load: an interface did not {what} before its run ended. Its values for this event"
             " are NaN, and failure_probability counts it as survived"
+        )
+
+
+def warn_of_fast_loading(run: Run, results: Sequence[Any]) -> None:
+    """Warn if the load rises too fast for arrested events to be those of a slow load."""
+    arrested = sum(int(np.nan_to_num(result["arrested_events"])) for result in results)
+    lengths = run.medium.problem.nucleation_lengths(run.steepest_rate)
+    crossing = lengths[0] / run.medium.problem.solid.shear_wave_speed
+    if not arrested:
+        return
+    loads = [float(result["applied_load"]) for result in results]
+    rate, scale = run.slope(run.first_slip()), run.scale_at(np.nanmax(loads))
+    rise = rate * crossing / scale
+    if rise > FAST_RISE:
+        warn_accuracy(
+            f"loading_rate: while shear waves cross the nucleation length, in {crossing:.2g} s, the"
+            f" load rises by {rise:.2g} of the stress scale, {scale:.2g} Pa. Number and size of"
+            f" arrested events then depend on the rate; load at {FAST_RISE / rise * rate:.1g} Pa/s"
+            " or slower to read them as quasi-static"
         )
 
 

@@ -109,6 +109,7 @@ def _set_maximum(now: Any, radiated: float) -> None:
 def _begin_event(now: Any) -> None:
     """Step 4: begin an instability at the last maximum of the mean stress."""
     now.in_event, now.event_slip_rate = 1, now.top_slip_rate
+    now.event_begun = 1
     is_first = now.instabilities == 0
     now.instabilities += 1
     if is_first:
@@ -209,8 +210,18 @@ def finish_step(
     now.top_slip_rate, now.top_node = top_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / setting.thresholds.breakable
+    now.mean_slip_rate = (
+        step.radiated / grid.impedance * slip.size / setting.thresholds.breakable
+    )
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, setting.thresholds, step.radiated)
+    if top_rate > setting.thresholds.unstable_rate and not now.event_begun:
+        now.fast_since = now.time if np.isnan(now.fast_since) else now.fast_since
+        now.fast_until = now.time
+    if now.maximum_time == now.time:  # an event may begin here
+        now.maximum_work = now.work
+        for i in range(slip.size):
+            state.maximum_slip[i] = slip[i]
     if record.steps.size > 0:
         record.steps[row] = now
         for s in range(setting.stations.size):

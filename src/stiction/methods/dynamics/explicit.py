@@ -154,7 +154,7 @@ def explicit_steps(
     rate_hat, slip_hat = tables.rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
-    while taken < count and reason == Reason.DONE:
+    while taken < count and reason == Reason.DONE and not (now.event_begun or now.event_calm):
         time = now.time + step
         load = value_at(setting.load, time)
         # 1. Predict.
@@ -197,6 +197,7 @@ def explicit_steps(
             reason = Reason.DROPPED
         elif calm:
             end_event(now, thresholds.unstable_rate, radiated)
+            now.event_calm = now.event_open
             if thresholds.rest_stop and now.instabilities > 0:
                 reason = Reason.AT_REST
             elif not thresholds.explicit_only:

@@ -320,6 +320,7 @@ def implicit_steps(
             reason = Reason.DROPPED
         elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
             reason = Reason.TO_EXPLICIT
-        if reason != Reason.DONE or last or now.time >= thresholds.end_time:
+        ends = reason != Reason.DONE or now.event_begun
+        if ends or last or now.time >= thresholds.end_time:
             break
     return taken, step, reason

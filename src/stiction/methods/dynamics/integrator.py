@@ -12,6 +12,7 @@ A run goes through phases (`Run.take_steps`):
 """
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,7 @@ from stiction.methods.dynamics.state import (
     RuptureState,
     Setting,
     StepRecord,
+    event_type,
     value_at,
 )
 from stiction.problem.friction.kernels import strengths
@@ -45,6 +47,9 @@ from stiction.problem.friction.kernels import strengths
 # Shares of the stress scale:
 _OVERSTRESS = 1e-6  # stress above the strength from which a run begins with explicit steps
 _RESTING_STRESS = 1e-9  # Z V below which the interface rests
+_STOPPED_SHARE = (
+    0.1  # slip rate, as a share of `unstable_rate`, above which an interface slides on
+)
 _REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
 _STEPS_BETWEEN_CHECKS = 1000  # steps after which a run checks whether it has ended
 
@@ -69,6 +74,8 @@ class Run:
     least_load: float
     # Tables of the last kind of step only, since they are large.
     tables: ExplicitTables | ImplicitTables | None = None
+    # Instabilities that came to rest so far, each a record of `event_type`.
+    events: list[NDArray[Any]] = dataclasses.field(default_factory=list)
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
         """Return the static stress of a slip at a load, as an interface at rest carries it, Pa."""
@@ -149,6 +156,7 @@ class Run:
         for name in ("first_stress", "onset_stress", "critical_stress", "kinetic_stress"):
             now[name] = np.nan  # not yet
         now["onset_time"] = now["onset_load"] = np.nan
+        now["fast_since"] = now["fast_until"] = np.nan
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
@@ -173,6 +181,8 @@ class Run:
             memory=memory,
             memory_sum=memory_sum,
             arrival=arrival,
+            maximum_slip=delta.copy(),
+            event_slip=delta.copy(),
             diagnostics=diagnostics,
         )
 
@@ -225,6 +235,10 @@ class Run:
             steps = self._explicit if state.explicit else self._implicit
             steps_taken, reason = steps(state, count - taken, rest_of_record)
             taken += steps_taken
+            now, held = state.now, self.setting.thresholds.held
+            rests = bool(now["event_calm"] or (reason == Reason.ALL_SLID and held))
+            if rests or now["event_begun"]:
+                self._follow_event(state, rests)
             if reason == Reason.TO_EXPLICIT:
                 self._to_explicit(state)
             elif reason == Reason.TO_IMPLICIT:
@@ -232,6 +246,35 @@ class Run:
             elif reason != Reason.DONE or self.ended(state):
                 return taken, reason
         return taken, Reason.DONE
+
+    def _follow_event(self, state: RuptureState, rests: bool) -> None:
+        """Keep the open event if it has come to rest, and open the one that has just begun.
+
+        An event comes to rest when all is calm (`rests`). If the next one begins before, it ends
+        at the maximum of the mean stress at which the next one begins.
+        """
+        now, slip, load, work = state.now, state.maximum_slip, "maximum_load", "maximum_work"
+        if rests:
+            slip, load, work = state.slip, "load", "work"
+        thresholds = self.setting.thresholds
+        slides = rests and now["all_broken"] and not thresholds.held
+        slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_rate
+        if now["event_open"] and np.isfinite(now["fast_since"]) and not slides:
+            event = np.zeros((), event_type(slip.size))
+            event["time"] = now["event_time"]
+            event["duration"] = now["fast_until"] - now["fast_since"]
+            event["load"] = now["event_load"], now[load]
+            event["work"] = now["event_work"], now[work]
+            event["slip"] = state.event_slip, slip
+            self.events.append(event)
+        now["fast_since"] = now["fast_until"] = np.nan
+        now["event_open"] = now["event_begun"]
+        if rests and now["maximum_time"] == now["time"]:
+            now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
+        for name in ("time", "load", "work"):
+            now[f"event_{name}"] = now[f"maximum_{name}"]
+        state.event_slip[:] = state.maximum_slip
+        now["event_begun"] = now["event_calm"] = 0
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()

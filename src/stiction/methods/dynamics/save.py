@@ -45,10 +45,11 @@ from stiction.methods.dynamics.state import (
     Floats,
     RuptureState,
     StepRecord,
+    event_type,
 )
-from stiction.methods.dynamics.summary import energy_balance, per_area, seismic_moment
+from stiction.methods.dynamics.summary import energy_balance, moment_of
 from stiction.problem.interface import Interface
-from stiction.problem.results import along, coordinate, to_dataset
+from stiction.problem.results import along, coordinate, per_area, to_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,6 +81,7 @@ SCALARS: dict[str, Variable] = _over(
     top_slip_rate=("m/s", "largest slip rate"),
     weakened_fraction=("1", "share of nodes at the residual strength"),
     seismic_moment=("N", "seismic moment per length"),
+    moment_rate=("N/s", "seismic moment rate per length"),
     work=("J/m", "work of the load on the slip"),
     strain_energy=("J/m", "static strain energy of the slip"),
     fracture_energy=("J/m", "energy dissipated above the residual"),
@@ -91,6 +93,7 @@ STEPS = _over(  # DIAGNOSTICS of these names
     step_load=("Pa", "load factor tau_0 after each step"),
     step_mean_stress=("Pa", "mean shear stress after each step"),
     step_mean_slip=("m", "mean slip after each step"),
+    step_mean_slip_rate=("m/s", "mean slip rate after each step"),
     step_top_slip_rate=("m/s", "largest slip rate after each step"),
     step_size=("s", "size of each step"),
     step_work=("J/m", "work of the load up to each step"),
@@ -209,7 +212,8 @@ class Recorder:
             "top_slip_rate": float(state.rate.max()),
             "weakened_fraction": float(now["weakened_nodes"])
             / run.setting.thresholds.breakable,
-            "seismic_moment": seismic_moment(run, state),
+            "seismic_moment": moment_of(medium.problem, state.slip),
+            "moment_rate": moment_of(medium.problem, state.rate),
         }
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             frame |= energy_balance(run, state)
@@ -316,7 +320,8 @@ def _digest(run: Run, saved: str) -> str:
 def write_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> None:
     """Write the state of a run and its digest, in a single operation."""
     digest = np.frombuffer(_digest(run, saved).encode(), np.uint8)
-    write_arrays(path, {"digest": digest} | state._asdict())
+    events = np.array(run.events, event_type(state.slip.size))
+    write_arrays(path, {"digest": digest, "events": events} | state._asdict())
 
 
 def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") -> RuptureState:
@@ -325,6 +330,7 @@ def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") 
         arrays = read_arrays(path)
         digest = arrays["digest"].tobytes().decode()
         stored = [arrays[name] for name in state._fields]
+        events = [*arrays["events"]]
     except UNREADABLE as error:
         raise InputError(f"to: {str(path)!r} is not a readable checkpoint: {error}") from None
     if digest != _digest(run, saved):
@@ -332,6 +338,7 @@ def read_checkpoint(path: Path, run: Run, state: RuptureState, saved: str = "") 
             f"to: {str(path.parent)!r} holds another run: the problem, the profiles, the load, "
             "the method or the saved results differ. Give a new folder"
         )
+    run.events = events
     for array, values in zip(state, stored, strict=True):
         array[...] = values  # in place, which keeps the alignment of the arrays
     return state

@@ -16,7 +16,7 @@ COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-s
 
 
 def write_scec(
-    run: Any, folder: Any, *, origin: Any, normal_stress: float, benchmark: str = "TPV3"
+    run: Any, folder: Any, *, origin: Any, normal_stress: float, benchmark: str
 ) -> list[Path]:
     """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
@@ -33,7 +33,7 @@ def write_scec(
     normal_stress : float
         Normal stress, Pa, negative in compression.
     benchmark : str
-        Name of the problem, for the headers.
+        Name of the problem, for the headers: "TPV3", or a name of your own.
 
     Returns
     -------
@@ -57,7 +57,8 @@ def write_scec(
     >>> run = st.simulate_rupture(problem, tau_p, method=method, save=save, progress=False)
     >>> import tempfile
     >>> folder = tempfile.mkdtemp()
-    >>> files = st.external.write_scec(run, folder, origin=0.05, normal_stress=-5e6)
+    >>> options = {"origin": 0.05, "normal_stress": -5e6, "benchmark": "block 7"}
+    >>> files = st.external.write_scec(run, folder, **options)
     >>> files[-1].name
     'cplot.txt'
     """

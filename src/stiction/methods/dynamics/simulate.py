@@ -17,10 +17,12 @@ from stiction.methods.dynamics.method import Rupture, make_run
 from stiction.methods.dynamics.save import SCALARS, Recorder, Save, open_rupture
 from stiction.methods.dynamics.simulate_event import simulate_event
 from stiction.methods.dynamics.state import RuptureState
-from stiction.methods.dynamics.summary import summary
+from stiction.methods.dynamics.summary import arrested_events, rate_spectrum, summary
+from stiction.methods.equilibrium.events import event_table, event_variables
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import along, study_attributes, to_dataset
+from stiction.problem.sample import Sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,18 +69,22 @@ def simulate_rupture(
     -------
     xarray.Dataset
         Over ('time', 'x'): the fields. Over 'time': `load`, `mean_stress`, `mean_slip`,
-        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `work` and energies. Over 'step':
-        `step_time`, and some of the above after every step. Over ('step', 'station'):
+        `top_slip_rate`, `weakened_fraction`, `seismic_moment`, `moment_rate`, `work` and energies.
+        Over 'step': `step_time`, and some of the above after every step. Over ('step', 'station'):
         `station_slip`, `station_slip_rate` and `station_shear_stress`. Over 'station':
         `station_x` (and `station_y`), the places of the nodes. Over 'x': `peak_strength` and
-        `arrival_time`. The scalars of `Rupture` refer to the run so far. The attribute `stopped`
-        is the reason why the run ended.
+        `arrival_time`. Over 'event': the table of events, with the variables of
+        `equilibrium_path`, `event_time`, `event_duration` and `event_radiated_energy`. Over
+        'frequency': `moment_rate_spectrum`, the amplitude spectrum of the moment rate from the
+        onset to the next event or to the end of the run, which cuts off an interface that slides.
+        The scalars of `Rupture` refer to the run so far. The attribute `stopped` is the reason why
+        the run ended.
 
         On a specimen, there are also `machine_stress` (with a thickness `machine_force`, N) and
         `drive_travel` over 'time', and energies relative to the stress at which the event began.
         `block_velocity` over ('snapshot', 'height', 'x') is the velocity along x in the upper
         block (m/s) at a few times. The lower block is its mirror image and moves the opposite way.
-        There is no 'step'.
+        There is no 'step' and no 'event'.
 
     Raises
     ------
@@ -138,9 +144,10 @@ def simulate_rupture(
     recorder.flush(state, last=True)
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
-    result = _complete(dataset, method, run, state)
+    result = _complete(dataset, method, run, state, rows)
     if stopped in ("rest", "time"):
         checks.warn_of_survival(method.stop, [result])
+    checks.warn_of_fast_loading(run, [result])
     recorder.finish(result, stopped)
     return with_gaps(problem, result, measured)
 
@@ -174,20 +181,37 @@ def _record_to_end(
     return "max_steps"
 
 
+def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> dict[str, Any]:
+    """Return the spectrum of the highest instability, up to the next one or the end of the run."""
+    problem, interface = run.medium.problem, run.medium.interface
+    stiffness = problem.solid.shear_modulus * interface.breakable_measure
+    rate = stiffness * dataset["step_mean_slip_rate"].values
+    time, onset = dataset["step_time"].values, float(state.now["onset_time"])
+    later = [float(event["time"]) for event in run.events if event["time"] > onset]
+    inside = (time >= onset) & (time <= min(later, default=np.inf))
+    return rate_spectrum(problem, time[inside], rate[inside])
+
+
 def _complete(
-    dataset: xr.Dataset, method: Rupture, run: Run, state: RuptureState
+    dataset: xr.Dataset, method: Rupture, run: Run, state: RuptureState, rows: Sample
 ) -> xr.Dataset:
     """Return a dataset with the variables of the whole run added."""
     problem, interface = run.medium.problem, run.medium.interface
     variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
-    for name, variable in method.variables(problem).items():
+    for name, variable in replace(method, events=0).variables(problem).items():
         variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     values: dict[str, Any] = {
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
     }
+    coordinates = {}
+    coordinates["frequency"], spectrum = _spectrum(dataset, run, state).values()
+    values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         values |= summary(run, state)
+        events, of_events = arrested_events(run), event_variables(interface, inertia=True)
+        values |= event_table(problem, rows, 0, events, of_events)
+    variables |= of_events
     # Energies and moment are there already, over 'time'. Their last value is the total.
     added = {name: value for name, value in values.items() if name not in SCALARS}
-    return dataset.merge(to_dataset(added, variables, {}, {}, interface))
+    return dataset.merge(to_dataset(added, variables, coordinates, {}, interface))

@@ -22,7 +22,7 @@ from stiction.methods.dynamics.specimens import (
     front_speeds,
     refuse_overstress,
 )
-from stiction.methods.dynamics.summary import SPEEDS
+from stiction.methods.dynamics.summary import SPEEDS, moment_of, rate_spectrum
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
@@ -38,7 +38,14 @@ PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 """Shares of an event's slip at which the velocities of the whole block are kept."""
 OVER_TIME: dict[str, Variable] = {
     name: SCALARS[name]
-    for name in ("load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction")
+    for name in (
+        "load",
+        "mean_stress",
+        "mean_slip",
+        "top_slip_rate",
+        "weakened_fraction",
+        "moment_rate",
+    )
 } | {
     "machine_stress": Variable("Pa", "force of the machine per area of interface", ("time",)),
     "drive_travel": Variable("m", "travel of both drives since the event began", ("time",)),
@@ -142,6 +149,7 @@ class EventRecord:
                 "mean_stress": problem.interface.mean(fields["shear_stress"]),
                 "mean_slip": problem.interface.mean(waves.slip),
                 "top_slip_rate": waves.slip_rate.max(),
+                "moment_rate": moment_of(problem, waves.slip_rate),
                 "weakened_fraction": problem.interface.mean(residual_nodes(sample, waves.slip)),
                 "machine_stress": held + waves.now[FORCE] / problem.interface.measure,
                 "drive_travel": 2.0 * waves.now[TRAVEL],
@@ -213,7 +221,10 @@ class EventRecord:
         if problem.area is not None:
             values |= forces(values, problem.area)
             variables |= force_variables(variables)
+        frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"]).values()
+        values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
         coordinates = {
+            "frequency": frequency,
             "time": (time, TIME),
             "snapshot": (
                 np.array([at for at, _ in self.blocks]),

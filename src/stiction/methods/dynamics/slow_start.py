@@ -132,5 +132,6 @@ def _state_at(
     now["maximum_radiated"] = now["previous_radiated"] = radiated
     # The slow path radiates no energy. Set its work so that the balance gives zero.
     now["work"] -= energy_balance(run, state)["radiated_energy"]
+    now["maximum_work"] = now["work"]
     now["start_error"] = missed.max(initial=0.0)
     return state

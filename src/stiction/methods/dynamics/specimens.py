@@ -29,11 +29,20 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.mesh import Mesh, make_mesh
+from stiction.methods.dynamics.state import UNSTABLE_STRESS
 from stiction.methods.dynamics.summary import SPEEDS, front_speed
-from stiction.methods.dynamics.waves import Waves, at_rest, wave_steps
+from stiction.methods.dynamics.waves import (
+    FAST_RATE,
+    FAST_SINCE,
+    FAST_UNTIL,
+    Waves,
+    at_rest,
+    wave_steps,
+)
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.method import Equilibrium
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
@@ -71,7 +80,10 @@ def refusals(method: Any, problem: Problem) -> list[str]:
 
 def variables(method: Any, problem: Problem) -> dict[str, Variable]:
     """Return the variables of the results on a specimen."""
-    return Equilibrium(events=method.events).variables(problem) | SPEEDS
+    known = Equilibrium().variables(problem) | SPEEDS
+    if method.events:
+        known |= of_samples(event_variables(problem.interface, inertia=True))
+    return known
 
 
 @dataclass
@@ -172,7 +184,12 @@ class RuptureProgram(DenseProgram):
 
     def event(self, sample: StaticSample, unstable: EquilibriumState) -> DynamicEvent:
         """Return an event that is about to run from an instability."""
-        return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
+        stiffness, solid = self.problem.blocks.stiffness, self.problem.solid
+        event = begin(sample, self.mesh, stiffness, unstable, self.arrival)
+        typical = float(np.median(sample.excess - sample.residual))
+        impedance = 0.5 * solid.shear_modulus / solid.shear_wave_speed
+        event.waves.now[FAST_RATE] = UNSTABLE_STRESS * typical / impedance
+        return event
 
     def jump(
         self, sample: StaticSample, unstable: EquilibriumState, to_rest: bool = False
@@ -197,13 +214,16 @@ class RuptureProgram(DenseProgram):
             stopped=True,
         )
         arrested, is_known = outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED
-        return Jump(arrested, is_known, state, arrival=event.waves.arrival)
+        now = event.waves.now
+        timed = {"event_duration": now[FAST_UNTIL] - now[FAST_SINCE]}
+        return Jump(arrested, is_known, state, arrival=event.waves.arrival, timed=timed)
 
 
 class RuptureSolver(OnsetSolver):
     """Solver for samples of a specimen with inertia; thread-safe."""
 
     program: RuptureProgram
+    inertia = True
 
     def __init__(self, problem: Problem, events: int, program: RuptureProgram) -> None:
         super().__init__(problem, Equilibrium(events=events), program)

@@ -66,6 +66,10 @@ class Phase(IntEnum):
     EXPLICIT = 1  # psi/B, divided by their response B to a unit slip rate
 
 
+UNSTABLE_STRESS = 0.075
+"""Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
+those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s)."""
+
 DIAGNOSTICS = np.dtype(
     [
         # The last step.
@@ -74,6 +78,7 @@ DIAGNOSTICS = np.dtype(
         ("load", "f8"),  # tau_0, Pa
         ("work", "f8"),  # of the load on the slip so far, J/m
         ("mean_slip", "f8"),  # m
+        ("mean_slip_rate", "f8"),  # m/s
         ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
         ("whole_stress", "f8"),  # mean stress of all nodes
         ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
@@ -86,11 +91,21 @@ DIAGNOSTICS = np.dtype(
         ("maximum_radiated", "f8"),  # Z <V>
         ("maximum_time", "f8"),
         ("maximum_load", "f8"),
+        ("maximum_work", "f8"),
         ("maximum_node", "i8"),  # the fastest
         # Instabilities. Stresses, times and loads are NaN until the first instability.
         ("instabilities", "i8"),  # number of instabilities so far
         ("in_event", "i8"),  # whether an instability is under way
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
+        # The event that `Run` follows until all is calm, or until the next one begins.
+        ("event_open", "i8"),  # whether there is one
+        ("event_begun", "i8"),  # whether one has just begun,
+        ("event_calm", "i8"),  # or has just ended
+        ("event_time", "f8"),  # when it began, s, at this load, Pa, after this work, J/m
+        ("event_load", "f8"),
+        ("event_work", "f8"),
+        ("fast_since", "f8"),  # when a node first and last slipped faster than `unstable_rate`
+        ("fast_until", "f8"),  # in it, s
         ("arrested_events", "i8"),
         ("first_stress", "f8"),  # mean stress at the first instability
         ("onset_stress", "f8"),  # mean stress of all nodes at the highest instability
@@ -126,6 +141,19 @@ DIAGNOSTICS = np.dtype(
 
 STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")])
 """Slip (m), slip rate (m/s) and stress (Pa) of a node."""
+
+
+def event_type(nodes: int) -> np.dtype[Any]:
+    """Return the type of the record of an event; pairs are before and after it."""
+    return np.dtype(
+        [
+            ("time", "f8"),  # when it began, s
+            ("duration", "f8"),  # from the first to the last fast slip, s
+            ("load", "f8", (2,)),  # tau_0, Pa
+            ("work", "f8", (2,)),  # of the load on the slip so far, J/m
+            ("slip", "f8", (2, nodes)),  # m
+        ]
+    )
 
 
 class StepRecord(NamedTuple):
@@ -210,6 +238,8 @@ class RuptureState(NamedTuple):
     memory: Floats  # memory variables, packed as in `memory`, in the form of `Phase`
     memory_sum: Floats  # weighted sum of the memory variables for the next explicit step
     arrival: Floats  # arrival time of the front, s; NaN before
+    maximum_slip: Floats  # slip at the last maximum of the mean stress, m
+    event_slip: Floats  # slip at the maximum at which the open event began, m
     diagnostics: NDArray[Any]  # (1,) array of DIAGNOSTICS
 
     @property

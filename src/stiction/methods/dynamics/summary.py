@@ -1,20 +1,27 @@
 """Scalars of a run: loads, moment, energies, rupture speeds."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from stiction.base.arrays import Array
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
-from stiction.methods.dynamics.state import Floats, RuptureState
+from stiction.methods.dynamics.state import Floats, RuptureState, Spectrum
+from stiction.methods.equilibrium.events import ArrestedEvent
+from stiction.methods.equilibrium.sample import EquilibriumState
 from stiction.problem.interface import Interface
-from stiction.problem.results import position
+from stiction.problem.problem import Problem
+from stiction.problem.results import per_area, position
 
 SPEEDS: dict[str, Variable] = {
     "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
 }
+SPECTRUM = Variable("N", "amplitude spectrum of the moment rate per length", ("frequency",))
+NODES_IN_SHORTEST_WAVE = 8.0
+"""Of a spectrum: spacings of nodes in the shortest shear wave."""
+FREQUENCIES = 100
 SPEED_SPANS: dict[str, Any] = {
     "rupture_speed": (2.0, np.max),
     "median_rupture_speed": (0.5, np.median),
@@ -37,15 +44,6 @@ _SCALARS: dict[str, Variable] = {
 }
 
 
-def per_area(interface: Interface, variable: Variable) -> Variable:
-    """Return a variable with its units on planes, if a line has it per unit length."""
-    if not interface.is_plane:
-        return variable
-    units = {"N": "N m", "J/m": "J"}.get(variable.units, variable.units)
-    name = variable.long_name.replace(" per length", "")
-    return replace(variable, units=units, long_name=name)
-
-
 def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run.
 
@@ -60,14 +58,48 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return variables
 
 
-def seismic_moment(run: Run, state: RuptureState) -> float:
-    """Return the seismic moment of the slip, N per unit length, on a plane N m."""
-    medium = run.medium
-    return medium.problem.solid.shear_modulus * float(state.slip.sum()) * medium.grid.cell
+def moment_of(problem: Problem, slip: Array) -> float:
+    """Return the moment of a slip (m), N, or its rate by a slip rate, N/s; times m on a plane."""
+    return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
+
+
+def rate_spectrum(
+    problem: Problem, time: Array, rate: Array
+) -> dict[str, tuple[Array, Variable]]:
+    """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N; on a plane N m.
+
+    The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with straight lines between the
+    times (s), from one period in all to the waves that the nodes and times resolve. It is empty
+    with fewer than three times.
+    """
+    frequencies = np.empty(0)
+    if time.size > 2:
+        spacing = max(problem.interface.spacings)
+        resolved = problem.solid.shear_wave_speed / (NODES_IN_SHORTEST_WAVE * spacing)
+        steps = np.diff(time)
+        highest = max(min(resolved, 0.5 / float(np.median(steps))), 2.0 / np.ptp(time))
+        frequencies = np.geomspace(1.0 / np.ptp(time), highest, FREQUENCIES)
+    amplitude = np.empty(frequencies.size)
+    for i, omega in enumerate(2.0 * np.pi * frequencies):
+        # Integrated twice by parts: a straight line leaves the changes of its slope.
+        phases = np.exp(-1j * omega * (time - time[0]))
+        ends = rate[0] * phases[0] - rate[-1] * phases[-1]
+        bends = np.diff(phases) @ (np.diff(rate) / steps)
+        amplitude[i] = abs(ends / (1j * omega) + bends / omega**2)
+    variable = per_area(problem.interface, SPECTRUM)
+    return {
+        "frequency": (frequencies, Variable("Hz", "frequency", ("frequency",))),
+        "moment_rate_spectrum": (amplitude, variable),
+    }
 
 
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
-    """Return strain, fracture and radiated energy, J/m, on a plane J.
+    """Return strain, fracture and radiated energy so far, J/m; on a plane J."""
+    return _energies(run, state.slip, state.slip_hat, float(state.now["work"]))
+
+
+def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[str, float]:
+    """Return the energies of a slip and its transform on which the load has done this work.
 
     The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
     less friction and strain energy. The stress of a slipping node equals its strength, so the work
@@ -75,17 +107,37 @@ def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
-    fracture = friction.dissipated(state.slip, drop, nodes.weakening)
+    fracture = friction.dissipated(slip, drop, nodes.weakening)
     share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
-    power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(state.slip_hat[1:]) ** 2
+    power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(slip_hat[1:]) ** 2
     strain = float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
-    dissipated = float((fracture + nodes.residual * state.slip).sum()) * grid.cell
+    dissipated = float((fracture + nodes.residual * slip).sum()) * grid.cell
     return {
         "strain_energy": strain,
         "fracture_energy": float(fracture.sum()) * grid.cell,
-        "radiated_energy": float(state.now["work"]) - dissipated - strain,
+        "radiated_energy": work - dissipated - strain,
     }
+
+
+def arrested_events(run: Run) -> list[ArrestedEvent]:
+    """Return the events of a run so far, with what inertia knows of each."""
+    interface, events = run.medium.interface, []
+    for record in run.events:
+        states, radiated = [], []
+        for slip, load, work in zip(
+            record["slip"], record["load"], record["work"], strict=True
+        ):
+            slip_hat = interface.transform(slip.reshape(interface.shape)).ravel()
+            radiated.append(_energies(run, slip, slip_hat, work)["radiated_energy"])
+            states.append(EquilibriumState(float(load), slip, np.empty(0)))
+        timed = {
+            "event_time": float(record["time"]),
+            "event_duration": float(record["duration"]),
+            "event_radiated_energy": radiated[1] - radiated[0],
+        }
+        events.append(ArrestedEvent(states[0], states[1], timed))
+    return events
 
 
 def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
@@ -128,7 +180,7 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
         "applied_load": float(now["onset_load"]),
         "kinetic_stress": kinetic,
         "stress_drop": critical - kinetic,
-        "seismic_moment": seismic_moment(run, state),
+        "seismic_moment": moment_of(run.medium.problem, state.slip),
         "arrested_events": int(now["arrested_events"]),
         "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
         **{name: energies[name] for name in ("radiated_energy", "fracture_energy")},

@@ -64,10 +64,13 @@ class Waves(NamedTuple):
     """Values in the order of `NOW`."""
 
 
-NOW = ("time", "travel", "speed", "force", "friction")
+NOW = (
+    "time", "travel", "speed", "force", "friction", "fast rate", "fast since", "fast until"
+)  # fmt: skip
 """Time (s), travel (m) and speed (m/s) of a block's drive, change of its force (N/m), and energy
-that friction took from a block (J/m)."""
-TIME, TRAVEL, SPEED, FORCE, FRICTION = range(5)
+that friction took from a block (J/m). A slip rate that counts as fast (m/s), and when a node first
+and last slipped faster (s, NaN before)."""
+TIME, TRAVEL, SPEED, FORCE, FRICTION, FAST_RATE, FAST_SINCE, FAST_UNTIL = range(8)
 
 
 def at_rest(mesh: Mesh, slip: Array) -> Waves:
@@ -75,9 +78,10 @@ def at_rest(mesh: Mesh, slip: Array) -> Waves:
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
     slip_rate, stress, corrected = np.zeros((3, slip.size))
     arrival = np.full(slip.size, np.nan)
+    now = np.zeros(len(NOW))
+    now[FAST_RATE], now[FAST_SINCE:] = np.inf, np.nan
     return Waves(
-        u, v, u_rate, v_rate, slip.copy(), slip_rate, stress, corrected, arrival,
-        np.zeros(len(NOW)),
+        u, v, u_rate, v_rate, slip.copy(), slip_rate, stress, corrected, arrival, now
     )  # fmt: skip
 
 
@@ -132,7 +136,7 @@ def _slide(
     """Step 3: move the nodes of the interface. Return how many never slipped."""
     dx, step = mesh.spacing, mesh.step
     slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
-    never = 0
+    never, fast = 0, False
     for i in range(slip.shape[0]):
         # In double precision, since slip adds up many small increments.
         before = np.float64(rates[i])
@@ -154,6 +158,10 @@ def _slide(
         u[i] += np.float32(step * after + mesh.viscous_time * (after - before))
         rates[i] = np.float32(after)
         never += slip[i] == 0.0
+        fast |= 2.0 * after > now[FAST_RATE]
+    if fast:
+        now[FAST_SINCE] = now[TIME] if np.isnan(now[FAST_SINCE]) else now[FAST_SINCE]
+        now[FAST_UNTIL] = now[TIME]
     # Update the stress of the correction by the added slip only: most nodes rest most of the time.
     for j in range(slip.shape[0]):
         added = step * waves.slip_rate[j]

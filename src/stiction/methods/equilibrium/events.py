@@ -1,9 +1,30 @@
-"""Arrested events and their variables, and the travel of a machine on the way.
+"""The table of events: instabilities that came to rest, of every method that follows them.
+
+Problem
+-------
+An event takes an interface at rest from the slip d_0 to the slip d_1. With delta = d_1 - d_0, it
+releases the stress K delta at the load at which it begins. The table has these measures:
+
+1. The patch of an event is where delta is above `MIN_ADDED_SLIP` of its largest value, around that
+   value. It has extents, an area and a mean slip. Slip elsewhere also grows a little.
+2. The moment is G times the integral of delta. The magnitude of a plane follows from it:
+   Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori, 1979, in SI units).
+3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is the mean of
+   K delta over the patch, the second its mean weighted by delta. The third is twice the energy that
+   the slip releases beyond friction at the residual strength, over the integral of delta. Waves and
+   weakening share this energy. If the stress comes to rest at the residual strength, the third
+   equals the second.
+4. The fracture energy is dissipated above the residual strength.
+5. Methods with inertia know how long an event takes and, between half-spaces, when it begins and
+   what it radiates.
 
 Behind a machine the load is the drive: the mean stress that it would cause without slip. Slip
 relieves it.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +35,7 @@ from stiction.methods.equilibrium.patches import largest_patch
 from stiction.methods.equilibrium.sample import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.results import position
+from stiction.problem.results import per_area, position
 from stiction.problem.sample import Sample
 
 OF_SPECIMENS = {
@@ -26,12 +47,19 @@ OF_SPECIMENS = {
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
     "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
+WITH_INERTIA = {
+    "event_duration": Variable("s", "time from the first to the last fast slip", ("event",)),
+}
+BETWEEN_HALF_SPACES = {
+    "event_time": Variable("s", "time from zero load to the event", ("event",)),
+    "event_radiated_energy": Variable("J/m", "energy radiated by the event", ("event",)),
+}
 MIN_ADDED_SLIP = 1e-3
 """Smallest added slip of the nodes in the patch of an event, as a share of the largest."""
 
 
-def event_variables(interface: Interface) -> dict[str, Variable]:
-    """Return the variables of each arrested event on a line or a plane."""
+def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:
+    """Return the variables of each event on a line or a plane, with the inertia of a rupture."""
 
     def variable(units: str, text: str) -> Variable:
         return Variable(units, text, ("event",))
@@ -40,53 +68,100 @@ def event_variables(interface: Interface) -> dict[str, Variable]:
     centre = variable("m", "centre of the slip added by the event")
     extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
     moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
-    return {
+    variables = {
         "event_load": variable("Pa", "load factor of the event"),
         "event_stress": variable("Pa", "mean interface stress at the event"),
         "event_position": position(interface, centre),
         "event_extent" if plane else "event_length": position(interface, extent),
         **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
         "event_mean_slip": variable("m", "mean slip added to that patch"),
-        "event_moment": variable("N m" if plane else "N", moment),
-        **(OF_SPECIMENS if interface.is_free else {}),
+        "event_largest_slip": variable("m", "largest slip added by the event"),
+        "event_moment": variable("N", moment),
+        **({"event_magnitude": variable("1", "moment magnitude")} if plane else {}),
+        "event_area_stress_drop": variable(
+            "Pa", "mean stress drop over the patch that slipped"
+        ),
+        "event_slip_stress_drop": variable("Pa", "mean stress drop weighted by the slip added"),
+        "event_energy_stress_drop": variable(
+            "Pa", "twice the energy released above the residual strength, over the slip added"
+        ),
+        "event_fracture_energy": variable("J/m", "energy dissipated above the residual"),
+        **(WITH_INERTIA if inertia else {}),
+        **(OF_SPECIMENS if interface.is_free else BETWEEN_HALF_SPACES if inertia else {}),
+    }
+    return {name: per_area(interface, known) for name, known in variables.items()}
+
+
+def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
+    """Return the variables of events of many samples."""
+    return {
+        name: replace(variable, dims=("sample", *variable.dims))
+        for name, variable in variables.items()
     }
 
 
 class ArrestedEvent(NamedTuple):
-    """States before and after an instability that came to rest."""
+    """States before and after an instability that came to rest.
+
+    `timed` holds the variables that only a method with inertia knows, by name.
+    """
 
     before: EquilibriumState
     after: EquilibriumState
+    timed: Mapping[str, float] = MappingProxyType({})
 
 
 def event_table(
-    problem: Problem, rows: Sample, row: int, events: list[ArrestedEvent]
+    problem: Problem,
+    rows: Sample,
+    row: int,
+    events: Sequence[ArrestedEvent],
+    variables: Mapping[str, Variable],
+    most: int | None = None,
 ) -> dict[str, Array]:
-    """Return the variables of a sample's arrested events, (events, ...) arrays."""
-    initial, profile = rows.initial_stress[row].mean(), rows.load_profile.mean()
-    measured = [_measures(problem, initial, profile, *event) for event in events]
-    return {
-        name: np.array([values[name] for values in measured]).reshape(
-            len(events), *(2 for _ in variable.dims[1:])
+    """Return the variables of the events of one sample, (events, ...) arrays.
+
+    With `most`, the first so many events, and NaN where there are fewer.
+    """
+    events = events[:most]
+    measured = [_measures(problem, rows, row, *event) for event in events]
+    table = {}
+    for name, variable in variables.items():
+        components = (2,) * (len(variable.dims) - 1)
+        table[name] = np.full((len(events) if most is None else most, *components), np.nan)
+        table[name][: len(events)] = np.reshape(
+            [values[name] for values in measured], (len(events), *components)
         )
-        for name, variable in event_variables(problem.interface).items()
-    }
+    return table
 
 
 def _measures(
     problem: Problem,
-    initial: float,
-    profile: float,
+    rows: Sample,
+    row: int,
     before: EquilibriumState,
     after: EquilibriumState,
+    timed: Mapping[str, float],
 ) -> dict[str, Any]:
-    """Return the variables of an event; `initial` and `profile` are means over the interface."""
-    interface = problem.interface
-    added = (after.slip - before.slip).reshape(interface.shape)
-    # Slip elsewhere also grows a little in an event. The patch is around the largest added slip.
+    """Return the variables of one event."""
+    interface, law = problem.interface, problem.friction
+    initial, profile = (
+        float(rows.mean(values)) for values in (rows.initial_stress[row], rows.load_profile)
+    )
+    slips = before.slip.reshape(interface.shape), after.slip.reshape(interface.shape)
+    added = slips[1] - slips[0]
+    # 1. and 2. Patch and moment.
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
+    moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
+    # 3. and 4. Stress drops and fracture energy. Waves and weakening share what the mean of the
+    # stress before and after does on the slip beyond the residual strength.
+    drop, residual = problem.released_stress(added), rows.residual_strength[row]
+    above = rows.initial_stress[row] + before.load * rows.load_profile - residual
+    above = above - problem.released_stress(slips[0])
+    weakening = np.where(np.isfinite(rows.strength[row]), rows.strength[row] - residual, 0.0)
+    dissipated = [law.dissipated(slip, weakening, rows.weakening_rate[row]) for slip in slips]
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
@@ -95,7 +170,14 @@ def _measures(
         "event_extent": patch.extents,
         "event_area": patch.area,
         "event_mean_slip": added[inside].mean(),
-        "event_moment": problem.solid.shear_modulus * float(added.sum()) * interface.cell,
+        "event_largest_slip": added.max(),
+        "event_moment": moment,
+        "event_magnitude": (np.log10(moment) - 9.1) / 1.5,
+        "event_area_stress_drop": drop[inside].mean(),
+        "event_slip_stress_drop": (drop * added).sum() / added.sum(),
+        "event_energy_stress_drop": ((2.0 * above - drop) * added).sum() / added.sum(),
+        "event_fracture_energy": float((dissipated[1] - dissipated[0]).sum()) * interface.cell,
+        **timed,
     }
     if problem.specimen is not None:
         travel_before = travel_of(problem, before.load, before.slip)

@@ -1,7 +1,6 @@
 """Equilibrium as a method: exact quasi-static onset with every interaction."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from numpy.typing import NDArray
@@ -9,7 +8,7 @@ from pydantic import Field
 
 from stiction.base.model import Flag, Number, Real, model
 from stiction.base.variables import Variable
-from stiction.methods.equilibrium.events import event_variables
+from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.sample import pieces_of, refused
 from stiction.methods.equilibrium.solver import OnsetSolver, make_program
 from stiction.problem.problem import Problem
@@ -69,7 +68,8 @@ class Equilibrium:
     slip : bool
         Also return the slip at the first instability.
     events : int
-        Also return this number of arrested events of each sample over 'event', padded with NaN.
+        Also return this number of arrested events of each sample over 'event', padded with NaN. The
+        event in which an interface that ends slides is among them.
         They form a sequence: stress and slip continue from event to event. The variables are
         described in `equilibrium_path`.
     gap : float
@@ -159,10 +159,7 @@ class Equilibrium:
         for name in {"sliding_position", "critical_patch_extent"} & variables.keys():
             variables[name] = position(interface, variables[name])
         if self.events:
-            variables |= {
-                name: replace(variable, dims=("sample", *variable.dims))
-                for name, variable in event_variables(interface).items()
-            }
+            variables |= of_samples(event_variables(interface))
         for name, variable in ON_NODES.items():
             if getattr(self, name):
                 variables[name] = along(interface, variable)

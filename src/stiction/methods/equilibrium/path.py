@@ -19,7 +19,6 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Numbers, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.equilibrium.events import (
-    ArrestedEvent,
     elongation_of,
     event_table,
     event_variables,
@@ -81,22 +80,29 @@ def equilibrium_path(
         `arrested_events` so far, and `sliding`. After the onset of global sliding, slip and stress
         are NaN and `sliding` is true.
 
-        Over 'event', all arrested events up to global sliding, even beyond the given loads:
+        Over 'event', all arrested events up to global sliding, even beyond the given loads, and the
+        event in which an interface that ends slides:
         `event_load` (tau_0, Pa), `event_stress` (mean stress on the interface, Pa),
         `event_position` (m), `event_length` of the patch that slipped (m), `event_mean_slip` over
-        that length (m), and `event_moment`, G times the integral of the added slip (N per unit
-        depth).
+        that length (m), `event_largest_slip` (m), `event_moment`, G times the integral of the added
+        slip (N per unit depth), and `event_fracture_energy`, dissipated above the residual strength
+        (J/m). There are three stress drops (Pa). `event_area_stress_drop` is the mean over the
+        patch, and `event_slip_stress_drop` the mean weighted by the added slip.
+        `event_energy_stress_drop` is twice the energy that the slip releases beyond friction at the
+        residual strength, over the integral of the slip. With a `Rupture` as the method,
+        events have `event_duration` (s). `stiction.external.event_table` makes a data frame.
 
         On specimens, `load` is the drive: the mean stress that it would cause without slip.
         `travel` is the sum of the travels of both drives (m). `crosshead_travel` (m) adds the
         deformation of the machine, force over stiffness, and is NaN under a dead load. Events also
-        have `event_stress_drop` (Pa), `event_travel` and `event_crosshead_travel` before the
-        event (m), `event_travel_step` (m) and `event_start`, the left end of the patch (m). With a
-        thickness, width or area, mean stresses are also given as forces: `force`, `event_force`
-        and `event_force_drop` (N).
+        have `event_stress_drop` (fall of the mean stress, Pa), `event_travel` and
+        `event_crosshead_travel` before the event (m), `event_travel_step` (m) and `event_start`,
+        the left end of the patch (m). With a thickness, width or area, mean stresses are also given
+        as forces: `force`, `event_force` and `event_force_drop` (N).
 
         On planes, positions have two components, along 'direction'. `event_extent` (m) and
-        `event_area` (m²) replace the length, and the moment is in N m.
+        `event_area` (m²) replace the length, the moment is in N m, and `event_magnitude` is
+        Mw = (log10 M_0 - 9.1)/1.5.
 
     Raises
     ------
@@ -138,16 +144,16 @@ def equilibrium_path(
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
     path = follow_to_sliding(program, sample, to_rest=True)  # 1.
-    passed, end, known = path.events, path.last.load, path.known
-    if path.rest is not None:
-        passed = [*passed, ArrestedEvent(path.last, path.rest)]
+    passed, end, known = path.all_events, path.last.load, path.known
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
     at = np.array([event.before.load for event in passed])
     events = (at[None, :] < given[:, None]).sum(axis=1)
     sliding = given > end
     state = at_rest(sample)
-    for i, load in enumerate(map(float, given if path.rest is not None else given[~sliding])):
+    for i, load in enumerate(
+        map(float, given if path.sliding is not None else given[~sliding])
+    ):
         if events[i]:  # 2.
             after = passed[events[i] - 1].after
             state = max(after, state, key=lambda reached: reached.load)
@@ -178,8 +184,10 @@ def equilibrium_path(
         "mean_stress": interface.mean(stress.reshape(wide)),
         "arrested_events": np.minimum(events, len(path.events)),
         "sliding": sliding,
-    } | event_table(problem, rows, 0, passed)
-    variables = VARIABLES | event_variables(interface)
+    }
+    of_events = event_variables(interface, inertia=method is not None)
+    values |= event_table(problem, rows, 0, passed, of_events)
+    variables = VARIABLES | of_events
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     if interface.is_free:
         values |= {"travel": travel, "crosshead_travel": far}

@@ -5,8 +5,10 @@ residual strength. Between corners everything is linear, so solvers step from co
 linear law has a single piece, whose start is tau_p to the bit.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -183,6 +185,7 @@ class Jump(NamedTuple):
     state: EquilibriumState
     counts: bool = True  # false for a long step of a path that was not seen to turn
     arrival: Array | None = None  # with inertia: arrival time of the front at each node, s
+    timed: Mapping[str, float] = MappingProxyType({})  # with inertia: variables of the event
 
 
 class Program(Protocol):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.events import ArrestedEvent, event_table
+from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
@@ -56,8 +56,8 @@ class SamplePath(NamedTuple):
     a path was not followed to its end; the load of `last` is then a lower bound. `peak` is the
     largest mean stress on the way, divided by the mean of the load profile (Pa). With inertia,
     `arrival` is the time at which the front of the last event reached each node (s). If
-    the interface ends, `last` is the last instability, and `rest` the equilibrium to which it
-    leads, if it was followed so far.
+    the interface ends, `last` is the last instability, and `sliding` its event, if it was followed
+    to its end.
     """
 
     first: EquilibriumState
@@ -66,7 +66,12 @@ class SamplePath(NamedTuple):
     events: list[ArrestedEvent]
     known: bool
     arrival: Array | None
-    rest: EquilibriumState | None = None
+    sliding: ArrestedEvent | None = None
+
+    @property
+    def all_events(self) -> list[ArrestedEvent]:
+        """The arrested events, and the event in which an interface that ends slides."""
+        return self.events + ([] if self.sliding is None else [self.sliding])
 
 
 def follow_to_sliding(
@@ -79,7 +84,7 @@ def follow_to_sliding(
     break; `to_rest` follows this event to its end.
     """
     can_break = np.isfinite(sample.excess)
-    ends, rest = not can_break.all(), None
+    ends, sliding = not can_break.all(), None
     # 1.
     state = program.next(sample)
     first: EquilibriumState | None = None
@@ -93,15 +98,16 @@ def follow_to_sliding(
                 known, arrival = jump.known, jump.arrival
                 break
             # 4. A jump that does not count is a long step of a path that did not turn.
-            events.append(ArrestedEvent(state, jump.state))
+            events.append(ArrestedEvent(state, jump.state, jump.timed))
             if ends and (jump.state.slip[can_break] > 0.0).all():
                 arrival = jump.arrival
                 break
         state = program.next(sample, jump.state)
         known, peak = state.known, max(peak, state.highest)
     if ends and events and known and (state is events[-1].before or not state.unstable):
-        state, rest = events.pop()  # the last instability, after which the others creep at most
-    return SamplePath(first or state, state, peak, events, known, arrival, rest)
+        sliding = events.pop()  # the last instability, after which the others creep at most
+        state = sliding.before
+    return SamplePath(first or state, state, peak, events, known, arrival, sliding)
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> Program:
@@ -124,6 +130,8 @@ def warn_of_signs(problem: Problem) -> None:
 class OnsetSolver:
     """Solver for samples by `Equilibrium` with its options; thread-safe."""
 
+    inertia = False
+
     def __init__(self, problem: Problem, options: Any, program: Program) -> None:
         self.problem, self.options, self.program = problem, options, program
 
@@ -139,7 +147,7 @@ class OnsetSolver:
         for row in range(rows.samples):
             sample = row_of(samples, row)
             try:
-                path = follow_to_sliding(self.program, sample)
+                path = follow_to_sliding(self.program, sample, self.options.events > 0)
             except Exception as error:
                 error.add_note(
                     f"in sample {row} of the {rows.samples} that were solved together"
@@ -198,10 +206,8 @@ class OnsetSolver:
                 derivative = _sensitivity(self.problem, self.program, sample, first)
             values["sensitivity"] = derivative.reshape(shape) * rows.mean(rows.load_profile)
         if most := self.options.events:
-            events = event_table(self.problem, rows, row, path.events[:most])
-            for name, column in events.items():
-                values[name] = np.full((most, *column.shape[1:]), np.nan)
-                values[name][: len(column)] = column
+            variables = event_variables(interface, self.inertia)
+            values |= event_table(self.problem, rows, row, path.all_events, variables, most)
         return values
 
     def _peak(self, path: SamplePath) -> float:

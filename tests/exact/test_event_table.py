@@ -1,0 +1,152 @@
+"""The table of events beside cracks of known slip, and beside energies and histories of a run."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from setups import QUARTER, make_problem
+
+import stiction as st
+from stiction.methods.dynamics.summary import rate_spectrum
+from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
+from stiction.methods.equilibrium.sample import EquilibriumState
+from stiction.plot.ruptures import _line_film, crack_moment
+
+DROP = 2e5
+
+
+def table_of_crack(problem, inside):
+    """The table of an event that lowers the stress by `DROP` in a crack, by dense algebra."""
+    shape = problem.interface.shape
+    response = problem.interface.inverse_transform(problem.half_spaces.symbol(shape))
+    nodes = np.argwhere(inside)
+    apart = (nodes[:, None] - nodes[None]) % np.array(shape)
+    slip = np.zeros(shape)
+    slip[inside] = np.linalg.solve(
+        response[tuple(np.moveaxis(apart, -1, 0))], np.full(len(nodes), DROP)
+    )
+    rows = problem.sample(np.full(shape, 1e6))
+    still = np.zeros(slip.size)
+    before = EquilibriumState(DROP, still, still)  # the residual strength is zero
+    event = ArrestedEvent(before, dataclasses.replace(before, slip=slip.ravel()))
+    table = event_table(problem, rows, 0, [event], event_variables(problem.interface))
+    return {name: values[0] for name, values in table.items()}
+
+
+@pytest.mark.parametrize("mode", ["II", "III"])
+def test_a_crack_on_a_line_is_starrs(mode):
+    problem = make_problem(512, 0.1, mode=mode)
+    inside = np.abs(np.arange(512) - 200) <= 40
+    found, modulus = table_of_crack(problem, inside), problem.effective_modulus
+    # In a row of cracks a period L apart, pi a²/2 becomes -(L²/pi) ln cos(pi a/L). Tips between
+    # nodes make a crack of 81 nodes look longer or shorter by less than a node.
+    half, period = found["event_length"] / 2, 0.1
+    single = crack_moment(problem, DROP, np.array(2 * half))
+    row = -2.0 * (period / (np.pi * half)) ** 2 * np.log(np.cos(np.pi * half / period))
+    assert found["event_moment"] == pytest.approx(single * row, rel=2.0 / 81)
+    assert found["event_largest_slip"] == pytest.approx(2 * DROP * half / modulus, rel=0.04)
+    for name in ("area", "slip", "energy"):
+        assert found[f"event_{name}_stress_drop"] == pytest.approx(DROP, rel=1e-10)
+
+
+def test_a_circular_crack_is_eshelbys():
+    problem = make_problem((64, 60), (0.1, 0.09375), solid=QUARTER, weakening_rate=5e10)
+    places = np.meshgrid(np.arange(64) - 30, np.arange(60) - 25, indexing="ij")
+    inside = np.hypot(*places) <= 9.5
+    found = table_of_crack(problem, inside)
+    exact = crack_moment(problem, DROP, found["event_area"])
+    assert exact == pytest.approx(16 / 7 * DROP * np.sqrt(found["event_area"] / np.pi) ** 3)
+    # A rim between nodes: half a node of 9.5, three times.
+    assert found["event_moment"] == pytest.approx(exact, rel=1.5 / 9.5)
+    magnitude = (np.log10(found["event_moment"]) - 9.1) / 1.5
+    assert found["event_magnitude"] == pytest.approx(magnitude)
+
+
+def fault(rate=2e9, **options):
+    problem = dataclasses.replace(
+        make_problem(128, 0.05, mode="III", residual_strength=2e5),
+        interface=st.Interface(0.05, 128, extent=(0.01, 0.03)),
+    )
+    x = problem.interface.x
+    strength = 1e6 - 2e5 * np.exp(-(((x - 0.017) / 0.003) ** 2)) - 5e4 * np.cos(600.0 * x)
+    return problem, strength, st.Rupture(loading_rate=rate, **options)
+
+
+@pytest.fixture(scope="module")
+def run():
+    problem, strength, method = fault()
+    save = st.Save(["slip", "slip_rate", "shear_stress"], stations={"a": 0.02})
+    return st.simulate_rupture(problem, strength, method=method, save=save)
+
+
+def test_energies_of_an_event_add_up(run):
+    event = run.isel(event=0)
+    shared = event.event_fracture_energy + event.event_radiated_energy
+    stiffness = fault()[0].solid.shear_modulus
+    released = 0.5 * event.event_energy_stress_drop * event.event_moment / stiffness
+    # The load rises by 2e9 Pa/s while the event lasts, beside a drop of 6e5 Pa.
+    assert float(shared) == pytest.approx(
+        float(released), rel=2e9 * float(run.time.max()) / 6e5
+    )
+    assert float(event.event_moment) == pytest.approx(float(run.seismic_moment[-1]), rel=0.05)
+
+
+def test_a_spectrum_is_that_of_the_lines_between_the_times():
+    """A triangle of any knots has the spectrum M sinc²(f T)."""
+    inner = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 300))
+    time = np.sort(np.concatenate([[0.0, 1.0, 2.0], inner]))
+    frequencies, amplitude = rate_spectrum(
+        make_problem(128, 0.05), 5.0 + time, 7.0 * (1.0 - np.abs(time - 1.0))
+    ).values()
+    np.testing.assert_allclose(amplitude[0], 7.0 * np.sinc(frequencies[0]) ** 2, atol=1e-9)
+    assert frequencies[0][0] == pytest.approx(0.5)
+
+
+def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):
+    moment, time = run.seismic_moment.values, run.time.values
+    # Frames hold every tenth of 400 steps.
+    assert np.trapezoid(run.moment_rate, time) == pytest.approx(moment[-1], rel=0.03)
+    released = moment[-1] - np.interp(run.onset_time, time, moment)
+    spectrum = run.moment_rate_spectrum.values
+    assert spectrum.max() <= 1.001 * released
+    assert spectrum.max() > 0.5 * released
+
+
+def test_tables_have_a_row_for_each_event(run, tmp_path):
+    frame = st.external.event_table(run)
+    assert frame["event_moment (N)"].tolist() == run.event_moment.values.tolist()
+    problem, strength, method = fault(events=3)
+    rows = np.stack([strength, strength[::-1]])
+    result = st.onset(problem, rows, method=method)
+    frame = st.external.event_table(result)
+    assert len(frame) == np.isfinite(result.event_load).sum()
+    assert set(frame["sample (1)"]) == {0, 1}
+    np.testing.assert_allclose(frame["event_moment (N)"][0], run.event_moment[0], rtol=1e-2)
+    with pytest.raises(st.InputError, match="events="):
+        st.external.event_table(st.onset(problem, rows, method=fault()[2]))
+
+
+def test_films_scale_to_what_breaks_and_files_name_their_problem(run, tmp_path):
+    stress = _line_film(run)[0].axes[0]
+    broken = np.isfinite(run.peak_strength)
+    assert stress.get_ylim()[1] < run.shear_stress.max() / 1e6
+    assert stress.get_ylim()[1] > run.shear_stress.where(broken).max() / 1e6
+    low, high = np.array(stress.get_xlim()) / 1e3
+    assert 0.008 < low < 0.01
+    assert 0.03 < high < 0.032
+    paths = st.external.write_scec(
+        run, tmp_path, origin=0.02, normal_stress=-5e6, benchmark="ends"
+    )
+    assert all(path.read_text().startswith("# problem=ends\n") for path in paths)
+
+
+def test_fast_loading_of_arrested_events_is_warned_of():
+    problem, strength, _ = fault()
+    x = problem.interface.x
+    strength = strength + 1.2e6 * (x > 0.02)
+    with pytest.warns(st.AccuracyWarning, match="loading_rate"):
+        st.onset(problem, strength, method=st.Rupture(loading_rate=2e10))
+    arrested = st.onset(problem, strength, method=st.Rupture(loading_rate=1e7))
+    assert arrested.arrested_events > 0
