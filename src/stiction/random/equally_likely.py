@@ -32,7 +32,7 @@ from stiction.base.model import describe
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
-from stiction.random.dotted_keys import distributions_of, full_key, with_values
+from stiction.random.dotted_keys import distributions_of, full_key, hypercube, with_values
 from stiction.random.fields import (
     FACTOR,
     RandomField,
@@ -371,16 +371,6 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
     with prefixed("random"):
         _known(random)
     return Uncertain(random, laws)
-
-
-def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
-    """Return a Latin hypercube: for each distribution, a value in every interval of 1/count."""
-    rng = np.random.default_rng([seed, 6])
-    # Permute the intervals of each distribution, and take a random place in each interval.
-    cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
-    shares = (cells + rng.random(cells.shape)) / count
-    rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
-    return [dict(zip(laws, values, strict=True)) for values in np.transpose(rows).tolist()]
 
 
 def as_random(

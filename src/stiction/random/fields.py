@@ -49,7 +49,7 @@ from stiction.base.variables import PROFILES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
 from stiction.random.conditioning import Conditioning, Conditions, Measured, conditioned
-from stiction.random.dotted_keys import distributions_of, full_key, with_values
+from stiction.random.dotted_keys import distributions_of, full_key, hypercube, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.modes import Modes, make_modes
@@ -589,13 +589,9 @@ class RandomInterface:
             laws = distributions_of(parameters, "random.")
             if not laws:
                 raise InputError("must map keys to distributions, got an empty mapping")
-        rng, interfaces = np.random.default_rng([seed, 6]), []
-        cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
-        shares = (cells + rng.random(cells.shape)) / count
-        rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
-        keys = [full_key(key).removeprefix("random.") for key in laws]
-        for values in np.transpose(rows).tolist():
-            pairs = dict(zip(keys, values, strict=True))
+        laws = {full_key(key).removeprefix("random."): law for key, law in laws.items()}
+        interfaces = []
+        for pairs in hypercube(laws, count, seed):
             with prefixed(
                 "uncertain: at " + ", ".join(f"{k} = {v:.4g}" for k, v in pairs.items())
             ):
