@@ -9,7 +9,7 @@ Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation
 finite window it is the debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and
 Early (2019), Biometrika 106, 251, and on planes of Guillaumin, Sykulski, Olhede and
 Simons (2022), Journal of the Royal Statistical Society B 84, 1526. Correlations of mapped
-fields: Grigoriu, Applied Non-Gaussian Processes (1995), section 3.1.
+fields: Grigoriu, Applied Non-Gaussian Processes (1995).
 
 Steps:
 

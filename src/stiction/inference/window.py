@@ -9,9 +9,9 @@ linear in the correlation C:
 with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing and the
 loss of low wavenumbers to the trend.
 
-Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251,
-section 3, for a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
-Journal of the Royal Statistical Society B 84, 1526, for planes with gaps.
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, for a
+line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
+Statistical Society B 84, 1526, for planes with gaps.
 
 Steps:
 

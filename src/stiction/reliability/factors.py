@@ -5,16 +5,16 @@ mean m, a factor b between specimens and a field f within. A handful of paramete
 the law of b) differs between equally likely interfaces of one field, and T is m b R(f) if
 the onset is in proportion to the strength. The solver is needed for R only.
 
-Source. Conditional Monte Carlo (Hammersley, 1956, Mathematical Proceedings of the Cambridge
-Philosophical Society 52, 73; Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
+Source. Conditional Monte Carlo (Hammersley, 1956, Journal of the ACM 3, 73; Asmussen and
+Glynn, Stochastic Simulation, 2007, section V.4).
 
 Steps:
 
 1. Draw plain samples, as `stiction.monte_carlo` does, and solve them.
 2. Divide each onset by the factor and the mean of its own sample.
 3. Multiply it by the means of other interfaces of the same field, evenly spread over
-   these, and by factors at stratified shares of their laws: `SPECIMENS_PER_SAMPLE` specimens in
-   all.
+   these, and by factors at stratified shares of their laws: `SPECIMENS_PER_SAMPLE`
+   specimens in all.
 4. Specimens of one solved sample are one family. The error follows from the shares of
    families among the failures (`uncertainty.ancestral_variance`), as in subset
    simulation.
