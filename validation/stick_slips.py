@@ -21,7 +21,6 @@ from scipy.special import comb
 
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureProgram
-from stiction.methods.equilibrium.events import relief_of
 from stiction.methods.equilibrium.patches import line_patch
 from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
@@ -380,7 +379,7 @@ def last_events(problem, strength, method=None):
             "critical_position": line_patch(grows, problem.interface).centre[0],
             "most": x[before.argmax()],
             "slip": (slip - before).mean(),
-            "drop": relief_of(problem, slip) - relief_of(problem, before),
+            "drop": problem.relief(slip) - problem.relief(before),
             "spread": np.interp(SENSORS, x, slip - before).std(ddof=1),
             "crossed": crossed,
             "speed": 1.0 / abs(slope),

@@ -202,7 +202,7 @@ def test_heavy_attenuation_comes_to_rest_where_an_overdamped_jump_does(drive):
     program, mesh = make_program(problem), make_mesh(problem)._replace(attenuation=3e5)
     for seed in range(1, 4):
         sample = of(problem, rough(problem, seed)[0])
-        for before, after in path_of(program, sample).events[:3]:
+        for before, after, _ in path_of(program, sample).events[:3]:
             event = begin(sample, mesh, problem.blocks.stiffness, before, 0.5)
             event.take_steps(60 * mesh.window)
             moved = after.slip - before.slip
@@ -260,7 +260,7 @@ def test_an_event_that_has_come_to_rest_moves_no_further():
     x = problem.interface.x
     strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
     program, sample = RuptureProgram(problem, st.Rupture()), of(problem, strength)
-    for before, _ in path_of(program, sample).events:
+    for before, _, _ in path_of(program, sample).events:
         event = program.event(sample, before)
         event.run(10**6)
         slip = event.waves.slip.copy()
@@ -281,7 +281,7 @@ def test_half_the_spacing_changes_an_event_by_two_per_cent():
         program = RuptureProgram(problem, st.Rupture())
         path = path_of(program, of(problem, strength))
         sizes = [np.ptp(one.after.slip - one.before.slip) for one in path.events]
-        before, after = path.events[int(np.argmax(sizes))]
+        before, after, _ = path.events[int(np.argmax(sizes))]
         added = after.slip - before.slip
         reach = np.flatnonzero(added > 1e-3 * added.max())[[0, -1]]
         found.append((added.sum() / nodes, added.max(), np.ptp(reach) / nodes))

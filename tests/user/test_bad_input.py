@@ -66,7 +66,9 @@ def test_errors_of_equilibrium_are_warned_of():
 
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):
     ends = "stiction.methods.equilibrium.path.follow_to_sliding"
-    monkeypatch.setattr(ends, lambda *given: follow_to_sliding(*given)._replace(known=False))
+    monkeypatch.setattr(
+        ends, lambda *given, **kept: follow_to_sliding(*given, **kept)._replace(known=False)
+    )
     with pytest.warns(st.AccuracyWarning, match="no equilibrium was found beyond 900000 Pa"):
         st.equilibrium_path(PROBLEM, 0.9 * ONE, [1e5, 2e6])
     with warnings.catch_warnings(action="error"):
