@@ -44,7 +44,8 @@ def simulator(
     problem, random, method, seed
         Arguments of `infer`.
     parameters : sequence of str
-        Keys as in the prior of `infer`, for example ``("correlation_length", "marginal.low")``.
+        Keys as in the prior of `infer`, for example ``("correlation_length",
+        "marginal.low")``.
     samples : int
         Number of tests that a call simulates.
     load_cell_error : float
@@ -53,16 +54,17 @@ def simulator(
     Returns
     -------
     callable
-        ``simulate(theta)`` returns the peaks, (samples,), Pa, for an array theta with a number for
-        each parameter. ``simulate(theta, first=k)`` returns the peaks of samples k, k + 1, ...,
-        which are independent of the first call if k >= samples. All theta share the samples, so
-        that peaks are smooth in theta.
+        ``simulate(theta)`` returns the peaks, (samples,), Pa, for an array theta
+        with a number for each parameter. ``simulate(theta, first=k)`` returns the
+        peaks of samples k, k + 1, ..., which are independent of the first call if
+        k >= samples. All theta share the samples, so that peaks are smooth in
+        theta.
 
     Raises
     ------
     InputError
-        If an argument is invalid or a parameter does not exist. The function raises it if the
-        values of the parameters do not make a valid problem.
+        If an argument is invalid or a parameter does not exist. The function
+        raises it if the values of the parameters do not make a valid problem.
 
     Examples
     --------

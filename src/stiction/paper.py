@@ -20,16 +20,18 @@ def __dir__() -> list[str]:  # what completion lists
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
     """Return the problem of Albertini, Karrer, Grigoriu and Kammer (2020).
 
-    It is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m and W = 0.5 TPa/m. Only
-    the strength above the residual strength affects the onset, so the residual strength is zero.
+    It is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m and W
+    = 0.5 TPa/m. Only the strength above the residual strength affects the onset,
+    so the residual strength is zero.
 
     Parameters
     ----------
     nodes : int
         Number of nodes on the interface, even.
     plane : {"stress", "strain"}
-        The paper states plane stress, where G* = G (1 + nu), but prints G* = G/(1 - nu),
-        which belongs to plane strain. ``plane="strain"`` gives the printed value.
+        The paper states plane stress, where G* = G (1 + nu), but prints G* = G/(1
+        - nu), which belongs to plane strain. ``plane="strain"`` gives the printed
+        value.
     """
     return st.Problem(
         solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),

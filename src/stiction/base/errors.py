@@ -28,8 +28,8 @@ class InputError(ValueError):
     Parameters
     ----------
     problems : str or iterable of str
-        A text for each mistake, with the key or argument, the value given and the valid
-        values.
+        A text for each mistake, with the key or argument, the value given and the
+        valid values.
 
     Attributes
     ----------
@@ -213,8 +213,8 @@ def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     Parameters
     ----------
     text : str
-        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the largest
-        size.
+        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the
+        largest size.
     which : array of bool
         Whether the warning concerns each sample.
     sizes : array, optional

@@ -206,9 +206,9 @@ def _warn_of_no_cache(folder: Path, reason: str) -> None:
 def private_folder(folder: Path) -> Path:
     """Return a folder in which only this user can have put anything, and make it if needed.
 
-    Compiled kernels are pickles, so whoever can replace a kernel can run code as the user
-    who loads it. If the folder is not private, a warning says why, and a temporary folder
-    of this process takes its place. The steps are:
+    Compiled kernels are pickles, so whoever can replace a kernel can run code as
+    the user who loads it. If the folder is not private, a warning says why, and a
+    temporary folder of this process takes its place. The steps are:
 
     1. Resolve links, because their owners could let them lead elsewhere.
     2. Make all missing folders with mode 0700, for any umask.

@@ -387,7 +387,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
         except pydantic.ValidationError as error:
             raise InputError(explain(error, cls.__name__)) from None
 
-    # Validation inside another model must keep calling pydantic's own path, not this wrapper.
+    # Validation inside another model must keep calling pydantic's own path, not
+    # this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
     wrapped.__init__, wrapped.__repr__, wrapped._repr_html_ = init, brief, html_of
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of

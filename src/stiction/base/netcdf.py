@@ -1,13 +1,13 @@
 """NetCDF files from anywhere: only numbers that the file itself holds, and no more than expected.
 
 A NetCDF-4 file is an HDF5 file. While HDF5 reads, it follows names of other files
-(external storage, external links, virtual datasets), and it unpacks data without a limit.
-The steps are:
+(external storage, external links, virtual datasets), and it unpacks data without
+a limit. The steps are:
 
 1. Take the bytes of the file, so that nobody can change the file between a look and a use.
 2. Walk through all groups. Refuse links that are not hard, data outside the file, too
-   many values for the size of the file, filters other than shuffle, zlib and checksum,
-   and chunks that unpack to more than their shape states.
+   many values for the size of the file, filters other than shuffle, zlib and
+   checksum, and chunks that unpack to more than their shape states.
 3. Read the attributes, lists of texts and numeric variables of the root. All attributes
    and texts together may be as large as the file.
 4. Name the dimensions as NetCDF does.

@@ -162,12 +162,13 @@ def run(
 ) -> None:
     """Run the study in a file, or the missing part of it.
 
-    Rerunning the command resumes an interrupted run, computes failed samples again, and
-    adds samples if `samples` was raised. Results do not depend on workers, machines or
-    interruptions.
+    Rerunning the command resumes an interrupted run, computes failed samples
+    again, and adds samples if `samples` was raised. Results do not depend on
+    workers, machines or interruptions.
 
-    The exit code is 0 if the run is complete, 1 if samples failed or the run could not
-    continue, 2 if the study or the command has errors, and 130 after an interruption.
+    The exit code is 0 if the run is complete, 1 if samples failed or the run
+    could not continue, 2 if the study or the command has errors, and 130 after an
+    interruption.
 
     \b
     Examples:
@@ -199,9 +200,9 @@ def run(
 def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run.
 
-    Checksums find damage, not forgery. The exit code is 0 if the run is complete, 1 if
-    samples are missing, failed or damaged or the run cannot be read, and 2 if links,
-    pipes or folders lie in place of its files.
+    Checksums find damage, not forgery. The exit code is 0 if the run is complete,
+    1 if samples are missing, failed or damaged or the run cannot be read, and 2
+    if links, pipes or folders lie in place of its files.
 
     \b
     Examples:
@@ -244,10 +245,10 @@ def export(
 ) -> None:
     """Write a run as a file over the sweep and the samples.
 
-    A table (.csv) has a row for each sample and columns named `name (unit)`. It leaves
-    out profiles along the interface and events; --events writes the events instead. If
-    samples are missing, no file is written and the exit code is 1. With --partial, missing
-    samples are NaN.
+    A table (.csv) has a row for each sample and columns named `name (unit)`. It
+    leaves out profiles along the interface and events; --events writes the events
+    instead. If samples are missing, no file is written and the exit code is 1.
+    With --partial, missing samples are NaN.
 
     \b
     Examples:
@@ -270,7 +271,8 @@ def report(
 ) -> None:
     """Write a self-contained HTML page: figures, tables, failures, the study and versions.
 
-    The exit code is 0 if the run is complete. It is 1 if samples are missing from the page.
+    The exit code is 0 if the run is complete. It is 1 if samples are missing from
+    the page.
 
     \b
     Examples:
@@ -308,8 +310,9 @@ def example() -> None:
 def check(study: StudyFile) -> None:
     """Check a study file as `run` does, and estimate time and size.
 
-    All errors appear at once, with the warnings of a run before its first sample. Files
-    outside the folder of the study are listed, because their numbers go into the run.
+    All errors appear at once, with the warnings of a run before its first sample.
+    Files outside the folder of the study are listed, because their numbers go
+    into the run.
 
     \b
     Examples:
@@ -424,11 +427,12 @@ def onset(
 ) -> None:
     """Compute the load and position at which an interface of given strength begins to slide.
 
-    The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...) or
-    NetCDF, with or without x. On a plane it is an .npy file of shape (nx, ny) or a map.
-    Values are in Pa and m unless the file states units, such as 'x (mm), strength (MPa)'.
-    Every applicable method is used. The method of the study keeps its options. Other
-    methods have their defaults, and `rupture` has a loading rate of 2e7 Pa/s.
+    The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...)
+    or NetCDF, with or without x. On a plane it is an .npy file of shape (nx, ny)
+    or a map. Values are in Pa and m unless the file states units, such as 'x
+    (mm), strength (MPa)'. Every applicable method is used. The method of the
+    study keeps its options. Other methods have their defaults, and `rupture` has
+    a loading rate of 2e7 Pa/s.
 
     \b
     Examples:
@@ -509,12 +513,12 @@ def rupture(
 ) -> None:
     """Simulate an interface from its first slip to global sliding, or until its study stops it.
 
-    The strength is a sample of the study (at the first point of a sweep) or your own
-    profile, with or without x. The command writes `rupture.nc` (slip, slip rate and
-    stress over time and x) and a figure of the slip rate in space and time (PNG and PDF).
-    The loading rate comes from the method `rupture` of the study, else it is 2e7 Pa/s. On
-    a specimen the command simulates the event in which the whole interface slides, and
-    draws the blocks too.
+    The strength is a sample of the study (at the first point of a sweep) or your
+    own profile, with or without x. The command writes `rupture.nc` (slip, slip
+    rate and stress over time and x) and a figure of the slip rate in space and
+    time (PNG and PDF). The loading rate comes from the method `rupture` of the
+    study, else it is 2e7 Pa/s. On a specimen the command simulates the event in
+    which the whole interface slides, and draws the blocks too.
 
     \b
     Examples:
@@ -603,26 +607,28 @@ def reliability(
     """Compute the probability that an interface slides below a demand, or its design.
 
     The answer is a line for each point of the sweep. `--force`, `--stress` and
-    `--friction-coefficient` ask for a probability, `--probability` for a design. Without
-    these options, the table [reliability] of the study asks. `--page` writes a design as
-    a page that prints on A4, with its characteristic value, partial factor, inputs,
-    doubts and sensitivities. `--out` computes the whole curve, decade by decade.
+    `--friction-coefficient` ask for a probability, `--probability` for a design.
+    Without these options, the table [reliability] of the study asks. `--page`
+    writes a design as a page that prints on A4, with its characteristic value,
+    partial factor, inputs, doubts and sensitivities. `--out` computes the whole
+    curve, decade by decade.
 
-    Problem, strength, method, seed and sweep come from the study file, whose number of
-    samples is not used. The stress is the mean shear stress on the interface. Failure
-    means that the whole interface slides below that stress. With a table [uncertain], the
-    probability is the mean over equally likely interfaces, and a band contains 90 % of
-    them. `--uncertain` adds a line to this table, such as an assumed constant and its
-    range. Rerunning the command resumes an interrupted run and adds repetitions if
-    `--repetitions` was raised. `stiction export` writes the curve as a table, and
-    `stiction report` writes a page with its figure.
+    Problem, strength, method, seed and sweep come from the study file, whose
+    number of samples is not used. The stress is the mean shear stress on the
+    interface. Failure means that the whole interface slides below that stress.
+    With a table [uncertain], the probability is the mean over equally likely
+    interfaces, and a band contains 90 % of them. `--uncertain` adds a line to
+    this table, such as an assumed constant and its range. Rerunning the command
+    resumes an interrupted run and adds repetitions if `--repetitions` was raised.
+    `stiction export` writes the curve as a table, and `stiction report` writes a
+    page with its figure.
 
     \b
     Examples:
       stiction reliability study.toml --force 40e3 stiction reliability study.toml
       --probability 1e-3 stiction reliability study.toml --uncertain
-      "problem.friction.residual_ratio = [0.6, 0.8]" stiction reliability study.toml --out
-      curve --smallest 1e-6
+      "problem.friction.residual_ratio = [0.6, 0.8]" stiction reliability
+      study.toml --out curve --smallest 1e-6
     """
     from stiction.study.run import table_of
     from stiction.study.study import Study, open_run

@@ -44,8 +44,8 @@ def write_design_page(
     problem : Problem
         The problem of the design. Its constants are the inputs.
     evidence : sequence
-        Results behind the design, which are printed: a fit, a posterior, an agreement.
-        Their doubts and notes are listed as doubts.
+        Results behind the design, which are printed: a fit, a posterior, an
+        agreement. Their doubts and notes are listed as doubts.
     sources : mapping, optional
         The source of each input by its dotted key, such as ``{"load.pressing_force":
         "drawing 12"}``. Inputs without a source are called assumed.
@@ -168,7 +168,8 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
                 shown = f"{len(value)} values, mean {np.mean(value):.5g}" if numbers else value
                 rows.append([key, shown, UNITS.get(name, ""), sources.get(key, "assumed")])
 
-    # Young's modulus is shown beside the shear modulus, which is stored, with the same source.
+    # Young's modulus is shown beside the shear modulus, which is stored, with the
+    # same source.
     plain = to_plain(problem)
     plain["solid"]["youngs_modulus"] = problem.solid.youngs_modulus
     moduli = "solid.shear_modulus", "solid.youngs_modulus"

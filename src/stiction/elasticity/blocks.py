@@ -9,7 +9,8 @@ stress F/L,
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 
-K holds for a given force: a uniform slip is free of stress. `block_response` returns K, q and C.
+K holds for a given force: a uniform slip is free of stress. `block_response`
+returns K, q and C.
 
 Algorithm
 ---------
@@ -19,8 +20,9 @@ Algorithm
    form apart from a few harmonics (`_rollers_correction`).
 3. With a pusher, q and C of a block on rollers have closed forms, too (`_pushed`).
 4. With a platen, find the shear traction t that holds the top in place (`glued_top`). With the
-   compliance G of the top and the stress A t on the interface, A' d/2 is the displacement of the
-   top that slip d causes (Betti's theorem). For a platen that is held,
+   compliance G of the top and the stress A t on the interface, A' d/2 is the
+   displacement of the top that slip d causes (Betti's theorem). For a platen that
+   is held,
 
        K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1.
 
@@ -86,7 +88,8 @@ class BlockResponse(NamedTuple):
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
     shear: Array  # (n,): q, shear stress of the drive, divided by its mean
     drive_stiffness: float  # C, force per unit depth divided by travel, without slip, Pa
-    # Largest relative error of q, C and K (as a share of its diagonal), without the lattice's error
+    # Largest relative error of q, C and K (as a share of its diagonal), without
+    # the lattice's error
     error: float = 0.0
 
 
@@ -280,7 +283,8 @@ def _anti_plane(
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
     ends = harmonics.sums(x + 1j * low).inverse - harmonics.sums(x + 1j * high).inverse
-    # Reflections between the ends. The closed forms hold the waves before the first reflection.
+    # Reflections between the ends. The closed forms hold the waves before the
+    # first reflection.
     once = -np.expm1(-2.0 * k * length)
     waves = np.exp(-np.outer(2.0 * length + x, k)) + np.exp(-np.outer(2.0 * length - x, k))
     stress = 2.0 / height * (ends.real / (high - low) + waves @ (mean_sine / once))

@@ -1,12 +1,14 @@
 """Two blocks behind the machine that drives them: stiffness, shear profile, travel and windows.
 
-The block with its drive and the machine are springs in series. With the force F per unit depth, the
-drive's travel U, the travel X at the machine's far end, and the machine's stiffness k,
+The block with its drive and the machine are springs in series. With the force F
+per unit depth, the drive's travel U, the travel X at the machine's far end, and
+the machine's stiffness k,
 
     F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 
-The second equation is Betti's theorem: C is the stiffness of the block against its drive without
-slip, and slip d at the interface moves the drive by its average with q. Eliminating U gives
+The second equation is Betti's theorem: C is the stiffness of the block against
+its drive without slip, and slip d at the interface moves the drive by its average
+with q. Eliminating U gives
 
     tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
 
@@ -84,8 +86,9 @@ def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
 def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
 
-    The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a shortest run that
-    begins later also ends later, and a single pass over the nodes finds all of them:
+    The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a
+    shortest run that begins later also ends later, and a single pass over the
+    nodes finds all of them:
 
     1. Lengthen the run until it is unstable.
     2. Shorten it from its end as long as it remains unstable, and keep it.

@@ -9,24 +9,27 @@ Elasticity, article 24) as a sum of independent harmonics,
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
 
-If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead. Then sin and cos change
-places, and k = pi/H, 2 pi/H, ... Free sides clamp Phi_k: it vanishes there with its slope. All
-fields follow from a function g_k(x, s), the deflection of a clamped beam,
+If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead. Then sin
+and cos change places, and k = pi/H, 2 pi/H, ... Free sides clamp Phi_k: it
+vanishes there with its slope. All fields follow from a function g_k(x, s), the
+deflection of a clamped beam,
 
     (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
 
-For example slip d on the interface makes the shear stress -(E*/H) sum k² int (d²g_k/dx ds) d ds on
-it, with E* = 8 G/(kappa + 1).
+For example slip d on the interface makes the shear stress -(E*/H) sum k² int
+(d²g_k/dx ds) d ds on it, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
 1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r, less two parts:
-   the reflection of each clamp by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the
-   left clamp, and a `remainder`, the reflections between the clamps.
+   the reflection of each clamp by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x +
+   s))/(4 k³) for the left clamp, and a `remainder`, the reflections between the
+   clamps.
 2. Sum the beam without ends and the single reflections over k in closed form (`sums`).
 3. The remainder falls as exp(-k L), so that few harmonics give it to round-off (`reflected`). It is
-   a combination of the four solutions of (2) without a load, exp(-k x), k x exp(-k x) and the same
-   in L - x. The conditions at the clamps fix their coefficients.
+   a combination of the four solutions of (2) without a load, exp(-k x), k x
+   exp(-k x) and the same in L - x. The conditions at the clamps fix their
+   coefficients.
 
 Derivatives of the four solutions follow from polynomials: an operator P(d/dx), in units of k,
 turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k x P(-1)) exp(-k x).
@@ -77,7 +80,8 @@ class Harmonics:
         count = int(max_decay * height / (np.pi * length)) + 2
         self.k = (np.arange(count) + (1.0 if pressed else 0.5)) * np.pi / height
         self.at_top = (-1.0) ** (np.arange(count) + pressed)  # cos(k H), or sin(k H)
-        # Step 3. Values and slopes of the four solutions at the left and the right clamp.
+        # Step 3. Values and slopes of the four solutions at the left and the
+        # right clamp.
         kl, decay = self.k * length, np.exp(-self.k * length)
         zero, unit = np.zeros_like(kl), np.ones_like(kl)
         clamps = np.array(

@@ -8,35 +8,39 @@ International Journal of Fracture 93, 1998):
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
-The kernel C follows from the Laplace symbol D(s) of the traction per slip, in units of
-G|k|/2, with s in units of |k| c_s (P. H. Geubelle and J. R. Rice, Journal of the Mechanics
-and Physics of Solids 43, 1995): its transform is (D(0) + s - D(s))/s, with D(s) = sqrt(1 +
-s^2) in mode III, in mode II
+The kernel C follows from the Laplace symbol D(s) of the traction per slip, in
+units of G|k|/2, with s in units of |k| c_s (P. H. Geubelle and J. R. Rice,
+Journal of the Mechanics and Physics of Solids 43, 1995): its transform is (D(0) +
+s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode III, in mode II
 
     [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
 
-Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to a tolerance on
-0 <= T <= `T_MAX`. They turn the convolution with the whole history into a recursion for each pair.
+Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to
+a tolerance on 0 <= T <= `T_MAX`. They turn the convolution with the whole history
+into a recursion for each pair.
 
 Algorithm (`fit_exponentials`)
 ------------------------------
 1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i a,
-   a = 1 and eta. The integrand is smooth there and decays, so that the same tanh-sinh nodes
-   (H. Takahasi and M. Mori, Publications of RIMS 9, 1974) are accurate for every T
-   (`arc_quadrature`). The result is a sum of some 280 exponentials. (The closed forms by Bessel
-   functions lose digits by cancellation above T = 7.)
+   a = 1 and eta. The integrand is smooth there and decays, so that the same
+   tanh-sinh nodes (H. Takahasi and M. Mori, Publications of RIMS 9, 1974) are
+   accurate for every T (`arc_quadrature`). The result is a sum of some 280
+   exponentials. (The closed forms by Bessel functions lose digits by cancellation
+   above T = 7.)
 2. Shorten the sum by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
-   26, 1981). Its Gramians are Cauchy matrices, which are factorised to high relative accuracy
-   (J. Demmel, Accurate Singular Value Decompositions of Structured Matrices, 1999). Before, all
-   poles are damped by a common decay, which is removed afterwards (`balanced_truncation`).
+   26, 1981). Its Gramians are Cauchy matrices, which are factorised to high
+   relative accuracy (J. Demmel, Accurate Singular Value Decompositions of
+   Structured Matrices, 1999). Before, all poles are damped by a common decay,
+   which is removed afterwards (`balanced_truncation`).
 3. Polish the poles by variable projection: the poles move by Levenberg-Marquardt, and the
    weights follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on
    Numerical Analysis 10, 1973).
 4. Level the error: give more emphasis to times with a large error, as in Lawson's algorithm
-   (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968), and polish again
-   (`_attempt`).
+   (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968), and
+   polish again (`_attempt`).
 5. Accept the fit only if its error on a denser set of times is below the tolerance, and its terms
-   do not cancel (`_acceptable`). Otherwise try another common decay, then a further pair.
+   do not cancel (`_acceptable`). Otherwise try another common decay, then a
+   further pair.
 """
 
 import contextlib
@@ -62,18 +66,20 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 _RULE_STEP = 0.025  # of the tanh-sinh rule; with 0.05 the kernel is off by 6e-11 at T = 1e5
-# End of the rule: the outermost node lies 1e-55 from the branch point, and its weight underflows.
+# End of the rule: the outermost node lies 1e-55 from the branch point, and its
+# weight underflows.
 _RULE_END = 4.4
 _TIMES_PER_CHUNK = 2048
 T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; after T_MAX the sum decays
 MAX_WEIGHT = 10.0  # larger weights cancel, and lose digits in the recursion
 MAX_PAIRS = 60  # enough for 1e-9 in mode II
 MAX_LEVELLINGS = 14  # a fit that is not level by then gets a further pair
-# Smallest exponent by which each pole decays over T_MAX, so that sums decay after T_MAX.
+# Smallest exponent by which each pole decays over T_MAX, so that sums decay after
+# T_MAX.
 _MIN_DECAY = 0.3
 _MIN_DECAY_RATE = _MIN_DECAY / T_MAX
-# Common decays over T_MAX for balanced truncation, in the order of trials. They are good starts for
-# polishing at loose and at tight tolerances.
+# Common decays over T_MAX for balanced truncation, in the order of trials. They
+# are good starts for polishing at loose and at tight tolerances.
 _LOOSE_DECAYS, _TIGHT_DECAYS = (10.0, 1.0), (1.0, 0.3)
 _FILE_FORMAT = 2  # raise it when the fit or the file layout changes, to ignore old files
 
@@ -100,7 +106,8 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     """
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)
-    # sqrt(1 + s^2) at s = i rotation, in a form without cancellation beside the branch point.
+    # sqrt(1 + s^2) at s = i rotation, in a form without cancellation beside the
+    # branch point.
     root = np.sqrt(2.0 * np.sin(angle)) * np.exp(1j * (0.5 * angle - 0.25 * np.pi))
     factor = rotation * weight * (2.0 / (np.pi * 1j))
     s = 1j * rotation
@@ -297,7 +304,8 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
     check_times = _sample_times(150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
-    # The first number of pairs, which proved to be just too small for every Poisson's ratio.
+    # The first number of pairs, which proved to be just too small for every
+    # Poisson's ratio.
     digits = -np.log10(tolerance)
     pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
     starts = _LOOSE_DECAYS if tolerance > 1e-7 else _TIGHT_DECAYS

@@ -9,10 +9,11 @@ without a matrix in memory:
     (A + spring phi phi')_SS x_S = right_S,                                                   (1)
     A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
 
-In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff spring the matrix
-is positive definite even if A has a single direction of negative curvature, close to phi. States on
-and beyond the turning point of the load can be computed in this way (`turning_point`). Kernels take
-flat arrays, so that the same code serves lines and planes.
+In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff
+spring the matrix is positive definite even if A has a single direction of
+negative curvature, close to phi. States on and beyond the turning point of the
+load can be computed in this way (`turning_point`). Kernels take flat arrays, so
+that the same code serves lines and planes.
 
 Algorithm for (1), `solve_inside`
 ---------------------------------
@@ -20,9 +21,9 @@ Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimiza
 algorithm 5.3) with the textbook's r, alpha and beta. z is the preconditioned residual.
 
 1. Precondition the residual: z = M r, cut to S, with M = 1/(K(k) + W/2) on Fourier modes and the
-   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a turning point an
-   eigenvalue of A is much smaller than the others. With its eigenvector as y it does not cost
-   iterations.
+   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a
+   turning point an eigenvalue of A is much smaller than the others. With its
+   eigenvector as y it does not cost iterations.
 2. Take the direction z + beta times the former direction, and multiply it by the matrix.
 3. If the curvature along the direction is not positive, stop: A is not positive definite on S.
 4. Step to the minimum along the direction, and go to 1. Stop once no residual exceeds the
@@ -321,7 +322,8 @@ def lowest_eigenvector(
     basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction
     images = np.empty((3, nodes))  # A times these
     work = np.empty(nodes)
-    # The norm of a small guess may underflow. Scaling by a power of two does not change its digits.
+    # The norm of a small guess may underflow. Scaling by a power of two does not
+    # change its digits.
     exponent = math.frexp(largest_inside(vector, inside))[1]
     set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
     restrict(basis[0], inside)

@@ -1,11 +1,12 @@
 """The elasticity that methods need of the solids on both sides of an interface.
 
-`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a machine) are complete.
-`HalfSpaces` on a plane have the symbol of K only, as K itself would not fit in memory, and slip
-does not relieve the load. This file holds records. Their kernels are in `stiffness` and `weakest`.
+`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a
+machine) are complete. `HalfSpaces` on a plane have the symbol of K only, as K
+itself would not fit in memory, and slip does not relieve the load. This file
+holds records. Their kernels are in `stiffness` and `weakest`.
 
-Slip has one component, along x, the direction of the load. With a wave vector (kx, ky) of
-length k and a = (kx/k)^2 the stiffness between half-spaces is
+Slip has one component, along x, the direction of the load. With a wave vector
+(kx, ky) of length k and a = (kx/k)^2 the stiffness between half-spaces is
 
     K(k) = (G* a + G (1 - a)) k/2,
 

@@ -16,8 +16,9 @@ number act on nodes of odd number only, and the reverse.
 1. For each parity, take the slipping nodes of this parity. They act on n/2 targets, the nodes of
    the other parity.
 2. The entries of K from a node to its targets are n/2 consecutive numbers of `strip`, the odd
-   entries of the first column three times over. Add them, times the slip, for four nodes at once,
-   so that each target is read and written once for four nodes.
+   entries of the first column three times over. Add them, times the slip, for
+   four nodes at once, so that each target is read and written once for four
+   nodes.
 3. Join the two halves, and add the diagonal.
 
 `_apply_rows` does the same with rows of a dense matrix, which is symmetric.

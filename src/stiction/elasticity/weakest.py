@@ -10,13 +10,13 @@ of these bounds over all windows and all places.
 Algorithm
 ---------
 1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
-   weakening rate than any node has. Stop once a narrower window is unstable anywhere, since wider
-   windows bound the load less closely.
+   weakening rate than any node has. Stop once a narrower window is unstable
+   anywhere, since wider windows bound the load less closely.
 2. If the rate varies, count for each node how many nodes in a row weaken fast enough.
 3. A window with a fixed place (on blocks) has a single bound. A window that may lie anywhere (on a
-   line) is tried at every sixteenth of its width, because a weighted mean hardly changes over this
-   distance, and then at all nodes around the best place. The lowest minimum may be missed, but
-   every place gives a valid bound.
+   line) is tried at every sixteenth of its width, because a weighted mean hardly
+   changes over this distance, and then at all nodes around the best place. The
+   lowest minimum may be missed, but every place gives a valid bound.
 4. Compare with sliding of the whole interface: y = 1 everywhere.
 """
 

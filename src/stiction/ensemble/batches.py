@@ -1,7 +1,7 @@
 """Samples computed in batches by threads or any executor, with the same numbers from each.
 
-Problem. Solve spans of samples on workers that come and go, in bounded memory, so that
-results do not depend on the workers.
+Problem. Solve spans of samples on workers that come and go, in bounded memory, so
+that results do not depend on the workers.
 
 Steps:
 
@@ -161,7 +161,8 @@ def piece_size(
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
     if pace:
         size = int(PIECE_SECONDS / max(pace, 1e-9))
-    # A fair share of the remaining samples, but at least a block, which is drawn as a whole.
+    # A fair share of the remaining samples, but at least a block, which is drawn
+    # as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MAX_PIECE_BYTES / experiment.sample_bytes), span.samples))
     end = span.first + size

@@ -266,8 +266,9 @@ def limit_state(
     -------
     LimitState
         A callable that maps independent standard normal draws, of shape (samples,
-        `dimension`), to stresses, Pa, of shape (samples,). `draws(seed, first, samples)`
-        returns the draws of `monte_carlo`, and `profiles(draws)` their profiles.
+        `dimension`), to stresses, Pa, of shape (samples,). `draws(seed, first,
+        samples)` returns the draws of `monte_carlo`, and `profiles(draws)` their
+        profiles.
 
     Raises
     ------

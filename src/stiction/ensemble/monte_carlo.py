@@ -178,55 +178,59 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
 
-    Sample i depends on (seed, i) only, not on the number of samples, the workers or the
-    executor.
+    Sample i depends on (seed, i) only, not on the number of samples, the workers
+    or the executor.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties. A field alone is the peak strength, Pa. The members of a
-        list are equally likely, and every sample has one of them.
+        The random properties. A field alone is the peak strength, Pa. The members
+        of a list are equally likely, and every sample has one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
-        As in `Ensemble`. To see the profiles of a few samples, repeat them: a call with
-        the same seed and fewer samples gives the same samples.
+        As in `Ensemble`. To see the profiles of a few samples, repeat them: a
+        call with the same seed and fewer samples gives the same samples.
     workers : int, optional
-        Threads, by default all cores. The compiled kernels release the interpreter lock.
+        Threads, by default all cores. The compiled kernels release the
+        interpreter lock.
     executor : concurrent.futures.Executor, optional
         Any object with `submit` instead of threads, such as a process pool or a Dask
         executor.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable gets (done, total).
+        True shows progress on standard error after a second. A callable gets
+        (done, total).
     pilot : bool
-        Whether to check an approximate method with the first samples (32 on a line, 8 on
-        a plane) and the weakest of the first thousand. If a quick test leaves a doubt,
-        they are also solved by `Equilibrium`, and the difference is reported. The
-        ensemble stays the same.
+        Whether to check an approximate method with the first samples (32 on a
+        line, 8 on a plane) and the weakest of the first thousand. If a quick test
+        leaves a doubt, they are also solved by `Equilibrium`, and the difference
+        is reported. The ensemble stays the same.
 
     Returns
     -------
     xarray.Dataset
-        Results of `onset` over 'sample'. The attributes contain the version, the study as
-        JSON and the seed, so that it can be run again. Samples that could not be solved
-        are NaN. The attribute 'failed_samples' lists them (point, sample, seed, message,
-        whether the sample itself does not fit). If the pilot compared, 'pilot_bias' and
-        'pilot_scatter' are mean and standard deviation of the difference in
-        `critical_stress`, relative to the mean by `Equilibrium`, and 'pilot_weakest_bias'
-        and 'pilot_weakest_scatter' of the weakest samples.
+        Results of `onset` over 'sample'. The attributes contain the version, the
+        study as JSON and the seed, so that it can be run again. Samples that
+        could not be solved are NaN. The attribute 'failed_samples' lists them
+        (point, sample, seed, message, whether the sample itself does not fit). If
+        the pilot compared, 'pilot_bias' and 'pilot_scatter' are mean and standard
+        deviation of the difference in `critical_stress`, relative to the mean by
+        `Equilibrium`, and 'pilot_weakest_bias' and 'pilot_weakest_scatter' of the
+        weakest samples.
 
     Raises
     ------
     InputError
-        If any argument is invalid (the message lists every problem), or no sample is valid.
+        If any argument is invalid (the message lists every problem), or no sample
+        is valid.
     RunError
         If the solver fails on all samples. The message names a sample with its seed.
 
     Warns
     -----
     AccuracyWarning
-        If samples could not be solved, or the pilot differs from the local criterion by
-        more than 1 %.
+        If samples could not be solved, or the pilot differs from the local
+        criterion by more than 1 %.
 
     Examples
     --------
@@ -238,8 +242,8 @@ def monte_carlo(
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
 
-    A table for pandas has a row for each sample. Kept profiles have a table of their own,
-    ``found[["strength"]].to_dataframe()``, with a row for each node.
+    A table for pandas has a row for each sample. Kept profiles have a table of
+    their own, ``found[["strength"]].to_dataframe()``, with a row for each node.
 
     >>> len(found.drop_dims("x", errors="ignore").to_dataframe())
     50

@@ -1,7 +1,7 @@
 """A pilot: some samples of an approximate method solved by its exact counterpart, too.
 
-Problem. How far are onsets by an approximate method, such as the local criterion, from
-the exact onsets of the same samples?
+Problem. How far are onsets by an approximate method, such as the local criterion,
+from the exact onsets of the same samples?
 
 Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
 

@@ -1,11 +1,12 @@
 """The store: a folder of self-describing chunks.
 
-Problem. Many processes write samples to a folder, and any of them may be killed at any
-moment. No sample may be lost once it is written, and damage must be found.
+Problem. Many processes write samples to a folder, and any of them may be killed
+at any moment. No sample may be lost once it is written, and damage must be found.
 
-Solution. ``study.json`` identifies the study, and ``chunks/`` holds the samples. A chunk
-is a table of samples with a mark of its study, and its name is a digest of its content.
-Chunks are written whole or not at all, they never change, and no file lists them.
+Solution. ``study.json`` identifies the study, and ``chunks/`` holds the samples.
+A chunk is a table of samples with a mark of its study, and its name is a digest
+of its content. Chunks are written whole or not at all, they never change, and no
+file lists them.
 
 Limits. A digest finds damage, but not forgery, because whoever can write to a folder can
 write other numbers with a new digest. A folder may come from a stranger. Links, pipes,

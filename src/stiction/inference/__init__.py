@@ -1,8 +1,8 @@
 """From measurements to random fields: fits of profiles, parameters from peaks, designs of tests.
 
-Profiles: begin with `fit` and `estimate`. Then read `records` and `window` (measured
-values), `whittle` (their likelihood), `marginal_fit`, `bootstrap` (errors) and `between`
-(specimens).
+Profiles: begin with `fit` and `estimate`. Then read `records` and `window`
+(measured values), `whittle` (their likelihood), `marginal_fit`, `bootstrap`
+(errors) and `between` (specimens).
 
 Peaks: begin with `infer`. Then read `prior`, `likelihood` with `scaling` and `density`,
 `grid` and `posterior`. `specimens` and `joined` combine profiles and peaks. `agreement`

@@ -1,23 +1,23 @@
 """Whether measured peaks agree with a prediction: tests whose p-values hold for few peaks.
 
-Problem. n peaks have the empirical distribution F_n. The prediction has the distribution
-F, given by a sample or by a posterior. Find the probability that n peaks from F lie as
-far from F as the measured peaks, for two distances:
+Problem. n peaks have the empirical distribution F_n. The prediction has the
+distribution F, given by a sample or by a posterior. Find the probability that n
+peaks from F lie as far from F as the measured peaks, for two distances:
 
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
 
-Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates) are in
-Davison and Hinkley, Bootstrap Methods and their Application (1997), sections 4.2 and 4.3.
-The sum for W^2 is in Anderson and Darling (1952), Annals of Mathematical Statistics 23,
-193.
+Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates)
+are in Davison and Hinkley, Bootstrap Methods and their Application (1997),
+sections 4.2 and 4.3. The sum for W^2 is in Anderson and Darling (1952), Annals of
+Mathematical Statistics 23, 193.
 
 Steps for a predicted sample:
 
 1. Under the hypothesis, each choice of n values from all measured and predicted values
-   together is equally likely. This is exact for any numbers of values, and for equal
-   values. F is then the distribution of the remaining values, and the integral is over
-   all values.
+   together is equally likely. This is exact for any numbers of values, and for
+   equal values. F is then the distribution of the remaining values, and the
+   integral is over all values.
 2. Choose n values at random, and compute both distances between them and the remaining
    values.
 3. The p-value is the share of choices that are at least as far apart as the measured
@@ -79,9 +79,9 @@ class Agreement(Result):
     peaks : Peaks
         The measured peaks.
     cramer_von_mises, largest_deviation : float
-        Both distances. W^2 sums the squared differences between measured and predicted
-        shares over the tests. The largest difference is multiplied by the square root of
-        the number of tests.
+        Both distances. W^2 sums the squared differences between measured and
+        predicted shares over the tests. The largest difference is multiplied by
+        the square root of the number of tests.
     p_values : dict of str to float
         Probability of a distance at least as large if the prediction is right, by the
         names of the two distances.
@@ -90,9 +90,10 @@ class Agreement(Result):
     band : float
         Largest deviation that 90 % of campaigns do not exceed.
     precursors : dict of str to (measured, predicted) arrays
-        Given if curves were compared, one value for each test: ``number`` of precursors,
-        ``size`` (N or Pa) of the largest precursor or 0, and ``first_load``, the force at
-        the first precursor or else the peak. `p_values` has these names too.
+        Given if curves were compared, one value for each test: ``number`` of
+        precursors, ``size`` (N or Pa) of the largest precursor or 0, and
+        ``first_load``, the force at the first precursor or else the peak.
+        `p_values` has these names too.
     """
 
     peaks: Peaks
@@ -139,22 +140,24 @@ def agreement(
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.
 
-    The test compares distributions, so the order of the tests does not count. If peaks
-    drift, remove the trend first, ``peaks - np.polyval(np.polyfit(time, peaks, 1), time)
-    + peaks.mean()``, and report that you did.
+    The test compares distributions, so the order of the tests does not count. If
+    peaks drift, remove the trend first, ``peaks - np.polyval(np.polyfit(time,
+    peaks, 1), time) + peaks.mean()``, and report that you did.
 
     Parameters
     ----------
     prediction : Dataset or Posterior
-        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose uncertainty then
-        counts. It must not have been fitted to these peaks.
+        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose
+        uncertainty then counts. It must not have been fitted to these peaks.
     peaks : array, mapping of arrays, Peaks or Curves
-        As in `stiction.infer`. Precursors are compared too if curves are given and the
-        prediction has events, such as the events of ``Equilibrium(events=20)``.
+        As in `stiction.infer`. Precursors are compared too if curves are given
+        and the prediction has events, such as the events of
+        ``Equilibrium(events=20)``.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
-        Standard deviation of the error of a peak, for a dataset. A posterior has its own.
+        Standard deviation of the error of a peak, for a dataset. A posterior has
+        its own.
     replicates : int
         Number of simulated campaigns. A p-value is at least 1/(replicates + 1).
     seed : int
@@ -168,10 +171,10 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the measured quantity, is a sweep, or has one kind of
-        specimen although several were tested. If peaks differ from the prediction by a
-        factor of fifty. If the posterior was fitted to these peaks, because it then lies
-        near them.
+        If the prediction lacks the measured quantity, is a sweep, or has one kind
+        of specimen although several were tested. If peaks differ from the
+        prediction by a factor of fifty. If the posterior was fitted to these
+        peaks, because it then lies near them.
 
     Warns
     -----
@@ -285,7 +288,8 @@ def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
         # 2.
         chosen = rng.choice(total, size, replace=False) if row else np.arange(size)
         reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / size
-        # The remaining values have the distribution of all values less the chosen ones.
+        # The remaining values have the distribution of all values less the chosen
+        # ones.
         away = (reached - np.cumsum(share)) * total / values.size
         distances[row] = size * (share @ away**2), np.sqrt(size) * np.abs(away).max()
     return distances

@@ -1,11 +1,11 @@
 """The scatter between specimens, and records without it.
 
-Problem. Records k = 1, ..., n of different specimens have means with logarithms L_k. A
-field alone would give L_k the variance v_k. Estimate the variance s between specimens,
-and scale the records as if all came from one specimen.
+Problem. Records k = 1, ..., n of different specimens have means with logarithms
+L_k. A field alone would give L_k the variance v_k. Estimate the variance s
+between specimens, and scale the records as if all came from one specimen.
 
-Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of Standards
-87, 377. Viechtbauer (2007), Statistics in Medicine 26, 37.
+Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of
+Standards 87, 377. Viechtbauer (2007), Statistics in Medicine 26, 37.
 
 Steps:
 

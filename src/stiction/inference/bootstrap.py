@@ -1,19 +1,20 @@
 """Intervals of a fit, and fields as likely as the fit, from fits to simulated records.
 
-Problem. A fit estimates parameters theta from records. Find intervals that contain the
-true theta with a given probability, and fields that are as likely as the estimate.
+Problem. A fit estimates parameters theta from records. Find intervals that
+contain the true theta with a given probability, and fields that are as likely as
+the estimate.
 
 Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their
-Application (1997), section 5.2. Ends by test inversion: Carpenter (1999), Journal of the
-Royal Statistical Society B 61, 159.
+Application (1997), section 5.2. Ends by test inversion: Carpenter (1999), Journal
+of the Royal Statistical Society B 61, 159.
 
 Steps:
 
 1. Simulate records from the estimate, and fit each of them from the estimate as a start.
 2. Bring each parameter to a scale on which its error is about normal (`Scale`).
 3. The error of a repetition is (estimate of the repetition - estimate)/width. The width
-   is in proportion to the square root of the correlation length, because a record holds
-   few of these.
+   is in proportion to the square root of the correlation length, because a record
+   holds few of these.
 4. Subtract the quantiles of the error, times the width, from the estimate: a first
    interval.
 5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its

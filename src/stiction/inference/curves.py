@@ -1,8 +1,8 @@
 """Measured curves of force against travel or time: peak, precursors and plateau of each test.
 
-Problem. Readings F_i carry white noise of standard deviation s. Find the peak, the drops
-before it (precursors: a part of the interface slips and comes to rest) and the plateau
-after it.
+Problem. Readings F_i carry white noise of standard deviation s. Find the peak,
+the drops before it (precursors: a part of the interface slips and comes to rest)
+and the plateau after it.
 
 Source. The range of white noise is in David and Nagaraja, Order Statistics (2003),
 section 10.5. The choice of thresholds and turning points is our own.
@@ -87,10 +87,11 @@ class Curve(Result):
     peak, peak_travel : float
         Largest force and its travel.
     drops : Drops
-        Precursors: drops before the peak. The error of each size is about twice the noise.
+        Precursors: drops before the peak. The error of each size is about twice
+        the noise.
     plateau, plateau_deviation : float
-        Mean and standard deviation of the force after the drop at the peak. NaN if the
-        record ends there.
+        Mean and standard deviation of the force after the drop at the peak. NaN
+        if the record ends there.
     """
 
     name: str
@@ -183,21 +184,22 @@ def read_curve(
     Parameters
     ----------
     source : path, DataFrame or (travel, force)
-        A text file or workbook, a folder of such files, a pandas table, or two arrays. A
-        table needs a column with force, stress or friction coefficient and a column with
-        travel or time. A file may hold several tests, either numbered in a column
-        ``test`` or separated by empty lines.
+        A text file or workbook, a folder of such files, a pandas table, or two
+        arrays. A table needs a column with force, stress or friction coefficient
+        and a column with travel or time. A file may hold several tests, either
+        numbered in a column ``test`` or separated by empty lines.
     force, travel : str or int, optional
-        Column, given by its name, heading or number from 0. By default the force is the
-        column called force, load, friction, ... and the travel is the column called
-        travel, displacement, extension, position, ... or else time.
+        Column, given by its name, heading or number from 0. By default the force
+        is the column called force, load, friction, ... and the travel is the
+        column called travel, displacement, extension, position, ... or else time.
     unit, travel_unit : str, optional
         Units of force and travel if the source states no units.
     speed : float, optional
         Speed of the crosshead, m/s. It turns time into travel.
     noise : float, optional
-        Standard deviation of a reading of the load cell, in SI. By default it is estimated
-        from neighbouring readings, which needs a load cell without a filter.
+        Standard deviation of a reading of the load cell, in SI. By default it is
+        estimated from neighbouring readings, which needs a load cell without a
+        filter.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`.
 
@@ -209,13 +211,14 @@ def read_curve(
     Raises
     ------
     InputError
-        If a file cannot be read, a unit is missing or unknown, columns are ambiguous, or
-        travel or time goes back.
+        If a file cannot be read, a unit is missing or unknown, columns are
+        ambiguous, or travel or time goes back.
 
     Warns
     -----
     AccuracyWarning
-        If readings are missing, all forces are negative, or a record ends at its peak.
+        If readings are missing, all forces are negative, or a record ends at its
+        peak.
 
     Examples
     --------

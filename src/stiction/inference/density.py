@@ -1,7 +1,7 @@
 """Density of a measured peak: the density of the onset, with the error of the load cell.
 
-Problem. Onsets T_1, ..., T_N were simulated, all of them above the bound b. Wanted is the
-density
+Problem. Onsets T_1, ..., T_N were simulated, all of them above the bound b.
+Wanted is the density
 
     p(y) = int f(T) phi((y - T)/e)/e dT
 
@@ -15,14 +15,14 @@ section 3.4.2. Kernels that keep the variance: section 6.1.2.
 Steps:
 
 1. Take v = log(T - b). Where the correlation length is long, many onsets lie just above
-   b, and kernels on T itself would leak below b. Without a bound, take one so far below
-   the onsets that the logarithm is straight.
+   b, and kernels on T itself would leak below b. Without a bound, take one so far
+   below the onsets that the logarithm is straight.
 2. Standardise v to mean 0 and variance 1. Its density then hardly changes between nodes.
 3. Replace the sorted sample by means of at most `GROUPS` groups, which are smaller in the
    tails.
 4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres drawn together
-   by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the logarithm in steps of
-   `STEP`.
+   by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the logarithm in
+   steps of `STEP`.
 5. Interpolate this logarithm between steps and nodes. Beyond the table it falls like a
    parabola.
 6. Integrate over v by the midpoint rule. It converges faster than any power of the step,

@@ -1,20 +1,21 @@
 """Designs of tests: the expected information before any test is made.
 
-Problem. Parameters theta have a prior. Compute how much a design, such as ten tests, is
-expected to tell about each parameter: the mean over campaigns of the divergence of
-posterior from prior,
+Problem. Parameters theta have a prior. Compute how much a design, such as ten
+tests, is expected to tell about each parameter: the mean over campaigns of the
+divergence of posterior from prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
-Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, by nested Monte Carlo.
+Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, by nested Monte
+Carlo.
 
 Steps, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
 2. Draw the peaks from the same simulated onsets that give the likelihood.
 3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`).
-   Known parameters keep their drawn values. If the posterior lies between the points of a
-   coarse grid, draw the box closer around the true parameters.
+   Known parameters keep their drawn values. If the posterior lies between the
+   points of a coarse grid, draw the box closer around the true parameters.
 4. Take the divergence of each marginal posterior. I is the mean over campaigns.
 
 `stiction.inference.widths` answers the same question for a fit or a posterior.
@@ -72,22 +73,22 @@ def design_of_tests(
 ) -> xr.Dataset:
     """Estimate how much each design of tests will tell: narrower intervals, or information.
 
-    If `random` is a fit or a posterior of `infer`, the result holds the expected widths
-    of the intervals of mean and scatter between specimens, and the expected design
-    stress. If a `prior` of other parameters is given, the result holds the expected
-    information about each parameter.
+    If `random` is a fit or a posterior of `infer`, the result holds the expected
+    widths of the intervals of mean and scatter between specimens, and the
+    expected design stress. If a `prior` of other parameters is given, the result
+    holds the expected information about each parameter.
 
     Parameters
     ----------
     problem, random, prior, method, samples, seed, workers, progress
         As in `infer`.
     designs : mapping
-        Designs by name. A design is a number of tests, a mapping of lengths (m) to
-        numbers of tests, or a table ``{"tests": ..., "known": [...]}``, in which
-        ``known`` lists parameters of the prior that are known from other measurements.
-        For a fit or a posterior, a design is ``{"tests": ..., "profiles": ...}``, with
-        numbers of further tests and profiles. The default is 5, 10, 20 or 40 tests, or 2,
-        5 or 10 profiles.
+        Designs by name. A design is a number of tests, a mapping of lengths (m)
+        to numbers of tests, or a table ``{"tests": ..., "known": [...]}``, in
+        which ``known`` lists parameters of the prior that are known from other
+        measurements. For a fit or a posterior, a design is ``{"tests": ...,
+        "profiles": ...}``, with numbers of further tests and profiles. The
+        default is 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
     probability : float
         Probability of the design stress for a fit or a posterior.
     load_cell_error : float
@@ -100,13 +101,13 @@ def design_of_tests(
     Returns
     -------
     xarray.Dataset
-        Over 'design' and 'parameter': `information`, the expected divergence of the
-        posterior of a parameter from its prior (nats, NaN if the parameter is known), and
-        its `standard_error`. For a fit or a posterior: `width`, the expected width of the
-        90 % interval, with its `standard_error`. Then `design_stress` over 'design' is
-        the expected design stress, Pa, and 90 % of the designs will lie between
-        `design_low` and `design_high`. The first design, 'now', stands for the present
-        measurements.
+        Over 'design' and 'parameter': `information`, the expected divergence of
+        the posterior of a parameter from its prior (nats, NaN if the parameter is
+        known), and its `standard_error`. For a fit or a posterior: `width`, the
+        expected width of the 90 % interval, with its `standard_error`. Then
+        `design_stress` over 'design' is the expected design stress, Pa, and 90 %
+        of the designs will lie between `design_low` and `design_high`. The first
+        design, 'now', stands for the present measurements.
 
     Raises
     ------

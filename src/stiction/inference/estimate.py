@@ -4,26 +4,27 @@ Problem. Values y = v(z) + e were measured along records. z is a Gaussian field 
 correlation, v a map to a marginal, and e white normal noise. Find the marginal, the
 spectrum and the noise.
 
-Sources. Composite likelihood: Varin, Reid and Firth (2011), Statistica Sinica 21, 5. The
-criterion of Akaike (1974), IEEE Transactions on Automatic Control 19, 716. Steps 3, 5 and
-6 are our own.
+Sources. Composite likelihood: Varin, Reid and Firth (2011), Statistica Sinica 21,
+5. The criterion of Akaike (1974), IEEE Transactions on Automatic Control 19, 716.
+Steps 3, 5 and 6 are our own.
 
 Steps:
 
 1. Fit the marginal to the values, as if they were independent (`marginal_fit`).
 2. Fit spectrum and noise to the periodograms with the map of this marginal (`whittle`).
-   The noise widens the values, so repeat both steps once with the noise that was found.
+   The noise widens the values, so repeat both steps once with the noise that was
+   found.
 3. Widen the marginal by the variance that mean and trend have taken from the values on
    average.
 4. Score a family by its mean log likelihood times the number of independent values (step
    5), less the number of estimated parameters.
 5. Families fitted to the same values agree in mean and variance. The logarithm of the
-   ratio of their densities then has Hermite orders of z from 3 on. Its sum over N values
-   with correlations rho_ij has mean and variance of a sum over N^2/sum rho_ij^3
-   independent values.
+   ratio of their densities then has Hermite orders of z from 3 on. Its sum over N
+   values with correlations rho_ij has mean and variance of a sum over N^2/sum
+   rho_ij^3 independent values.
 6. If records are of different specimens, scale them as if they came from one specimen
-   (`between`). This needs the field's own share in the scatter of means, so repeat the
-   fit `ROUNDS` times.
+   (`between`). This needs the field's own share in the scatter of means, so
+   repeat the fit `ROUNDS` times.
 """
 
 import math

@@ -1,7 +1,7 @@
 """A random field from measured profiles, with intervals and doubts.
 
-Problem. Records are samples of one random field with noise. Find the field, and how well
-the records determine it.
+Problem. Records are samples of one random field with noise. Find the field, and
+how well the records determine it.
 
 Sources. The parts are in `records`, `window`, `whittle`, `marginal_fit`, `estimate`,
 `bootstrap`, `between` and `specimens`, with their sources.
@@ -13,17 +13,17 @@ Steps:
 2. Fit each family of marginals together with the spectrum, and order them by their scores
    (`estimate`).
 3. Fit records that are simulated from the best family, and from others that may be true
-   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and go on
-   with 2.
+   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and
+   go on with 2.
 4. Take intervals from the repetitions. If records are of different specimens, take the
    intervals of mean and scatter from the posterior by the levels of the records
    (`specimens`).
 5. Compare the distances of the data from marginal and spectrum with the distances of the
-   repetitions. Logarithms of these distances are about normal, which gives p-values by
-   Student's distribution.
+   repetitions. Logarithms of these distances are about normal, which gives
+   p-values by Student's distribution.
 6. Draw likely fields from the families in proportion to their weights, evenly by a
-   sequence of Niederreiter (Random Number Generation and Quasi-Monte Carlo Methods, 1992,
-   chapter 3).
+   sequence of Niederreiter (Random Number Generation and Quasi-Monte Carlo
+   Methods, 1992, chapter 3).
 """
 
 import math
@@ -118,35 +118,38 @@ class FieldFit(Result):
     Attributes
     ----------
     field : RandomField
-        The fitted field for simulation, without measurement noise and with the mean mode.
+        The fitted field for simulation, without measurement noise and with the
+        mean mode.
     parameters : dict of str to float
-        Estimates in SI. ``efolding_length`` (m) is the lag at which the correlation of z
-        falls to 1/e. ``mean`` and ``standard_deviation`` belong to the field.
-        ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have their names in study files.
-        ``noise`` is the standard deviation of the measurement noise, and ``between`` the
-        coefficient of variation between specimens.
+        Estimates in SI. ``efolding_length`` (m) is the lag at which the
+        correlation of z falls to 1/e. ``mean`` and ``standard_deviation`` belong
+        to the field. ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have their
+        names in study files. ``noise`` is the standard deviation of the
+        measurement noise, and ``between`` the coefficient of variation between
+        specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval of each parameter. The interval of the noise may begin at zero.
-        Intervals of the bounds of the marginal end outside of the values. Intervals of
-        exponent and anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to 20.
-        With `between`, the intervals of ``mean`` and ``between`` come from the posterior
-        by the levels of the records.
+        Bootstrap interval of each parameter. The interval of the noise may begin
+        at zero. Intervals of the bounds of the marginal end outside of the
+        values. Intervals of exponent and anisotropy end at the searched ranges,
+        0.65 to 16 and 0.05 to 20. With `between`, the intervals of ``mean`` and
+        ``between`` come from the posterior by the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
-        Fits to records simulated from `field`, as another measurement might have given
-        them.
+        Fits to records simulated from `field`, as another measurement might have
+        given them.
     families : dict of str to Goodness
         Quality of each requested family of marginals, the best family first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float
-        Probability that records of the fitted ``marginal`` and ``spectrum`` lie as far
-        from their fits as the data do. A small probability means that the family does not
-        fit. For several records without `between`, ``level`` is the probability that
-        their means scatter as much.
+        Probability that records of the fitted ``marginal`` and ``spectrum`` lie
+        as far from their fits as the data do. A small probability means that the
+        family does not fit. For several records without `between`, ``level`` is
+        the probability that their means scatter as much.
     missing : (int, int)
-        Number of points without a value, which are left out, and number of all points.
+        Number of points without a value, which are left out, and number of all
+        points.
     doubts : tuple of str
         Reasons not to trust the fit. Empty without doubts.
     """
@@ -191,11 +194,12 @@ class FieldFit(Result):
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
         """Return equally likely random interfaces, for the failure probability under all of them.
 
-        Each is the estimate less the error of a repetition, with the bias and scatter of
-        the intervals. Families of the marginal are drawn in proportion to their `weight`.
-        With `between`, each interface has a mean and a factor between specimens, drawn
-        from their posterior (`stiction.inference.specimens`). A longer list begins with a
-        shorter one of the same seed.
+        Each is the estimate less the error of a repetition, with the bias and
+        scatter of the intervals. Families of the marginal are drawn in proportion
+        to their `weight`. With `between`, each interface has a mean and a factor
+        between specimens, drawn from their posterior
+        (`stiction.inference.specimens`). A longer list begins with a shorter one
+        of the same seed.
 
         Parameters
         ----------
@@ -264,7 +268,8 @@ class FieldFit(Result):
         length = truth.field(self.quantity).spectrum.efolding_length
         cvs = np.array([one.standard_deviation / one.mean for one in fields])
         lengths = np.array([one.spectrum.efolding_length for one in fields])
-        # The variance of a mean grows with the variance of the field and its correlation length.
+        # The variance of a mean grows with the variance of the field and its
+        # correlation length.
         share = np.minimum(cvs**2 * lengths / ((deviation / mean) ** 2 * length), 1e3)
         within = np.minimum(np.outer(share, truth.within), np.log1p(cvs**2)[:, None])
         if not self._families:  # all records are of one specimen
@@ -328,41 +333,43 @@ def fit_field(
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points, such as
-        `stiction.read_profile` returns. Missing values (NaN, missing points, filled
-        values) are left out. Plain arrays in SI have a value at each node of `interface`,
-        and shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples, nx, ny).
-        Several profiles are samples of one field and may differ in length.
+        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points,
+        such as `stiction.read_profile` returns. Missing values (NaN, missing
+        points, filled values) are left out. Plain arrays in SI have a value at
+        each node of `interface`, and shape (nodes,) or (samples, nodes), on a
+        plane (nx, ny) or (samples, nx, ny). Several profiles are samples of one
+        field and may differ in length.
     interface : Interface, optional
-        Needed for arrays without coordinates. A warning is issued if it is too short, or
-        its nodes too coarse, for the fitted field.
+        Needed for arrays without coordinates. A warning is issued if it is too
+        short, or its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous
-        distribution of `scipy.stats`. The best of several is chosen, and `families` in
-        the result compares them. A table fixes parameters: ``{"type": "beta", "low": 0,
-        "high": 2e6}``. By default both bounds of 'beta' are estimated, and the lower
-        bound of the others is 0.
+        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
+        continuous distribution of `scipy.stats`. The best of several is chosen,
+        and `families` in the result compares them. A table fixes parameters:
+        ``{"type": "beta", "low": 0, "high": 2e6}``. By default both bounds of
+        'beta' are estimated, and the lower bound of the others is 0.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'. A table fixes parameters,
-        such as ``{"type": "power_law", "exponent": 4.0}``. If it has ``"truncation"`` or
-        ``"power_kept"``, the spectrum of the record ends there. Otherwise only the field
-        has its usual end.
+        'power_law', 'squared_exponential' or 'exponential'. A table fixes
+        parameters, such as ``{"type": "power_law", "exponent": 4.0}``. If it has
+        ``"truncation"`` or ``"power_kept"``, the spectrum of the record ends
+        there. Otherwise only the field has its usual end.
     detrend : int
-        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that
-        mean and trend take from the values on average is added to the estimate, except
-        for families of `scipy.stats` with a fixed loc or scale.
+        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The
+        scatter that mean and trend take from the values on average is added to
+        the estimate, except for families of `scipy.stats` with a fixed loc or
+        scale.
     noise : bool or float
-        Whether to estimate white, normal measurement noise along with the field, or its
-        standard deviation (SI) if it is known.
+        Whether to estimate white, normal measurement noise along with the field,
+        or its standard deviation (SI) if it is known.
     anisotropy : bool or float
-        Ratio of the correlation lengths of maps along y and x. False stands for 1, and True
-        estimates it.
+        Ratio of the correlation lengths of maps along y and x. False stands for
+        1, and True estimates it.
     between : bool, str or sequence of str
-        Whether records come from different specimens, each with its own factor of mean 1.
-        The coefficient of variation ``between`` of this factor is then estimated. Its
-        family is one of 'lognormal', 'normal' (above zero) and 'weibull'. Several
-        families, or True for all, are averaged. A warning states that fewer than five
-        specimens determine the scatter poorly.
+        Whether records come from different specimens, each with its own factor of
+        mean 1. The coefficient of variation ``between`` of this factor is then
+        estimated. Its family is one of 'lognormal', 'normal' (above zero) and
+        'weibull'. Several families, or True for all, are averaged. A warning
+        states that fewer than five specimens determine the scatter poorly.
     prior : mapping, optional
         Priors of the mean, ``"strength.mean"``, and of the coefficient of variation,
         ``"between.strength"``, as in `infer`. By default the first is flat in its
@@ -391,19 +398,20 @@ def fit_field(
     Raises
     ------
     InputError
-        If units are unknown, points repeat or are not equally spaced, neighbouring points
-        are not correlated, records are constant or short, or values lie outside the bounds
-        of the marginal.
+        If units are unknown, points repeat or are not equally spaced,
+        neighbouring points are not correlated, records are constant or short, or
+        values lie outside the bounds of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If values are outliers or dropouts, profiles repeat others, or a family is left
-        out because it cannot be fitted to records simulated from it. Also for each of the
-        `doubts`: records hold fewer than ten correlation lengths, a p-value is below 1 %
-        (of ``level`` if records of different specimens lack `between`), the noise hides
-        the cut-off of the spectrum, a parameter lies at the end of the searched range, or
-        fewer than five specimens shall determine the scatter between them.
+        If values are outliers or dropouts, profiles repeat others, or a family is
+        left out because it cannot be fitted to records simulated from it. Also
+        for each of the `doubts`: records hold fewer than ten correlation lengths,
+        a p-value is below 1 % (of ``level`` if records of different specimens
+        lack `between`), the noise hides the cut-off of the spectrum, a parameter
+        lies at the end of the searched range, or fewer than five specimens shall
+        determine the scatter between them.
 
     Notes
     -----
@@ -416,9 +424,9 @@ def fit_field(
     Families are compared by Akaike's criterion for a number of independent values. N
     values with correlations rho_ij count as N^2/sum rho_ij^3.
 
-    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section 5.2),
-    their upper and lower ends from fields of longer and shorter correlation (Carpenter,
-    1999).
+    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997,
+    section 5.2), their upper and lower ends from fields of longer and shorter
+    correlation (Carpenter, 1999).
 
     Examples
     --------

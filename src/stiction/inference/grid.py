@@ -1,10 +1,11 @@
 """The posterior on a grid that closes in on its mass, and draws from it.
 
-Problem. The prior is uniform in the unit cube. Compute the posterior density L(u)/Z of the
-parameters u from the likelihood L, with the evidence Z = int L du. L may be narrow.
+Problem. The prior is uniform in the unit cube. Compute the posterior density
+L(u)/Z of the parameters u from the likelihood L, with the evidence Z = int L du.
+L may be narrow.
 
-Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013), section
-10.1. Closing in is our own.
+Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013),
+section 10.1. Closing in is our own.
 
 Steps:
 

@@ -1,10 +1,10 @@
 """Parameters of a random interface from the peaks of repeated tests.
 
-Problem. Find the posterior p(theta | y) of parameters theta with a prior from measured
-peaks y.
+Problem. Find the posterior p(theta | y) of parameters theta with a prior from
+measured peaks y.
 
-Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis (2013),
-section 10.1. The choice of the box is our own.
+Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis
+(2013), section 10.1. The choice of the box is our own.
 
 Steps:
 
@@ -12,8 +12,8 @@ Steps:
    `stiction.inference.joined`.
 2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
 3. For an expensive method, find the posterior by the local criterion first, if it
-   applies. Its box, slightly widened, is the relevant part of the prior. Otherwise take
-   the whole prior.
+   applies. Its box, slightly widened, is the relevant part of the prior.
+   Otherwise take the whole prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on a grid (`grid`).
 5. If the posterior reaches an end of the box, widen the box on this side, and repeat step
    4.
@@ -104,49 +104,52 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
 
-    There are two uses. With a fit, or with interfaces and no `prior` of other parameters,
-    the mean strength and its scatter between specimens are inferred. With a `prior` of
-    other parameters, these parameters are inferred.
+    There are two uses. With a fit, or with interfaces and no `prior` of other
+    parameters, the mean strength and its scatter between specimens are inferred.
+    With a `prior` of other parameters, these parameters are inferred.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        For mean and scatter: a fit, whose records are joined with the peaks, or equally
-        likely interfaces, whose fields within a specimen count. For other parameters: one
-        interface, in which the parameters of `prior` are replaced.
+        For mean and scatter: a fit, whose records are joined with the peaks, or
+        equally likely interfaces, whose fields within a specimen count. For other
+        parameters: one interface, in which the parameters of `prior` are
+        replaced.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress or force at which each specimen slid, in `unit`. For specimens
-        of several lengths, map each length (m) to its peaks, ``{0.1: [...], 0.2:
-        [...]}``. The node spacing is the spacing of the problem. The result of
-        `read_peaks` is accepted too.
+        Mean shear stress or force at which each specimen slid, in `unit`. For
+        specimens of several lengths, map each length (m) to its peaks, ``{0.1:
+        [...], 0.2: [...]}``. The node spacing is the spacing of the problem. The
+        result of `read_peaks` is accepted too.
     prior : mapping, optional
-        For mean and scatter: ``"strength.mean"``, by default flat in its logarithm, and
-        ``"between.strength"``, the coefficient of variation between specimens, by default
-        half-Cauchy of scale 0.1. For other parameters, their independent priors: a frozen
-        continuous `scipy.stats` distribution, a range ``(low, high)``, or ``{"low": ...,
-        "high": ..., "spacing": "log"}``. Keys are the keys of a sweep, such as
+        For mean and scatter: ``"strength.mean"``, by default flat in its
+        logarithm, and ``"between.strength"``, the coefficient of variation
+        between specimens, by default half-Cauchy of scale 0.1. For other
+        parameters, their independent priors: a frozen continuous `scipy.stats`
+        distribution, a range ``(low, high)``, or ``{"low": ..., "high": ...,
+        "spacing": "log"}``. Keys are the keys of a sweep, such as
         ``"correlation_length"`` or ``"marginal.low"`` for the strength, and
-        ``"residual_strength.marginal.high"`` or ``"problem.friction.weakening_rate"``.
+        ``"residual_strength.marginal.high"`` or
+        ``"problem.friction.weakening_rate"``.
     between : str or sequence of str, optional
         Families of the factor between specimens, as in `fit_field`, with equal prior
         weights. By default the families of the fit, or all families.
     method : LocalCriterion, Equilibrium or any other
         Method that computes the onset. An expensive method is guided by the local
-        criterion, which first finds the relevant part of the prior. This part grows until
-        it contains the posterior.
+        criterion, which first finds the relevant part of the prior. This part
+        grows until it contains the posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`. If `Peaks` are given, it is
-        in Pa, in N, or a friction coefficient.
+        Standard deviation of the error of a peak, in `unit`. If `Peaks` are
+        given, it is in Pa, in N, or a friction coefficient.
     unit : str
-        Unit of peaks and load-cell error. A unit of force needs the ``thickness`` of a
-        specimen, the ``width`` of a line, or a plane. The unit "1" stands for friction
-        coefficients, which need ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error. A unit of force needs the ``thickness``
+        of a specimen, the ``width`` of a line, or a plane. The unit "1" stands
+        for friction coefficients, which need ``Load(normal_pressure=...)``.
     samples : int, optional
-        Simulated specimens at each point, by default 2000 by the local criterion and 500
-        by equilibrium. For mean and scatter, simulated specimens for each field, by
-        default 200 by the local criterion and 100 by other methods.
+        Simulated specimens at each point, by default 2000 by the local criterion
+        and 500 by equilibrium. For mean and scatter, simulated specimens for each
+        field, by default 200 by the local criterion and 100 by other methods.
     seed : int
         Not negative. All points share the samples, so that the likelihood is smooth.
     workers, progress
@@ -155,21 +158,22 @@ def infer(
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats). ArviZ draws and compares
-        `to_arviz()`.
+        With `draws`, `mean`, `interval` and `information` (nats). ArviZ draws and
+        compares `to_arviz()`.
 
     Raises
     ------
     InputError
-        If any argument is invalid, or no parameters in the prior can produce the peaks. The
-        message then names the bound that must move.
+        If any argument is invalid, or no parameters in the prior can produce the
+        peaks. The message then names the bound that must move.
 
     Warns
     -----
     AccuracyWarning
-        If the posterior piles up at an end of the prior, the method is not accurate
-        there, or few samples are simulated for the number of peaks. If profiles and peaks
-        contradict each other, with the p-value of `stiction.statistics.agreement`.
+        If the posterior piles up at an end of the prior, the method is not
+        accurate there, or few samples are simulated for the number of peaks. If
+        profiles and peaks contradict each other, with the p-value of
+        `stiction.statistics.agreement`.
     UserWarning
         Before a simulation of more than a minute, with its time and with faster
         alternatives.
@@ -184,10 +188,11 @@ def infer(
     to emcee or dynesty. After an interruption by Ctrl-C, an equal call in the same
     session goes on with the finished onsets.
 
-    Mean and scatter between specimens are integrated on a grid, with sixty fields within
-    a specimen from the repetitions of the fit (`stiction.inference.specimens`). The
-    families of the factor between specimens are averaged. `families` of the result has
-    their probabilities, and `agreement` compares the peaks with the profiles alone.
+    Mean and scatter between specimens are integrated on a grid, with sixty fields
+    within a specimen from the repetitions of the fit
+    (`stiction.inference.specimens`). The families of the factor between specimens
+    are averaged. `families` of the result has their probabilities, and
+    `agreement` compares the peaks with the profiles alone.
 
     Examples
     --------

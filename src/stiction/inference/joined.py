@@ -231,7 +231,8 @@ def simulated_onsets(
     by_field = in_threads(
         lambda place: onsets(place, at), range(fields), workers or usable_cores()
     )
-    # Standardised densities differ little between fields. Their mean has a smaller error.
+    # Standardised densities differ little between fields. Their mean has a
+    # smaller error.
     table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
     densities = tuple(known._replace(table=table) for _, known in by_field)
     return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)

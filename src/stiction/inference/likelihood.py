@@ -1,8 +1,9 @@
 """Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities.
 
-Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error were
-measured on specimens with onset T. Compute the likelihood L(theta) = prod_j p(y_j |
-theta) for any theta, where each density p needs hundreds of simulated onsets.
+Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error
+were measured on specimens with onset T. Compute the likelihood L(theta) = prod_j
+p(y_j | theta) for any theta, where each density p needs hundreds of simulated
+onsets.
 
 Sources. Steps 1 to 3 and 5 are our own. Step 4 is a control variate (Hammersley and
 Handscomb, Monte Carlo Methods, 1964, section 5.5), applied to quantiles in place of a
@@ -17,12 +18,13 @@ Steps:
 3. Simulate onsets at every node of the product grid with the same draws, so that L is
    smooth.
 4. If the method is expensive and the local criterion applies, simulate by the method only
-   at the corners and few nodes between them (`COARSE`), and by the local criterion at all
-   nodes. Move onsets by the local criterion by the difference of both quantile functions.
-   Do so only if the onsets by both methods have a correlation above `MIN_CORRELATION`.
+   at the corners and few nodes between them (`COARSE`), and by the local
+   criterion at all nodes. Move onsets by the local criterion by the difference of
+   both quantile functions. Do so only if the onsets by both methods have a
+   correlation above `MIN_CORRELATION`.
 5. Tabulate the density at each node (`stiction.inference.density`). Between nodes the
-   logarithm of the standardised density, its bound, mean and spread are linear in each
-   parameter.
+   logarithm of the standardised density, its bound, mean and spread are linear in
+   each parameter.
 """
 
 import itertools

@@ -1,24 +1,27 @@
 """Marginals by maximum likelihood, with the measurement noise of the values.
 
 Problem. Values y = x + e carry normal noise e of standard deviation s. Find the
-parameters of the distribution F of x within a family that maximise the likelihood of y.
+parameters of the distribution F of x within a family that maximise the likelihood
+of y.
 
-Sources. The climb is Fisher's scoring with damping (Levenberg, 1944, Quarterly of Applied
-Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are taken for
-independent, which leaves the estimate consistent (a composite likelihood: Varin, Reid and
-Firth, 2011, Statistica Sinica 21, 5). The bootstrap gives its error.
+Sources. The climb is Fisher's scoring with damping (Levenberg, 1944, Quarterly of
+Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are
+taken for independent, which leaves the estimate consistent (a composite
+likelihood: Varin, Reid and Firth, 2011, Statistica Sinica 21, 5). The bootstrap
+gives its error.
 
 Steps:
 
 1. If the noise is negligible, the likelihood is the density at the values. Otherwise
-   count the values in `BINS` bins. The probability of a bin comes from F convolved with
-   the noise, so that values may lie beyond a bound of F.
+   count the values in `BINS` bins. The probability of a bin comes from F
+   convolved with the noise, so that values may lie beyond a bound of F.
 2. Search scale and shape as logarithms. For 'beta' search both shapes, and the distances
    of free bounds from the mean. A shape at a free bound is at least 1, because the
    likelihood would grow without limit as the bound nears a value.
 3. Climb by steps (M + damping diag(M))^-1 g with score g and information M. Divide the
-   damping by 10 after a step that raises the likelihood, and multiply it by 10 otherwise.
-   Hold parameters that push against their limits. Stop after a small gain.
+   damping by 10 after a step that raises the likelihood, and multiply it by 10
+   otherwise. Hold parameters that push against their limits. Stop after a small
+   gain.
 4. Families of `scipy.stats` are fitted by scipy to the values, drawn together to the
    variance that they would have without noise.
 """

@@ -167,18 +167,19 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    Plot the peaks in the order of the tests first. Peaks that drift are not a sample of one
-    distribution.
+    Plot the peaks in the order of the tests first. Peaks that drift are not a
+    sample of one distribution.
 
     Parameters
     ----------
     source : path or Curves
-        Curves from `stiction.read_curve`, or a table with a heading and one test in each
-        line, separated by commas, semicolons, tabs or blanks. The peaks are the column
-        called peak, stress, strength, force or friction, with its unit: ``peak [MPa]``.
-        Forces have the unit N or kN, friction coefficients the unit 1 or -. Without such
-        a name, the peaks are the only column with a suitable unit. A column ``length
-        [mm]`` may hold the length of the specimen. Other columns are not read.
+        Curves from `stiction.read_curve`, or a table with a heading and one test
+        in each line, separated by commas, semicolons, tabs or blanks. The peaks
+        are the column called peak, stress, strength, force or friction, with its
+        unit: ``peak [MPa]``. Forces have the unit N or kN, friction coefficients
+        the unit 1 or -. Without such a name, the peaks are the only column with a
+        suitable unit. A column ``length [mm]`` may hold the length of the
+        specimen. Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file does not state it.
     missing, decimal, skip, sheet
@@ -192,8 +193,8 @@ def read_peaks(
     Raises
     ------
     InputError
-        If a unit is missing or unknown, columns are ambiguous, a number is missing, or
-        the file is the curve of one test.
+        If a unit is missing or unknown, columns are ambiguous, a number is
+        missing, or the file is the curve of one test.
 
     Examples
     --------

@@ -36,14 +36,14 @@ class Posterior(Result):
     draws : dict of (draws,) arrays
         Draws of each parameter, in its own unit.
     information : dict of float
-        Kullback-Leibler divergence of the marginal posterior of each parameter from its
-        prior, nats. Halving a uniform range gives ln 2 = 0.69.
+        Kullback-Leibler divergence of the marginal posterior of each parameter
+        from its prior, nats. Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
         Logarithm of the density of the peaks under the prior, to compare models.
     monte_carlo_error : float
-        Standard error of a posterior mean from the finite number of simulated samples,
-        over the posterior standard deviation. It is about the square root of measured
-        over simulated peaks.
+        Standard error of a posterior mean from the finite number of simulated
+        samples, over the posterior standard deviation. It is about the square
+        root of measured over simulated peaks.
     method : str
         Method that computed the onset.
     peaks : Peaks
@@ -194,8 +194,9 @@ class Posterior(Result):
     def to_arviz(self) -> Any:
         """Return posterior, prior, log-likelihood, prediction and data for ArviZ.
 
-        The result is an `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on. The draws
-        are independent. They are cut into four chains because ArviZ compares chains.
+        The result is an `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on.
+        The draws are independent. They are cut into four chains because ArviZ
+        compares chains.
 
         Raises
         ------

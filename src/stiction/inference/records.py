@@ -117,7 +117,8 @@ def _spacing(x: Array, name: str) -> float:
     spacing = float(np.median(steps))
     if not steps.min() > 1e-6 * spacing:
         raise InputError(f"{name} repeats: there are two values at {x[steps.argmin()]:.9g} m")
-    # Each step is a whole number of spacings, although few printed digits make it uneven.
+    # Each step is a whole number of spacings, although few printed digits make it
+    # uneven.
     spacing = float((x[-1] - x[0]) / np.maximum(np.round(steps / spacing), 1.0).sum())
     place = (x - x[0]) / spacing
     off = np.abs(place - np.round(place))

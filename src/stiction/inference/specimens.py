@@ -1,10 +1,10 @@
 """Mean and scatter between specimens, from profiles and peaks: one posterior on a grid.
 
 Problem. Specimen k has strength m b_k f(x): a mean m, a factor b_k of mean 1 and
-coefficient of variation s, and a field f of mean 1 within the specimen. Measured are the
-levels (means) of some specimen of mean strength c. Each measured specimen has its own
-factor. Find the posterior of m, s and the family of b, averaged over equally likely
-fields within.
+coefficient of variation s, and a field f of mean 1 within the specimen. Measured
+are the levels (means) of some specimen of mean strength c. Each measured specimen
+has its own factor. Find the posterior of m, s and the family of b, averaged over
+equally likely fields within.
 
 Sources. Integration of hierarchical models: Gelman and others, Bayesian Data Analysis
 (2013), chapter 5. Half-Cauchy prior of a scatter: Gelman (2006), Bayesian Analysis 1,
@@ -13,14 +13,15 @@ Sources. Integration of hierarchical models: Gelman and others, Bayesian Data An
 Steps, with x = log(m b/reference), the logarithm of the strength of one specimen:
 
 1. Simulate onsets T of each field at the reference mean. This is sufficient if T(c)/c
-   does not depend on c. Otherwise simulate at `ONSET_MEANS` means and interpolate T(c)/c,
-   sample by sample.
+   does not depend on c. Otherwise simulate at `ONSET_MEANS` means and interpolate
+   T(c)/c, sample by sample.
 2. Tabulate the likelihood of each measured number as a function of x: the normal density
    of the logarithm of a level, or the density of simulated onsets at a peak
    (`stiction.inference.density`).
 3. Take `SCATTER_CELLS` values of s at equal shares of its prior, and `MEAN_CELLS` values
-   of log m. The likelihood of a number at (family, s, m) is the integral of step 2 over
-   the density of x, which is the density of log b shifted by log m: a convolution.
+   of log m. The likelihood of a number at (family, s, m) is the integral of step
+   2 over the density of x, which is the density of log b shifted by log m: a
+   convolution.
 4. Multiply over the numbers, and close in on the means with posterior mass.
 5. Fields are equally likely given the profiles. The peaks change their shares by the mean
    of the likelihood over (family, s, m).

@@ -1,15 +1,17 @@
 """Whittle likelihood of records whose field is mapped from a Gaussian field, with noise on top.
 
-Problem. A record y = v(z) + e has periodogram I_k. For a spectrum of z, a map v and a noise
-variance its expectation is E_k. Find the parameters with the greatest likelihood
+Problem. A record y = v(z) + e has periodogram I_k. For a spectrum of z, a map v
+and a noise variance its expectation is E_k. Find the parameters with the greatest
+likelihood
 
     L = -sum_k w_k (log E_k + I_k/E_k).
 
-Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation for a
-finite window it is the debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and
-Early (2019), Biometrika 106, 251, and on planes of Guillaumin, Sykulski, Olhede and
-Simons (2022), Journal of the Royal Statistical Society B 84, 1526. Correlations of mapped
-fields: Grigoriu, Applied Non-Gaussian Processes (1995).
+Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation
+for a finite window it is the debiased likelihood of Sykulski, Olhede, Guillaumin,
+Lilly and Early (2019), Biometrika 106, 251, and on planes of Guillaumin,
+Sykulski, Olhede and Simons (2022), Journal of the Royal Statistical Society B 84,
+1526. Correlations of mapped fields: Grigoriu, Applied Non-Gaussian Processes
+(1995).
 
 Steps:
 
@@ -21,10 +23,12 @@ Steps:
    parameter, so that its error in a short record does not disturb the shape of the
    spectrum.
 4. Add a floor of a thousandth of the highest power to I_k and E_k. A spectrum that is cut
-   off has almost no power at high wavenumbers, where rounding and higher orders of the
-   map would decide. The score stays unbiased, and power below the floor ceases to count.
+   off has almost no power at high wavenumbers, where rounding and higher orders
+   of the map would decide. The score stays unbiased, and power below the floor
+   ceases to count.
 5. Take the best point of a coarse grid of parameters, and climb by scoring
-   (`marginal_fit.climb`). Fisher's information is sum w d d^T with d = d log E/d theta.
+   (`marginal_fit.climb`). Fisher's information is sum w d d^T with d = d log E/d
+   theta.
 
 Departures. The map v, the noise and the floor are our own.
 """
@@ -50,8 +54,9 @@ RANGES = {
     "variance": (1e-200, 1e200),
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
     "anisotropy": (0.05, 20.0),
-    # A negative share means less power at high wavenumbers than the field alone has, by chance. If
-    # it were cut at zero, the errors of small noises could not be estimated.
+    # A negative share means less power at high wavenumbers than the field alone
+    # has, by chance. If it were cut at zero, the errors of small noises could not
+    # be estimated.
     "noise_share": (-0.5, 0.95),
 }
 """Ends of the searched range of each parameter. The noise is given by its share of the variance."""

@@ -1,10 +1,11 @@
 """Expected widths of intervals and of the design after further tests or profiles.
 
-Problem. Specimens were measured, and their mean, scatter and fields have a posterior. How
-wide will the intervals and the design stress be after further measurements?
+Problem. Specimens were measured, and their mean, scatter and fields have a
+posterior. How wide will the intervals and the design stress be after further
+measurements?
 
-Source. Expectations over simulated campaigns, as in Lindley (1956), Annals of Mathematical
-Statistics 27, 986, with a width in place of information.
+Source. Expectations over simulated campaigns, as in Lindley (1956), Annals of
+Mathematical Statistics 27, 986, with a width in place of information.
 
 Steps, for each design and each simulated campaign:
 

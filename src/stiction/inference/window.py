@@ -1,17 +1,17 @@
 """The exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
 Problem. A record is not a period of the interface. Find the expectation of its
-periodogram after taper h (zero at gaps) and removal of a trend by the projection P. It is
-linear in the correlation C:
+periodogram after taper h (zero at gaps) and removal of a trend by the projection
+P. It is linear in the correlation C:
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
-with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing and the
-loss of low wavenumbers to the trend.
+with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing
+and the loss of low wavenumbers to the trend.
 
-Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, for a
-line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
-Statistical Society B 84, 1526, for planes with gaps.
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106,
+251, for a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
+Journal of the Royal Statistical Society B 84, 1526, for planes with gaps.
 
 Steps:
 
@@ -21,8 +21,8 @@ Steps:
    transform gives the expectation at all of them.
 3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
 4. The correlation comes from a transform of the spectrum on a period of `ROOM` records.
-   Add the density at all wavenumbers that look alike on the grid, the nearest exactly and
-   the farther aliases at few wavenumbers, because they are smooth.
+   Add the density at all wavenumbers that look alike on the grid, the nearest
+   exactly and the farther aliases at few wavenumbers, because they are smooth.
 
 Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
 """
@@ -101,7 +101,8 @@ class RecordWindow:
         unit = np.zeros(lags)
         unit[(0,) * unit.ndim] = 1.0
         self.white = self.expectation(unit)  # of white noise
-        # One half if both k and -k are there or k is its own opposite, and 0 for the mean.
+        # One half if both k and -k are there or k is its own opposite, and 0 for
+        # the mean.
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0

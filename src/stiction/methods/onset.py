@@ -103,19 +103,22 @@ def onset(
     method : LocalCriterion, Equilibrium or Rupture
         The method. It has no default.
     gaps : {"refuse", "fill"}
-        Whether to refuse missing values (NaN) or fill them as `stiction.read_profile` does.
+        Whether to refuse missing values (NaN) or fill them as
+        `stiction.read_profile` does.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable gets (done, total).
+        True shows progress on standard error after a second. A callable gets
+        (done, total).
 
     Returns
     -------
     xarray.Dataset
-        Over 'sample': `critical_load`, `critical_stress`, `first_instability` (Pa),
-        `critical_position` (m), and the variables that the method adds. A normal pressure adds
-        `friction_coefficient`; a thickness, width or area adds `critical_force` and
-        `first_instability_force` (N). Every variable has `units` and `long_name`. If gaps were
-        filled, `in_gap` shows whether the critical patch reaches into a gap, and the coordinate
-        `measured` which nodes have measured values.
+        Over 'sample': `critical_load`, `critical_stress`, `first_instability`
+        (Pa), `critical_position` (m), and the variables that the method adds. A
+        normal pressure adds `friction_coefficient`; a thickness, width or area
+        adds `critical_force` and `first_instability_force` (N). Every variable
+        has `units` and `long_name`. If gaps were filled, `in_gap` shows whether
+        the critical patch reaches into a gap, and the coordinate `measured` which
+        nodes have measured values.
 
     Raises
     ------
@@ -125,9 +128,10 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If gaps are filled or the onset lies in a gap. If the local criterion is off by more than
-        1 % in the first samples: at most 32, as many as `Equilibrium` solves in two seconds, and
-        only if a quick test leaves a doubt.
+        If gaps are filled or the onset lies in a gap. If the local criterion is
+        off by more than 1 % in the first samples: at most 32, as many as
+        `Equilibrium` solves in two seconds, and only if a quick test leaves a
+        doubt.
     UnitWarning
         If a value is so unusual for a solid that its unit is in doubt.
 
@@ -158,7 +162,8 @@ def onset(
             part = sample.part(slice(start, start + size))
             with collect_warnings() as caught:
                 parts.append(solver(part))
-            # Samples are numbered in a batch: shift their numbers to those in all profiles.
+            # Samples are numbered in a batch: shift their numbers to those in all
+            # profiles.
             warned += (text.after(start) for text in caught)
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}

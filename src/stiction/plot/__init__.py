@@ -1,10 +1,10 @@
 """Plots of results.
 
-A plot with a single panel draws on `ax`, or on new axes, and returns the axes. A plot
-with several panels (`block`, `events`, `fit`, `moment_rate`, `precursors`, `specimen`) makes
-a new figure and returns an array of axes. New figures always have the style of a printed
-page. On axes of the user, lines and texts keep a contrast of 4.5 to 1 to the background.
-`film` writes a file and returns its path.
+A plot with a single panel draws on `ax`, or on new axes, and returns the axes. A
+plot with several panels (`block`, `events`, `fit`, `moment_rate`, `precursors`,
+`specimen`) makes a new figure and returns an array of axes. New figures always
+have the style of a printed page. On axes of the user, lines and texts keep a
+contrast of 4.5 to 1 to the background. `film` writes a file and returns its path.
 
 Units follow the size of the numbers, such as mm and µs, or km and s. If the problem has a
 normal pressure, friction coefficients are drawn too. All files share `axes` and `style`.

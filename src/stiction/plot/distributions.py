@@ -46,12 +46,13 @@ def monte_carlo(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo` or `Study.run`. Give several results as a list, or by name. Up
-        to six steps of a sweep over a single parameter are drawn.
+        From `monte_carlo` or `Study.run`. Give several results as a list, or by
+        name. Up to six steps of a sweep over a single parameter are drawn.
     quantity : str, optional
-        A variable of the result. The default is `critical_force` if the area of a line or
-        specimen is known, else `friction_coefficient` if there is a pressure, else
-        `critical_stress`. `critical_position` is drawn as a histogram.
+        A variable of the result. The default is `critical_force` if the area of a
+        line or specimen is known, else `friction_coefficient` if there is a
+        pressure, else `critical_stress`. `critical_position` is drawn as a
+        histogram.
     measured : Peaks, Curves or array, optional
         Peaks of tests, in SI or with a unit, which are marked separately.
     ax : matplotlib.axes.Axes, optional
@@ -146,9 +147,9 @@ def quantiles(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `Study.run` with a sweep over a parameter or two. The second parameter makes
-        curves. Several results, as a list or by name, are compared along the same sweep
-        over a single parameter.
+        From `Study.run` with a sweep over a parameter or two. The second
+        parameter makes curves. Several results, as a list or by name, are
+        compared along the same sweep over a single parameter.
     quantity : str, optional
         As in `monte_carlo`.
     along : str, optional
@@ -286,7 +287,8 @@ def failure_curve(
     curve : Dataset
         From `stiction.failure_curve`.
     stress : float, optional
-        Demand, Pa: the mean shear stress to carry. It is marked, with its probability.
+        Demand, Pa: the mean shear stress to carry. It is marked, with its
+        probability.
     force : float, optional
         Demand as a force, N, instead of `stress`.
     ax : matplotlib.axes.Axes, optional
@@ -295,10 +297,10 @@ def failure_curve(
     Returns
     -------
     matplotlib.axes.Axes
-        The scale at the top shows forces if the area of the interface is known, else
-        friction coefficients if there is a normal pressure. A dotted line marks the lower
-        bound of the strength. For equally likely interfaces, the line is their mean, and
-        a wider band contains 90 % of them.
+        The scale at the top shows forces if the area of the interface is known,
+        else friction coefficients if there is a normal pressure. A dotted line
+        marks the lower bound of the strength. For equally likely interfaces, the
+        line is their mean, and a wider band contains 90 % of them.
 
     Raises
     ------
@@ -365,8 +367,8 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar connects the designs at both ends of a range. The line is the design, and
-        the band its interval.
+        Each bar connects the designs at both ends of a range. The line is the
+        design, and the band its interval.
 
     Raises
     ------

@@ -47,14 +47,14 @@ def field(
     ----------
     where : Problem or Interface
     profile : array or RandomField
-        An array of shape (nodes,) or (samples, nodes), of which the first six samples are
-        drawn. On a plane, (nx, ny) or (samples, nx, ny), of which the first sample is
-        drawn. A field is drawn as its median with the measured values
-        (`RandomField.given`), and on a line with its central 90 % band.
+        An array of shape (nodes,) or (samples, nodes), of which the first six
+        samples are drawn. On a plane, (nx, ny) or (samples, nx, ny), of which the
+        first sample is drawn. A field is drawn as its median with the measured
+        values (`RandomField.given`), and on a line with its central 90 % band.
     quantity : str, optional
-        Name of the property, as `RandomInterface` uses it, or 'friction_coefficient'. The
-        default is 'friction_coefficient' for a field of coefficients or a DataArray in
-        the unit 1, else 'strength'.
+        Name of the property, as `RandomInterface` uses it, or
+        'friction_coefficient'. The default is 'friction_coefficient' for a field
+        of coefficients or a DataArray in the unit 1, else 'strength'.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -169,12 +169,12 @@ def onset(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `stiction.onset` with this strength. Give several methods as a list, or by
-        name.
+        From `stiction.onset` with this strength. Give several methods as a list,
+        or by name.
     strength : array
-        tau_p, Pa, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or (samples,
-        nx, ny). A DataArray of friction coefficients (unit 1) is multiplied by the normal
-        pressure.
+        tau_p, Pa, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or
+        (samples, nx, ny). A DataArray of friction coefficients (unit 1) is
+        multiplied by the normal pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int

@@ -45,11 +45,12 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     Returns
     -------
     (4,) array of matplotlib.axes.Axes
-        (a) Values and the fitted marginal, (b) quantiles of the data against quantiles of
-        the fit, (c) correlation, with the effect of the window, and (d) spectrum, each
-        for all records together. The bands show records that were simulated from the
-        fitted field. They contain 90 % of the fits to such records in (a) and (b), and 90
-        % of the sets of such records in (c) and (d).
+        (a) Values and the fitted marginal, (b) quantiles of the data against
+        quantiles of the fit, (c) correlation, with the effect of the window, and
+        (d) spectrum, each for all records together. The bands show records that
+        were simulated from the fitted field. They contain 90 % of the fits to
+        such records in (a) and (b), and 90 % of the sets of such records in (c)
+        and (d).
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
@@ -212,8 +213,8 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        If the prediction is right, all steps of 90 % of campaigns with so many tests lie
-        in the shaded band. Each length of specimens has its own colour.
+        If the prediction is right, all steps of 90 % of campaigns with so many
+        tests lie in the shaded band. Each length of specimens has its own colour.
 
     Examples
     --------

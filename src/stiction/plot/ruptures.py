@@ -64,10 +64,11 @@ def rupture(
     Returns
     -------
     matplotlib.axes.Axes
-        If a patch became unstable, a dot marks the onset, at time zero. On a line, time
-        begins shortly before the onset and ends shortly after the last slip, and points
-        that slip seven decades slower than the fastest point are white. On a plane, the
-        front is drawn at equal intervals of time on a map of the strength.
+        If a patch became unstable, a dot marks the onset, at time zero. On a
+        line, time begins shortly before the onset and ends shortly after the last
+        slip, and points that slip seven decades slower than the fastest point are
+        white. On a plane, the front is drawn at equal intervals of time on a map
+        of the strength.
 
     Raises
     ------
@@ -98,8 +99,8 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Left the moment rate, until it stays below a hundredth of its largest value; right its
-        spectrum, which tends to the moment at low frequencies.
+        Left the moment rate, until it stays below a hundredth of its largest
+        value; right its spectrum, which tends to the moment at low frequencies.
 
     Examples
     --------
@@ -152,9 +153,10 @@ def events(
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Left the number of events per sample whose moment is at least so large; right moment over
-        area, on lines over length. Between half-spaces a line shows cracks with the median stress
-        drop: Eshelby's circular crack on planes, Starr's on lines.
+        Left the number of events per sample whose moment is at least so large;
+        right moment over area, on lines over length. Between half-spaces a line
+        shows cracks with the median stress drop: Eshelby's circular crack on
+        planes, Starr's on lines.
 
     Examples
     --------

@@ -129,9 +129,9 @@ def force_travel(
     Parameters
     ----------
     result : Dataset, or sequence of Dataset
-        From `stiction.equilibrium_path` of a specimen, at many loads. Several paths, of
-        samples from the same field, are drawn as their median, with a band that contains
-        90 % of them at each travel.
+        From `stiction.equilibrium_path` of a specimen, at many loads. Several
+        paths, of samples from the same field, are drawn as their median, with a
+        band that contains 90 % of them at each travel.
     measured : Curves, optional
         From `stiction.read_curve`. They are drawn over the prediction, with their
         precursors.
@@ -225,9 +225,9 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
     Returns
     -------
     (rows, columns) array of matplotlib.axes.Axes
-        Velocity along the interface, at times when 2 to 95 % of the slip have happened.
-        All panels share a scale of colours, and 1 % of the values lie beyond its ends.
-        Time counts from the first arrival of the front.
+        Velocity along the interface, at times when 2 to 95 % of the slip have
+        happened. All panels share a scale of colours, and 1 % of the values lie
+        beyond its ends. Time counts from the first arrival of the front.
     """
     need(run, "block_velocity", hint=". It is kept for specimens")
     interface = problem_of(run, problem).interface
@@ -294,14 +294,15 @@ def precursors(
     problem : Problem, optional
         Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`. They are drawn over the prediction. Marks at the upper
-        edge of the lower panel show the travel at which precursors of the tests begin.
+        From `stiction.read_curve`. They are drawn over the prediction. Marks at
+        the upper edge of the lower panel show the travel at which precursors of
+        the tests begin.
 
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        The upper panel is the plot of `force_travel`. The lower panel shows the extent of
-        each event at its travel.
+        The upper panel is the plot of `force_travel`. The lower panel shows the
+        extent of each event at its travel.
 
     Examples
     --------

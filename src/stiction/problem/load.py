@@ -134,9 +134,9 @@ class Load:
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
     pressing_force : float, optional
-        Force instead of `normal_pressure`, N, positive. Divided by the area of the
-        interface, which must be known, it is the pressure: uniform, or the mean between
-        glued plates.
+        Force instead of `normal_pressure`, N, positive. Divided by the area of
+        the interface, which must be known, it is the pressure: uniform, or the
+        mean between glued plates.
 
     Examples
     --------

@@ -516,7 +516,8 @@ class Problem:
             strength, or a DataArray that states the unit 1, is multiplied by the
             pressure.
         accept : collection of {"overstress"}
-            Extreme profiles that the method accepts: initial stress above the strength.
+            Extreme profiles that the method accepts: initial stress above the
+            strength.
 
         Raises
         ------

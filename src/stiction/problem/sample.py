@@ -63,9 +63,9 @@ class Sample(Result, _Profiles):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to them.
-        Strength is infinite beyond the extent of the interface. Where it is at or below
-        the residual strength, both are equal and W has no effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to
+        them. Strength is infinite beyond the extent of the interface. Where it is
+        at or below the residual strength, both are equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array

@@ -24,8 +24,8 @@ class Solid:
     Parameters
     ----------
     shear_modulus : float
-        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa. Then G = E/(2 (1 + nu)) is
-        stored.
+        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa. Then G = E/(2 (1 +
+        nu)) is stored.
     poisson_ratio : float
         nu, in (-1, 0.5).
     density : float

@@ -112,8 +112,8 @@ class Blocks:
         ``Load(normal_pressure=...)`` is the mean.
     quality_factor : float
         Q of the slowest shear wave along a block, at the frequency f = c_s/(2 L).
-        Momentum is lost at the rate 2 pi f/Q, in ruptures with inertia only. 25 is the
-        inverse of the loss tangent of acrylic at some 10 kHz, 0.04. With
+        Momentum is lost at the rate 2 pi f/Q, in ruptures with inertia only. 25
+        is the inverse of the loss tangent of acrylic at some 10 kHz, 0.04. With
         ``float("inf")``, waves echo for ever.
 
     Examples

@@ -9,14 +9,15 @@ the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
-If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k may be
-negative, this is a linear regression. The posterior of the draws is then normal, with
+If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k
+may be negative, this is a linear regression. The posterior of the draws is then
+normal, with
 
     covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
 
-With the symmetric root, mu + P^(1/2) a turns the usual draws into conditioned draws, with the
-same distribution as by Matheron's rule (A. G. Journel and C. J. Huijbregts, Mining Geostatistics,
-1978). For a caller only the draws change.
+With the symmetric root, mu + P^(1/2) a turns the usual draws into conditioned
+draws, with the same distribution as by Matheron's rule (A. G. Journel and C. J.
+Huijbregts, Mining Geostatistics, 1978). For a caller only the draws change.
 
 Algorithm (`conditioned`)
 -------------------------
@@ -25,7 +26,8 @@ map for the skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place, as if no other value had been measured.
 2. Replace each l_k by a Gaussian. Choose it so that the product with the normal distribution of
-   z_k given all other values keeps its mean and variance (`Measured.gaussian`, by quadrature).
+   z_k given all other values keeps its mean and variance (`Measured.gaussian`, by
+   quadrature).
 3. Find the regression (2) from a singular value decomposition (`_regression`). With the rows
    |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
    conditioned even if a smooth field was measured densely. If some p_k are negative, V is turned
@@ -35,7 +37,8 @@ map for the skewness that Gaussians miss:
    (`_from_others`).
 5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
 6. Map draws before the regression, so that they have the density (1) instead of its Gaussian
-   approximation (`stiction.random.transport`, which also estimates the remaining error).
+   approximation (`stiction.random.transport`, which also estimates the remaining
+   error).
 7. Compare the misfit of values and draws at the mean with chi-square, for a warning.
 
 Departures from Minka: all places are updated at once. If the Gaussians have no posterior (P is not
@@ -235,8 +238,9 @@ class Measured(NamedTuple):
             return half_range, z, log_density
 
         half_range, z, log_density = evaluate()
-        # If a value contradicts the others, the product peaks outside the range or at its end. Then
-        # search both ranges, and narrow the search around the peak.
+        # If a value contradicts the others, the product peaks outside the range
+        # or at its end. Then search both ranges, and narrow the search around the
+        # peak.
         ends = log_density[:, [0, -1]].max(axis=1)
         apart = ~overlap | (ends > log_density.max(axis=1) - MIN_END_FALL)
         if apart.any():
@@ -431,7 +435,8 @@ def _from_others(
     mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
     remaining = np.maximum(deviation**-2 - precision, least)
-    # Across a small deviation the map is linear, and the difference would be round-off.
+    # Across a small deviation the map is linear, and the difference would be
+    # round-off.
     sharp = deviation < MIN_DEVIATION
     cavity_mean = (mean / deviation**2 - shift) / remaining
     return np.where(sharp, 0.0, cavity_mean), np.where(sharp, 1.0, 1.0 / remaining)

@@ -77,7 +77,8 @@ def full_key(key: str) -> str:
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
     """Return a Latin hypercube: for each distribution, a value in every interval of 1/count."""
     rng = np.random.default_rng([seed, 6])
-    # Permute the intervals of each distribution, and take a random place in each interval.
+    # Permute the intervals of each distribution, and take a random place in each
+    # interval.
     cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
     shares = (cells + rng.random(cells.shape)) / count
     rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]

@@ -1,6 +1,7 @@
 """Equally likely random interfaces as a mixture: a first draw selects the member of a sample.
 
-A mixture behaves as a single random interface, so that one search for failures covers all members.
+A mixture behaves as a single random interface, so that one search for failures
+covers all members.
 
 1. Collect the draws of all members. Members share a draw for the same property and mode
    (`_columns`).
@@ -182,7 +183,8 @@ class EquallyLikely:
         """Change rows of draws so that they select given members."""
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
-        # The middle of a member's interval, so that round-off cannot select its neighbour.
+        # The middle of a member's interval, so that round-off cannot select its
+        # neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
@@ -217,7 +219,8 @@ class EquallyLikely:
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
-        # Members that cover all columns draw them. Shared columns get the same numbers twice.
+        # Members that cover all columns draw them. Shared columns get the same
+        # numbers twice.
         for number in columns.covering:
             of_member = columns.of[number]
             draws[:, of_member] = self.members[number].draws(interface, samples, seed, first)
@@ -309,8 +312,9 @@ class Uncertain(Result):
         likely = drawn_from(source, count, seed) if source else as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
-        # Member n takes the constants n % VARIANTS. Members with the same constants get
-        # neighbouring ranks and thereby, in the order of groups, strengths in proportion.
+        # Member n takes the constants n % VARIANTS. Members with the same
+        # constants get neighbouring ranks and thereby, in the order of groups,
+        # strengths in proportion.
         if len(keys) < len(self.laws):
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
@@ -343,15 +347,17 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         The random properties.
     parameters : mapping
-        Distributions by dotted key, such as ``"problem.friction.residual_ratio"``,
-        ``"problem.load.pressing_force"`` or ``"strength.spectrum.correlation_length"``, as in
+        Distributions by dotted key, such as
+        ``"problem.friction.residual_ratio"``, ``"problem.load.pressing_force"``
+        or ``"strength.spectrum.correlation_length"``, as in
         `RandomInterface.uncertain`. They are independent.
 
     Returns
     -------
     Uncertain
-        Pass it to `design_stress`, `failure_probability` or any function that takes a fit.
-        Constants of the problem have forty values, evenly spread over their distributions.
+        Pass it to `design_stress`, `failure_probability` or any function that
+        takes a fit. Constants of the problem have forty values, evenly spread
+        over their distributions.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """Random fields, and the random interface that holds all random properties.
 
-Problem: map independent standard normal draws to profiles of correlated properties, each a
-translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995). `layout` says which draws
-belong to which property and mode.
+Problem: map independent standard normal draws to profiles of correlated
+properties, each a translation field (M. Grigoriu, Applied Non-Gaussian Processes,
+1995). `layout` says which draws belong to which property and mode.
 
 Algorithm (`RandomInterface.from_draws`)
 ----------------------------------------
@@ -80,15 +80,16 @@ class RandomField:
     spectrum : PowerLawSpectrum, ..., CustomSpectrum
         Power spectral density of the Gaussian field z.
     mean_mode : bool
-        Whether z has the mean mode, k = 0. Without it, as in Albertini et al. (2020), every
-        sample has the same mean of z, which is harmless only if the correlation length is
-        short compared with the interface.
+        Whether z has the mean mode, k = 0. Without it, as in Albertini et al.
+        (2020), every sample has the same mean of z, which is harmless only if the
+        correlation length is short compared with the interface.
     anisotropy : float, optional
-        On a plane, the ratio of the correlation lengths along y and along x, by default 1. The
-        spectrum gives the correlation length along x.
+        On a plane, the ratio of the correlation lengths along y and along x, by
+        default 1. The spectrum gives the correlation length along x.
     of : {"friction_coefficient"}, optional
-        Declares that the field holds friction coefficients. The stress (strength, residual
-        strength or initial stress) is their product with the normal pressure.
+        Declares that the field holds friction coefficients. The stress (strength,
+        residual strength or initial stress) is their product with the normal
+        pressure.
     conditions : Conditions, optional
         Measured values, as set by `given`, or in a study file by the table ``given``.
 
@@ -140,7 +141,8 @@ class RandomField:
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
         """Return the field conditioned on measured values: fixed there, random elsewhere.
 
-        Its samples use the draws of this field, and tend to its samples as the noise grows.
+        Its samples use the draws of this field, and tend to its samples as the
+        noise grows.
 
         Parameters
         ----------
@@ -194,8 +196,8 @@ class RandomField:
         Warns
         -----
         AccuracyWarning
-            If the grid is too coarse for the spectrum, or the interface is short compared
-            with the correlation length and the field has no mean mode.
+            If the grid is too coarse for the spectrum, or the interface is short
+            compared with the correlation length and the field has no mean mode.
         """
         self._alone.warn_if_inaccurate(interface)
         profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
@@ -270,7 +272,8 @@ class RandomField:
         def excess(rho: float) -> float:
             return float(correlation_of_mapped(np.array(rho), coefficients)) - math.exp(-1.0)
 
-        # The correlation of the mapped field rises with the correlation of z: find the value of z.
+        # The correlation of the mapped field rises with the correlation of z:
+        # find the value of z.
         return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
 
@@ -319,21 +322,24 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa. With ``of="friction_coefficient"`` it is a friction coefficient, which
-        is multiplied by the normal pressure.
+        Peak strength, Pa. With ``of="friction_coefficient"`` it is a friction
+        coefficient, which is multiplied by the normal pressure.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
-        Other stresses, Pa. The first two may be coefficients, too. Leave random properties out of
-        the problem.
+        Other stresses, Pa. The first two may be coefficients, too. Leave random
+        properties out of the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
-        At most one of them, in Pa/m, m or J/m². Leave all three out of the friction law then.
+        At most one of them, in Pa/m, m or J/m². Leave all three out of the
+        friction law then.
     correlation : mapping, optional
-        Correlation coefficients of the Gaussian fields of two properties, mode by mode:
-        ``{("strength", "residual_strength"): 0.8}``, in a study file
-        ``correlation.strength.residual_strength = 0.8``. Other pairs are independent.
+        Correlation coefficients of the Gaussian fields of two properties, mode by
+        mode: ``{("strength", "residual_strength"): 0.8}``, in a study file
+        ``correlation.strength.residual_strength = 0.8``. Other pairs are
+        independent.
     between : mapping, optional
-        Marginals of positive factors with mean 1 that are constant along a specimen and differ
-        from specimen to specimen: ``{"strength": st.Lognormal(mean=1.0, cv=0.1)}``. A property that
-        is not random here may have one, too, such as ``"critical_slip"``, and so may
+        Marginals of positive factors with mean 1 that are constant along a
+        specimen and differ from specimen to specimen: ``{"strength":
+        st.Lognormal(mean=1.0, cv=0.1)}``. A property that is not random here may
+        have one, too, such as ``"critical_slip"``, and so may
         ``"pressing_force"``: the problem then gives its mean.
 
     Notes
@@ -560,14 +566,16 @@ class RandomInterface:
     ) -> list[RandomInterface]:
         """Return equally likely random interfaces whose parameters have given distributions.
 
-        Pass the list to a failure probability. The parameters are independent. Each has a value in
-        every interval of probability 1/count (a Latin hypercube; McKay and others, 1979).
+        Pass the list to a failure probability. The parameters are independent.
+        Each has a value in every interval of probability 1/count (a Latin
+        hypercube; McKay and others, 1979).
 
         Parameters
         ----------
         parameters : mapping
-            Distributions by dotted key, as priors of `infer`: frozen `scipy.stats` distributions,
-            ranges (low, high), or tables as in a study file.
+            Distributions by dotted key, as priors of `infer`: frozen
+            `scipy.stats` distributions, ranges (low, high), or tables as in a
+            study file.
         count : int
             Number of interfaces; 30 show a 90 % band.
         seed : int

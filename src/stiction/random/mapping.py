@@ -7,8 +7,8 @@ with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
-for millions of z. The quantile F^-1 of scipy is a thousand times too slow. If the correlation of z
-at a lag is rho, the correlation of v at this lag is
+for millions of z. The quantile F^-1 of scipy is a thousand times too slow. If the
+correlation of z at a lag is rho, the correlation of v at this lag is
 
     sum_m c_m^2 rho^m / sum_m c_m^2, m >= 1,   c_m = E[g(Z) h_m(Z)],                          (2)
 
@@ -19,8 +19,9 @@ Algorithm of the mapping (`from_normal`): our own
 1. Reduce the marginal to its family at scale 1, so that all multiples share a table
    (`_standard`).
 2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes by central
-   differences of fourth order. Check every piece at three points, and mark pieces that miss
-   `TABLE_RTOL`, for example at a kink of the density (`quantile_table`).
+   differences of fourth order. Check every piece at three points, and mark pieces
+   that miss `TABLE_RTOL`, for example at a kink of the density
+   (`quantile_table`).
 3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece, go to a second
    table of [-8, 8]. Values that it does not serve go to scipy.
 
@@ -110,7 +111,8 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     checks = z[2:-3, None] + step * np.array([0.25, 0.5, 0.75])
     exact = quantile_of_normal(distribution, checks)
     interpolated = np.empty(checks.size)
-    # Read-only arrays have another type for numba: check with the type of later calls.
+    # Read-only arrays have another type for numba: check with the type of later
+    # calls.
     table.flags.writeable = False
     interpolate(checks.ravel(), table, interpolated)
     # Errors are relative to the value, but not at its zero crossing.
@@ -204,7 +206,8 @@ def hermite_coefficients(
             break
         following = (z * current - np.sqrt(m) * previous) / np.sqrt(m + 1.0)
         previous, current = current, following
-    # A negative rest above round-off and the error of the rule shows inconsistent moments.
+    # A negative rest above round-off and the error of the rule shows inconsistent
+    # moments.
     if not rest > -max(MAX_REST, step**2) * variance:
         raise InputError(
             "marginal: scipy's quantile of this distribution is not accurate enough"

@@ -125,7 +125,8 @@ class Lognormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field, above `low`, and coefficient of variation (standard deviation / mean).
+        Mean of the field, above `low`, and coefficient of variation (standard
+        deviation / mean).
     low : float
         Lower bound, by default 0.
 
@@ -194,9 +195,9 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and coefficient of variation (standard deviation / mean), both after
-        truncation. The scatter must be below the scatter of an exponential distribution or, with
-        two bounds, of a uniform distribution.
+        Mean of the field and coefficient of variation (standard deviation /
+        mean), both after truncation. The scatter must be below the scatter of an
+        exponential distribution or, with two bounds, of a uniform distribution.
     low, high : float, optional
         Bounds, by default 0 and no upper bound.
 

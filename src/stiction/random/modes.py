@@ -10,7 +10,8 @@ density g(k) and its truncation K, their amplitudes have the variances
 Algorithm (`make_modes`)
 ------------------------
 1. List candidate wave vectors, either k or -k, in an order that depends on the proportions of the
-   interface only. The place of a mode in this order is the number of its draws (`_numbers`).
+   interface only. The place of a mode in this order is the number of its draws
+   (`_numbers`).
 2. Keep the wave vectors up to the truncation.
 3. Compute (1). The mean mode k = 0 stands for a single wave vector, every other mode for k and -k.
    The mean mode therefore has half of g(0).
@@ -38,7 +39,8 @@ class Modes:
     """Modes of a field on an interface: the mean mode, and then J modes."""
 
     interface: Interface
-    # Standard deviations, (J + 1,), with unit sum of squares; the first is 0 without a mean mode.
+    # Standard deviations, (J + 1,), with unit sum of squares; the first is 0
+    # without a mean mode.
     sigma: Array
     # Wave vectors in units of 2 pi/length, (dimensions, J + 1), either k or -k.
     numbers: NDArray[np.int64]

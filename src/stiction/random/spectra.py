@@ -4,8 +4,8 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-K being the truncation. Samples have the truncated spectrum, so correlations and lengths refer to
-the truncated spectrum, too.
+K being the truncation. Samples have the truncated spectrum, so correlations and
+lengths refer to the truncated spectrum, too.
 
 1. Integrate (1) octave by octave, because densities span decades, by QUADPACK's rule for a cosine
    (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D. Kahaner, QUADPACK, 1983)
@@ -13,8 +13,9 @@ the truncated spectrum, too.
 2. Find the length at which the correlation falls to 1/e by marching and a search
    (`lag_of_correlation`).
 
-On a plane the field is isotropic, and a line through it has the correlation of the field on a line.
-For this, the exponent of 1 + k^2 grows by (D - 1)/2 in D dimensions, and a Gaussian keeps its form.
+On a plane the field is isotropic, and a line through it has the correlation of
+the field on a line. For this, the exponent of 1 + k^2 grows by (D - 1)/2 in D
+dimensions, and a Gaussian keeps its form.
 
 To add a spectrum, derive from `ScaledSpectrum` and `register` the class.
 """
@@ -119,9 +120,10 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Step 2: return the first lag at which the correlation of z on a line falls to `target`, m."""
-    # The slope of the correlation is at most the mean wavenumber. Between lags that are close
-    # against the root mean square of the wavelengths, it is nearly straight. March in such steps
-    # until it is below the target, then search between the last two lags.
+    # The slope of the correlation is at most the mean wavenumber. Between lags
+    # that are close against the root mean square of the wavelengths, it is nearly
+    # straight. March in such steps until it is below the target, then search
+    # between the last two lags.
     edges, power = _truncated(spectrum)
     slope = _integrate(spectrum, edges, order=1) / power
     step = 0.25 * math.sqrt(power / _integrate(spectrum, edges, order=2))
@@ -209,7 +211,8 @@ class _PowerOfWavenumber(ScaledSpectrum):
         return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        # The complement 1 - t of the incomplete beta function avoids cancellation for t near 1.
+        # The complement 1 - t of the incomplete beta function avoids cancellation
+        # for t near 1.
         complement = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - complement) / complement)
 
@@ -226,8 +229,9 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     exponent : float
         Exponent in [0.6, 64], 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
-        Truncation in multiples of lambda. By default it retains 0.99969 of the power on a line, and
-        is at least 2.5: 2.5 at the exponent 4 (as in the paper), 11 at 2 and 2,100 at 1.
+        Truncation in multiples of lambda. By default it retains 0.99969 of the
+        power on a line, and is at least 2.5: 2.5 at the exponent 4 (as in the
+        paper), 11 at 2 and 2,100 at 1.
     power_kept : float, optional
         Share of the power retained by truncation, in (0, 1).
 
@@ -275,10 +279,11 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     Parameters
     ----------
     correlation_length : float
-        Correlation length xi_0, m, at which the correlation of z is 1/e without truncation.
+        Correlation length xi_0, m, at which the correlation of z is 1/e without
+        truncation.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or the share of the power that is retained, by default
-        0.9997.
+        Truncation in multiples of 2 pi/xi_0, or the share of the power that is
+        retained, by default 0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -326,8 +331,9 @@ class CustomSpectrum(SpectralDensity):
     Parameters
     ----------
     function : callable
-        g(k), which takes an array of wavenumbers (rad/m) and returns an array without negative
-        values. On a plane it is the density at wave vectors of length k.
+        g(k), which takes an array of wavenumbers (rad/m) and returns an array
+        without negative values. On a plane it is the density at wave vectors of
+        length k.
     max_wavenumber : float
         Truncation, rad/m.
     """

@@ -1,7 +1,7 @@
 """Random properties of a problem as stresses, also for friction coefficients under a pressure.
 
-`share_below_residual` estimates the share of the strength that does not exceed the residual
-strength, by our own algorithm:
+`share_below_residual` estimates the share of the strength that does not exceed
+the residual strength, by our own algorithm:
 
 1. Replace the residual strength by equally likely values.
 2. Multiply or divide them by equally likely values of each factor on only one of the two strengths:
@@ -22,10 +22,11 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.problem import Problem
 from stiction.random.fields import FACTOR, RandomInterface
 
-# Shares of the strength at or below the residual strength: the largest without a warning, and the
-# largest that is accepted.
+# Shares of the strength at or below the residual strength: the largest without a
+# warning, and the largest that is accepted.
 MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
-# Numbers of equally likely values of a random residual strength, and of a pressure or factor.
+# Numbers of equally likely values of a random residual strength, and of a
+# pressure or factor.
 RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
 
 

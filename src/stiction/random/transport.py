@@ -19,22 +19,25 @@ constant,
 
     p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
 
-Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1, ..., u_j.
-Equation (2) treats places as independent given e_1 to e_j (B. Cseke and T. Heskes, Journal
-of Machine Learning Research 12, 2011). It is exact for a single place, for independent places
-with a direction each, and for many places that measure the same number.
+Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1,
+..., u_j. Equation (2) treats places as independent given e_1 to e_j (B. Cseke and
+T. Heskes, Journal of Machine Learning Research 12, 2011). It is exact for a
+single place, for independent places with a direction each, and for many places
+that measure the same number.
 
 Preparation (`make_transport`):
 
 1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the
-   coefficients shows how far the posterior at a place is from the Gaussian. Ignore the
-   places with the smallest norms, which together stay below `IGNORED_TOTAL`.
+   coefficients shows how far the posterior at a place is from the Gaussian.
+   Ignore the places with the smallest norms, which together stay below
+   `IGNORED_TOTAL`.
 2. Choose the directions greedily. The candidates are the a_k of the places that differ most
-   from the Gaussian, made orthogonal to the directions chosen before. Choose the candidate
-   on which the expansions of all places together have the largest projection.
+   from the Gaussian, made orthogonal to the directions chosen before. Choose the
+   candidate on which the expansions of all places together have the largest
+   projection.
 3. Tabulate the factors of (2) along each direction. A place that depends noticeably on
-   earlier coordinates has a table of its own, over its mean given e_1 to e_j. The other
-   places share a table over e_j, with earlier coordinates at zero.
+   earlier coordinates has a table of its own, over its mean given e_1 to e_j. The
+   other places share a table over e_j, with earlier coordinates at zero.
 4. Estimate the remaining error: map samples, weight them by (1) divided by their density,
    and compare weighted and plain moments of z.
 
@@ -125,7 +128,8 @@ def make_transport(
 
     mean, slopes, coefficients = mean[kept], slopes[kept], coefficients[:, kept]
     basis = _choose_directions(coefficients, slopes / deviation[kept, None])
-    # If log r_k is linear in z_k, earlier coordinates only multiply (2) by a constant.
+    # If log r_k is linear in z_k, earlier coordinates only multiply (2) by a
+    # constant.
     nonlinearity = np.linalg.norm(coefficients[1:], axis=0)
     tables = _tabulate(log_ratio_of_kept, mean, slopes, basis, nonlinearity)
     if not kept.size:
@@ -139,8 +143,9 @@ def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
     value = log_ratio(np.arange(mean.size), mean[:, None] + deviation[:, None] * x)
     weight = np.exp(-0.5 * x**2)
     weight /= weight.sum()
-    # Points without a quantile have a log r_k so low that they would decide a mean over all points.
-    # They do not affect the median within a standard deviation.
+    # Points without a quantile have a log r_k so low that they would decide a
+    # mean over all points. They do not affect the median within a standard
+    # deviation.
     typical = np.median(value[:, np.abs(x) <= 1.0], axis=1)
     value = (value - typical[:, None]).clip(-MAX_LOG_RATIO, MAX_LOG_RATIO)
     coefficients, previous, current = [], np.zeros_like(x), np.ones_like(x)
@@ -161,7 +166,8 @@ def _choose_directions(coefficients: Array, unit: Array) -> Array:
         candidates = unspanned[norm > MIN_UNSPANNED] / norm[norm > MIN_UNSPANNED, None]
         if not candidates.size:
             break
-        # Along a unit vector u, polynomial n of z_k keeps the share (u'a_k / |a_k|)**n.
+        # Along a unit vector u, polynomial n of z_k keeps the share (u'a_k /
+        # |a_k|)**n.
         cosine = candidates @ unit.T
         power, squared_gain = np.ones_like(cosine), np.zeros(len(candidates))
         for coefficient in coefficients:

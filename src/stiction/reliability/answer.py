@@ -105,52 +105,58 @@ class Answer(Result):
         Coefficient of variation of the probability: estimated standard error over the
         estimate. Infinite without a failure, and zero if exact.
     members_cv : float
-        Part of `cv` because a list of equally likely interfaces is a sample of the
-        interfaces that may be true. The squares of this part and of the sampling error
-        add up. 0 for a mixture.
+        Part of `cv` because a list of equally likely interfaces is a sample of
+        the interfaces that may be true. The squares of this part and of the
+        sampling error add up. 0 for a mixture.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and by its less expensive first stage only.
     lower_bound, stress_above_bound : float
-        No sample slides below `lower_bound`, Pa. It is minus infinity if it is unknown.
+        No sample slides below `lower_bound`, Pa. It is minus infinity if it is
+        unknown.
     algorithm, reason : str
-        'plain', 'subset', 'two_level' or 'exact' (without samples), and the reason for it.
+        'plain', 'subset', 'two_level' or 'exact' (without samples), and the
+        reason for it.
     members : (members,) array
-        For a list of equally likely interfaces, the probability of each. NaN if fewer
-        than three samples of an interface slide below the stress. `probability` is their
-        mean, the predictive probability, on which a decision should rest.
+        For a list of equally likely interfaces, the probability of each. NaN if
+        fewer than three samples of an interface slide below the stress.
+        `probability` is their mean, the predictive probability, on which a
+        decision should rest.
     survived : float
-        Share of plain samples in which the event does not happen at any stress. Behind a
-        stiff machine an interface may stay stable, and it may carry any load.
+        Share of plain samples in which the event does not happen at any stress.
+        Behind a stiff machine an interface may stay stable, and it may carry any
+        load.
     warnings : tuple of str
         Reasons not to trust the answer. Empty without doubts.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
-        Area of the interface, m², and `stress` times the area, N. NaN if the area is
-        unknown: give ``Blocks(thickness=...)``, or ``Interface(width=...)`` for a line.
+        Area of the interface, m², and `stress` times the area, N. NaN if the area
+        is unknown: give ``Blocks(thickness=...)``, or ``Interface(width=...)``
+        for a line.
     failing_profiles : xarray.Dataset
-        Given by `failure_probability`: some samples of the failure set over ('sample',
-        'x'), with its distribution: `strength` and other random properties,
-        `critical_stress`, `critical_position`, ...
+        Given by `failure_probability`: some samples of the failure set over
+        ('sample', 'x'), with its distribution: `strength` and other random
+        properties, `critical_stress`, `critical_position`, ...
     sensitivities : xarray.Dataset
-        Given by `design_stress`: effects on the design over 'source', the largest first.
-        `low` and `high` are the settings at both ends, with `force_at_low` and
-        `force_at_high`, N, and `stress_at_low` and `stress_at_high`, Pa. Attributes
-        ``stress by ...`` belong to the families of the factor between specimens.
-        ``sensitivities.to_dataframe().to_csv(path)`` writes a file, and
-        `stiction.plot.sensitivities` draws it.
+        Given by `design_stress`: effects on the design over 'source', the largest
+        first. `low` and `high` are the settings at both ends, with `force_at_low`
+        and `force_at_high`, N, and `stress_at_low` and `stress_at_high`, Pa.
+        Attributes ``stress by ...`` belong to the families of the factor between
+        specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes a file,
+        and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
-        Given by `design_stress` if specimens were counted: stress below which 5 % of the
-        specimens slide, with this confidence (EN 1990: 75 %), Pa. It is a quantile over
-        equally likely interfaces. NaN otherwise.
+        Given by `design_stress` if specimens were counted: stress below which 5 %
+        of the specimens slide, with this confidence (EN 1990: 75 %), Pa. It is a
+        quantile over equally likely interfaces. NaN otherwise.
     partial_factor, reliability_index : float
         `characteristic_stress` over `stress`, and minus the quantile of the normal
         distribution at the probability.
     of_stress : bool
         Whether the stress is estimated, as by `design_stress`, or the probability.
     quantity : str
-        First quantity of the printed answer: 'stress', 'force' or 'friction_coefficient',
-        as requested. For `design_stress` it is the force if the area is known.
+        First quantity of the printed answer: 'stress', 'force' or
+        'friction_coefficient', as requested. For `design_stress` it is the force
+        if the area is known.
     """
 
     stress: float

@@ -3,9 +3,10 @@
 Problem. Estimate P(T < s) from independent samples of the onset T, so that the
 coefficient of variation is at most a target.
 
-Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With limits on the
-number of samples: Girshick, Mosteller and Savage (1946), Annals of Mathematical
-Statistics 17, 13. Intervals: Clopper and Pearson (1934), Biometrika 26, 404.
+Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With
+limits on the number of samples: Girshick, Mosteller and Savage (1946), Annals of
+Mathematical Statistics 17, 13. Intervals: Clopper and Pearson (1934), Biometrika
+26, 404.
 
 Steps:
 
@@ -50,7 +51,8 @@ class Counted(NamedTuple):
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
-        # If all samples failed, count one more that holds, because no count is certain.
+        # If all samples failed, count one more that holds, because no count is
+        # certain.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 

@@ -1,12 +1,13 @@
 """Counting with many specimens for each solved field.
 
-Problem. Estimate the lower tail of the onset T of specimens whose strength is m b f(x): a
-mean m, a factor b between specimens and a field f within. A handful of parameters (m and
-the law of b) differs between equally likely interfaces of one field, and T is m b R(f) if
-the onset is in proportion to the strength. The solver is needed for R only.
+Problem. Estimate the lower tail of the onset T of specimens whose strength is m b
+f(x): a mean m, a factor b between specimens and a field f within. A handful of
+parameters (m and the law of b) differs between equally likely interfaces of one
+field, and T is m b R(f) if the onset is in proportion to the strength. The solver
+is needed for R only.
 
-Source. Conditional Monte Carlo (Hammersley, 1956, Journal of the ACM 3, 73; Asmussen and
-Glynn, Stochastic Simulation, 2007, section V.4).
+Source. Conditional Monte Carlo (Hammersley, 1956, Journal of the ACM 3, 73;
+Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
 
 Steps:
 

@@ -1,17 +1,19 @@
 """Failure probability, design stress and the curve of both, by counting or by the tail.
 
-Problem. The onset T of a random interface has the distribution P(T < s). Estimate it at a
-stress s, or the stress of a probability, with a given coefficient of variation.
+Problem. The onset T of a random interface has the distribution P(T < s). Estimate
+it at a stress s, or the stress of a probability, with a given coefficient of
+variation.
 
-Sources. Each algorithm has its own file: `counting`, `factors`, `subset`, `two_level`,
-`tail`.
+Sources. Each algorithm has its own file: `counting`, `factors`, `subset`,
+`two_level`, `tail`.
 
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
 2. Count with many specimens for each solved field, if this costs less (`factors`).
 3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the
-   method is too slow for chains (`counting`). Sample the tail if they are rare (`tail`).
+   method is too slow for chains (`counting`). Sample the tail if they are rare
+   (`tail`).
 4. If interfaces are drawn from a fit or a posterior, draw more of them until the error by
    their number is small enough, and repeat steps 1 to 3.
 5. Solve some samples near the stress exactly, if the method is approximate, and warn if
@@ -133,38 +135,40 @@ def failure_probability(
     problem, seed, workers, progress
         As in `monte_carlo`. The total number of samples is an estimate.
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The members of a list are equally likely. From a fit, a posterior, or any object
-        with a method ``interfaces(count, seed)``, as many interfaces are drawn as the
-        target needs, from 1,000 up to 8,000. The answer is then their mean, the
-        predictive probability, and has a `band`.
+        The members of a list are equally likely. From a fit, a posterior, or any
+        object with a method ``interfaces(count, seed)``, as many interfaces are
+        drawn as the target needs, from 1,000 up to 8,000. The answer is then
+        their mean, the predictive probability, and has a `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        `Rupture` and other methods that are too slow for subset simulation use plain Monte
-        Carlo, unless `max_evaluations` is 20,000 or more.
+        `Rupture` and other methods that are too slow for subset simulation use
+        plain Monte Carlo, unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
-        Instead of `stress`: ratio of mean shear stress to mean normal pressure to carry.
-        If the pressure is random, each sample's own pressure counts.
+        Instead of `stress`: ratio of mean shear stress to mean normal pressure to
+        carry. If the pressure is random, each sample's own pressure counts.
     force : float, optional
-        Instead of `stress`: shear force to carry, N. The area of the interface must be
-        known.
+        Instead of `stress`: shear force to carry, N. The area of the interface
+        must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
-        Plain Monte Carlo, subset simulation, or subset simulation by the local criterion
-        with equilibrium as the last level. See the page 'Failure probability' of the
-        documentation. `reason` in the result explains the choice of 'auto'.
+        Plain Monte Carlo, subset simulation, or subset simulation by the local
+        criterion with equilibrium as the last level. See the page 'Failure
+        probability' of the documentation. `reason` in the result explains the
+        choice of 'auto'.
     target_cv : float
-        Coefficient of variation to reach, including the part by the list of interfaces.
+        Coefficient of variation to reach, including the part by the list of
+        interfaces.
     max_evaluations : int, optional
-        Largest number of samples to solve. By default a quarter of an hour on one core,
-        at most 2,000,000 samples, and 1,000 for ruptures.
+        Largest number of samples to solve. By default a quarter of an hour on one
+        core, at most 2,000,000 samples, and 1,000 for ruptures.
     event : {"critical_stress", "first_instability"}
         Whether the interface as a whole has to slide, or the first patch to become
         unstable, arrested or not. By the local criterion they are the same.
     mixture : bool
-        Whether a list of interfaces is complete, such as three equally common batches.
-        The interval then contains the sampling error only. By default the list is a
-        sample of the interfaces that may be true, and a short list makes the interval
-        wide.
+        Whether a list of interfaces is complete, such as three equally common
+        batches. The interval then contains the sampling error only. By default
+        the list is a sample of the interfaces that may be true, and a short list
+        makes the interval wide.
 
     Returns
     -------
@@ -179,12 +183,12 @@ def failure_probability(
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable. `warnings` in the result has the same texts. If the
-        method is the local criterion, equilibrium solves some samples near the stress,
-        too.
+        If the estimate is unreliable. `warnings` in the result has the same
+        texts. If the method is the local criterion, equilibrium solves some
+        samples near the stress, too.
     UnitWarning
-        If the stress is below a fiftieth or above fifty times the mean strength. A factor
-        of a thousand is an `InputError`.
+        If the stress is below a fiftieth or above fifty times the mean strength.
+        A factor of a thousand is an `InputError`.
 
     Examples
     --------
@@ -435,25 +439,26 @@ def design_stress(
 ) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
-    It is a quantile of the onset stress, from one set of repetitions of subset simulation.
+    It is a quantile of the onset stress, from one set of repetitions of subset
+    simulation.
 
     Parameters
     ----------
     probability : float
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
-        `Rupture`, or a method that would take more than a quarter of an hour on one core,
-        is refused unless `max_evaluations` is 20,000 or more.
+        `Rupture`, or a method that would take more than a quarter of an hour on
+        one core, is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
         Coefficient of variation to reach for the failure probability at the stress.
     confidence : float
         Confidence of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
-        Whether to compute the effects of families and constants on the design. By default
-        they are computed if `random` is a fit, a posterior or `uncertain`. A mapping from
-        dotted keys of the problem to ranges, such as
-        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 % on
-        either side.
+        Whether to compute the effects of families and constants on the design. By
+        default they are computed if `random` is a fit, a posterior or
+        `uncertain`. A mapping from dotted keys of the problem to ranges, such as
+        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10
+        % on either side.
     problem, random, seed, max_evaluations, event, mixture, workers, progress
         As in `failure_probability`.
 
@@ -574,8 +579,8 @@ def failure_curve(
         Smallest probability of the curve.
     target_cv : float
         Coefficient of variation to reach at the smallest probability. It is lower
-        elsewhere. Repetitions are added until it is reached. They equal the repetitions
-        of `Study.failure_curve` with the same numbers.
+        elsewhere. Repetitions are added until it is reached. They equal the
+        repetitions of `Study.failure_curve` with the same numbers.
     problem, random, method, seed, max_evaluations, event, mixture, workers, progress
         As in `design_stress`.
 
@@ -583,13 +588,13 @@ def failure_curve(
     -------
     xarray.Dataset
         Over 'point': `stress` and `stress_above_bound` (Pa), `probability` with
-        `probability_low`, `probability_high` and `cv`, and `stress_low` and `stress_high`
-        (Pa). With a normal pressure also `friction_coefficient`, the stress over its
-        mean, and with an area `force` (N). `stress_above_bound` has no meaning if the
-        attribute `lower_bound` is zero or less. For a list of interfaces, `probability`
-        is their mean. `members`, over 'point' and 'member', has the curve of each
-        interface, and 5 and 95 % of the interfaces have at most `band_low` and
-        `band_high`.
+        `probability_low`, `probability_high` and `cv`, and `stress_low` and
+        `stress_high` (Pa). With a normal pressure also `friction_coefficient`,
+        the stress over its mean, and with an area `force` (N).
+        `stress_above_bound` has no meaning if the attribute `lower_bound` is zero
+        or less. For a list of interfaces, `probability` is their mean. `members`,
+        over 'point' and 'member', has the curve of each interface, and 5 and 95 %
+        of the interfaces have at most `band_low` and `band_high`.
 
     Raises
     ------

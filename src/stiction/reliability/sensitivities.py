@@ -1,11 +1,11 @@
 """Effects of families of the factor and of assumed constants on a design.
 
-Problem. The interval of a design contains the error of the computation. Assumptions move
-the design more: constants of the problem that were not measured, and the family of the
-factor. How much?
+Problem. The interval of a design contains the error of the computation.
+Assumptions move the design more: constants of the problem that were not measured,
+and the family of the factor. How much?
 
-Source. Local sensitivities with common random numbers, as in Asmussen and Glynn, Stochastic
-Simulation (2007), chapter VII.
+Source. Local sensitivities with common random numbers, as in Asmussen and Glynn,
+Stochastic Simulation (2007), chapter VII.
 
 Steps, with the same draws everywhere, so that differences are accurate:
 

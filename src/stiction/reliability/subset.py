@@ -1,28 +1,30 @@
 """Subset simulation of any function of standard normal draws.
 
-Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z, where the
-probability is so small that nearly no plain sample is below y.
+Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z,
+where the probability is so small that nearly no plain sample is below y.
 
 Source. Au and Beck (2001), Probabilistic Engineering Mechanics 16, 263, with the
-conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub (2015), a preconditioned
-Crank-Nicolson walk whose acceptance does not fall with the dimension.
+conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub (2015), a
+preconditioned Crank-Nicolson walk whose acceptance does not fall with the
+dimension.
 
 Steps. A level is the set of z with g(z) below its ceiling.
 
 1. Draw N samples and evaluate them: the first level, whose ceiling is infinite.
 2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. If
-   this is below the requested threshold, take the threshold. If it is at the floor of g,
-   take the number just above the floor.
+   this is below the requested threshold, take the threshold. If it is at the
+   floor of g, take the number just above the floor.
 3. The probability of the next level is the probability of this level times the share of
    its samples strictly below the ceiling.
 4. Stop if the threshold, the floor or the requested probability is reached. Stop without
-   having reached it if no sample goes on, after `MOST_LEVELS`, or if evaluations do not
-   suffice.
+   having reached it if no sample goes on, after `MOST_LEVELS`, or if evaluations
+   do not suffice.
 5. Each sample that goes on begins a chain, about N states in all. A step takes z to z' =
-   sqrt(1 - b^2) z + b w, with w standard normal, which leaves the normal distribution as
-   it is. The chain stays at z where g(z') is not below the ceiling. After step t, b is
-   multiplied by exp((share of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b = 1. The
-   states are the samples of the next level: go on with 2.
+   sqrt(1 - b^2) z + b w, with w standard normal, which leaves the normal
+   distribution as it is. The chain stays at z where g(z') is not below the
+   ceiling. After step t, b is multiplied by exp((share of accepted steps -
+   `ACCEPTANCE`) / sqrt(t)), up to b = 1. The states are the samples of the next
+   level: go on with 2.
 6. P(g < y) is the probability of the rarest level whose ceiling is at least y, times the
    share of its samples below y. The error follows from their first ancestors
    (`uncertainty.ancestral_variance`).

@@ -9,20 +9,21 @@ Source. Independent repetitions of subset simulation (`subset`) or of two levels
 Steps:
 
 1. If the algorithm is 'auto' and two levels are possible, solve a pilot of plain samples
-   by the method and by its less expensive first stage, the guide. Take two levels if the
-   weakest tenth by the guide contains at least `LEAST_SHARE_PICKED` of the weakest
-   fiftieth of the samples.
+   by the method and by its less expensive first stage, the guide. Take two levels
+   if the weakest tenth by the guide contains at least `LEAST_SHARE_PICKED` of the
+   weakest fiftieth of the samples.
 2. Make a repetition of moderate size. It depends on the seed and its number only.
 3. Pool repetitions: p = sum of w_r p_r, with shares w_r in proportion to their numbers of
-   samples, which do not depend on the outcome. The squared coefficient of variation is
-   the sum of (w_r p_r)^2 v_r over p^2, with the relative variances v_r.
+   samples, which do not depend on the outcome. The squared coefficient of
+   variation is the sum of (w_r p_r)^2 v_r over p^2, with the relative variances
+   v_r.
 4. If it is above the target, make the next repetition (2) and pool again (3). Its size
    would reach the target, within the limits of size and evaluations.
 5. If fewer than a share `POOR` of the samples of a guide that 'auto' chose are failures,
    sample again by subset simulation.
 6. The stress of a probability follows from p(s) by bisection. The ends of its interval
-   are the stresses of the ends of the interval of p. The lower end is the least possible
-   stress if no sample is so low.
+   are the stresses of the ends of the interval of p. The lower end is the least
+   possible stress if no sample is so low.
 """
 
 import math

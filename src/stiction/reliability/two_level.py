@@ -1,28 +1,29 @@
 """Two levels: an inexpensive limit state guides down the tail, and the exact limit state ends it.
 
-Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help of the
-guide's stress L, which is not. By the definition of conditional probabilities, for any
-ceiling b,
+Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help
+of the guide's stress L, which is not. By the definition of conditional
+probabilities, for any ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-If L follows E closely, the last factor is near one and the middle factor is not small.
-Then a few hundred exact evaluations replace thousands.
+If L follows E closely, the last factor is near one and the middle factor is not
+small. Then a few hundred exact evaluations replace thousands.
 
-Source. Subset simulation with less expensive models on its first levels is due to Ullmann
-and Papaioannou (2015), Multilevel estimation of rare events. The choice of b and the
-walks that measure the last factor are our own.
+Source. Subset simulation with less expensive models on its first levels is due to
+Ullmann and Papaioannou (2015), Multilevel estimation of rare events. The choice
+of b and the walks that measure the last factor are our own.
 
 Steps:
 
 1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times as many samples per
    level. Its levels are candidates for L < b, each with its P(L < b).
 2. From the rarest level on, solve some of its samples exactly. The share with E < s is the
-   middle factor. If a probability is requested, s is the quantile of these that meets it.
+   middle factor. If a probability is requested, s is the quantile of these that
+   meets it.
 3. From failures among these, walk among the failures E < s (`subset.grow`), and forget
-   the first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is the last
-   factor. `_covered` estimates its error, with one observation for each family of
-   walkers.
+   the first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is
+   the last factor. `_covered` estimates its error, with one observation for each
+   family of walkers.
 4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise go on with 2 at
    the next less rare level, as far as evaluations and levels with draws allow.
 
@@ -59,7 +60,8 @@ def _covered(
     # Walkers of one ancestor are alike, so each family is one observation.
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last) / (walkers * last)
-    # A family of share w pulls the mean: its square is (1 - 2 w + sum w^2) of that about the truth.
+    # A family of share w pulls the mean: its square is (1 - 2 w + sum w^2) of
+    # that about the truth.
     shares = np.bincount(group) / walkers
     squares = shares * shares
     kept = float(squares @ (1.0 - 2.0 * shares + squares.sum()))

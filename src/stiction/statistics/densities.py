@@ -2,8 +2,8 @@
 
 Problem: estimate the density of N independent values, without crossing given bounds.
 
-Algorithm (`density`), after B. W. Silverman, Density Estimation for Statistics and Data
-Analysis, 1986:
+Algorithm (`density`), after B. W. Silverman, Density Estimation for Statistics
+and Data Analysis, 1986:
 
 1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
 2. Count the values in the cells of the grid.
@@ -38,7 +38,8 @@ class Density(Result):
     Attributes
     ----------
     x, value : (m,) arrays
-        Centres of equal cells, in the unit of the values, and the density there, 1/unit.
+        Centres of equal cells, in the unit of the values, and the density there,
+        1/unit.
     error : (m,) array
         Standard error of the density from sampling, without the effect of smoothing.
     bandwidth : float
@@ -61,8 +62,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     ----------
     values : (samples,) array
     bounds : (float or None, float or None)
-        Lower and upper bound of the distribution, if any, in the unit of the values. Use the bounds
-        of the marginal for strength.
+        Lower and upper bound of the distribution, if any, in the unit of the
+        values. Use the bounds of the marginal for strength.
 
     Notes
     -----
@@ -110,7 +111,8 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
         raise InputError(f"values: {smallest:g} is below the lower bound {low:g}")
     if largest > high:
         raise InputError(f"values: {largest:g} is above the upper bound {high:g}")
-    # A bound far from the sample would waste cells, as the kernel never reaches half a spread.
+    # A bound far from the sample would waste cells, as the kernel never reaches
+    # half a spread.
     return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
 
 

@@ -63,8 +63,8 @@ class Quantiles(Result):
     value : (m,) array
         Quantiles of the sample, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of their 95 % confidence intervals. Infinite if the sample is too small to bound a
-        quantile.
+        Ends of their 95 % confidence intervals. Infinite if the sample is too
+        small to bound a quantile.
     unit : str
         Unit of the values, if they state a unit, as an `xarray.DataArray` does.
     """
@@ -116,7 +116,8 @@ def quantiles(values: Any, probability: Numbers) -> Quantiles:
     if (wrong := p[~((p > 0.0) & (p < 1.0))]).size:
         raise InputError(f"probability: must be between 0 and 1, exclusive, got {wrong[0]:g}")
     n, tail = ordered.size, 0.025
-    # Rank r is a lower end if fewer than r values lie below the quantile with probability <= tail.
+    # Rank r is a lower end if fewer than r values lie below the quantile with
+    # probability <= tail.
     low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)
     high = scipy.stats.binom.isf(tail, n, p).astype(int) + 1  # P(B >= high) <= tail
     padded = np.concatenate(([-np.inf], ordered, [np.inf]))

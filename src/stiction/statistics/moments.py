@@ -61,8 +61,9 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     Raises
     ------
     InputError
-        If the weakening rate, the load, the initial stress or the pressure of coefficients
-        varies along the interface, or if a critical patch is larger than the interface.
+        If the weakening rate, the load, the initial stress or the pressure of
+        coefficients varies along the interface, or if a critical patch is larger
+        than the interface.
 
     Notes
     -----
@@ -71,8 +72,9 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     wave vectors, the spectrum of tau_p times the squared transform of the weight. The correlation
     of tau_p follows by Hermite expansion (Grigoriu, 1995).
 
-    On a plane tau_n is the average over the middle ellipse of `LocalCriterion`. The method takes
-    the least over several ellipses, which has no closed-form moments.
+    On a plane tau_n is the average over the middle ellipse of `LocalCriterion`.
+    The method takes the least over several ellipses, which has no closed-form
+    moments.
 
     Examples
     --------
@@ -100,7 +102,8 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
     """Return the share of Var[tau_p] at each wave of `Interface.transform`; the sum is 1."""
     interface = problem.interface
-    # The spectrum is the transform of the correlation. A mode stands for its conjugate, too.
+    # The spectrum is the transform of the correlation. A mode stands for its
+    # conjugate, too.
     power = interface.transform(strength.correlation(interface)).real / interface.size
     power[..., 1 : interface.shape[-1] // 2] *= 2.0
     return np.maximum(power, 0.0)

@@ -88,7 +88,8 @@ class StoredRun:
     path : Path
     study : Study
     settings : dict, optional
-        Smallest probability and event of failure curves. A run of samples has no settings.
+        Smallest probability and event of failure curves. A run of samples has no
+        settings.
     """
 
     def __init__(self, store: Store, study: Any, settings: dict[str, Any] | None) -> None:
@@ -180,8 +181,8 @@ class StoredRun:
         partial : bool
             Whether to write the stored part of an incomplete run.
         events : bool
-            Whether a table (.csv) has a row for each event, as `stiction.external.event_table`,
-            instead of a row for each sample.
+            Whether a table (.csv) has a row for each event, as
+            `stiction.external.event_table`, instead of a row for each sample.
 
         Raises
         ------
@@ -244,20 +245,21 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     Parameters
     ----------
     result : xarray.Dataset
-        From `equilibrium_path` or `simulate_rupture`, or from `onset`, `monte_carlo` or a study
-        whose method has ``events=``.
+        From `equilibrium_path` or `simulate_rupture`, or from `onset`,
+        `monte_carlo` or a study whose method has ``events=``.
 
     Returns
     -------
     pandas.DataFrame
-        Columns are named ``name (unit)``: the sweep and the sample, if there are any, the number
-        of the event in its sample, and its variables (see `equilibrium_path`).
+        Columns are named ``name (unit)``: the sweep and the sample, if there are
+        any, the number of the event in its sample, and its variables (see
+        `equilibrium_path`).
 
     Raises
     ------
     InputError
-        If the result has no events. An `AccuracyWarning` says if samples have more events than it
-        keeps.
+        If the result has no events. An `AccuracyWarning` says if samples have
+        more events than it keeps.
 
     Examples
     --------

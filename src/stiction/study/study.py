@@ -202,15 +202,16 @@ class Study(_Parts):
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes that are crossed. Each axis maps dotted keys, which vary together, to lists
-        of values. Every point of the sweep has the same samples.
+        Axes that are crossed. Each axis maps dotted keys, which vary together, to
+        lists of values. Every point of the sweep has the same samples.
     uncertain : dict, optional
         Distributions of parameters of ``random`` by dotted key, as in
         `RandomInterface.uncertain`, and their ``count``, by default 30. That many
-        interfaces are drawn with the seed and are equally likely. `failure_curve` gives
-        their mean and band, and `run` samples over them.
+        interfaces are drawn with the seed and are equally likely. `failure_curve`
+        gives their mean and band, and `run` samples over them.
     mixture : bool
-        Whether a list in ``random`` is complete, as in `stiction.failure_probability`.
+        Whether a list in ``random`` is complete, as in
+        `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the places of its stations.
     reliability : Question, optional
@@ -218,16 +219,17 @@ class Study(_Parts):
         ``friction_coefficient`` to carry, or the ``probability`` of a design, with
         ``target_cv``.
     peaks : Peaks or as of `stiction.infer`, optional
-        Peaks of tests from which ``random`` was not inferred: `stiction reliability` compares them
-        with its prediction. In a study file the name of a file that `read_peaks` reads.
+        Peaks of tests from which ``random`` was not inferred: `stiction
+        reliability` compares them with its prediction. In a study file the name
+        of a file that `read_peaks` reads.
     title : str
         Title of the study, for readers.
 
     Raises
     ------
     InputError
-        If a key is missing, unknown or out of range, or a point of the sweep is not a valid
-        study. The message lists every problem.
+        If a key is missing, unknown or out of range, or a point of the sweep is
+        not a valid study. The message lists every problem.
 
     Examples
     --------
@@ -387,14 +389,14 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are computed. The same call resumes
-            an interrupted run, computes failed samples again, and adds samples if
-            `samples` was raised.
+            Folder in which results are stored as they are computed. The same call
+            resumes an interrupted run, computes failed samples again, and adds
+            samples if `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
-            Part to compute in an independent job, such as "3/100". All parts go into the
-            same folder.
+            Part to compute in an independent job, such as "3/100". All parts go
+            into the same folder.
 
         Returns
         -------
@@ -405,8 +407,8 @@ class Study(_Parts):
         Raises
         ------
         InputError, RunError
-            See `stiction.monte_carlo`. Also if `out` holds another study, or a worker is
-            lost.
+            See `stiction.monte_carlo`. Also if `out` holds another study, or a
+            worker is lost.
         StoreError
             If `out` cannot be used.
         """
@@ -451,11 +453,12 @@ class Study(_Parts):
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are computed. The same call
-            resumes an interrupted run, and adds repetitions if `repetitions` was raised.
+            Folder in which repetitions are stored as they are computed. The same
+            call resumes an interrupted run, and adds repetitions if `repetitions`
+            was raised.
         repetitions : int
-            Eight repetitions give a coefficient of variation of about 0.2 at 1e-9, and 32
-            give half of that.
+            Eight repetitions give a coefficient of variation of about 0.2 at
+            1e-9, and 32 give half of that.
         smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
@@ -464,14 +467,15 @@ class Study(_Parts):
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, from stored and computed repetitions, over
-            the axes of the sweep too, with `lower_bound` (Pa). A point without
-            repetitions has NaN.
+            As from `stiction.failure_curve`, from stored and computed
+            repetitions, over the axes of the sweep too, with `lower_bound` (Pa).
+            A point without repetitions has NaN.
 
         Raises
         ------
         InputError, StoreError, RunError
-            As `run`, and if a method is `Rupture`, whose failures can only be counted.
+            As `run`, and if a method is `Rupture`, whose failures can only be
+            counted.
         """
         settings = {"smallest": smallest, "event": event}
         rows = Repetitions(self.experiments, repetitions, settings)

@@ -127,7 +127,8 @@ def _announce(part: list[str], kept: bool) -> None:
     when = "on first use only, then cached" if kept else "for your friction law; not cached"
     for text in {f"{name} ({when})" for name in part} - _announced:
         _announced.add(text)
-        # In a notebook the line would stay, and progress says that kernels are compiled.
+        # In a notebook the line would stay, and progress says that kernels are
+        # compiled.
         level = logging.INFO if "ipykernel" in sys.modules else logging.WARNING
         logger.log(level, "compiling kernels: %s", text)
 

@@ -39,7 +39,8 @@ MAX_NEWTON_STEPS = 50
 PLACE_ATOL = 1e-11  # change of the place, in nodes, that is round-off
 NO_NODE = -1
 
-# Coefficients of the polynomial through ten nodes, in powers of the distance from their middle.
+# Coefficients of the polynomial through ten nodes, in powers of the distance from
+# their middle.
 _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
 
@@ -208,7 +209,8 @@ def _minimum_of_rows(
     for row in range(excess.shape[0]):
         strength = excess[row]
         convolve(transform, multiplier, strength, spectrum, values)
-        # The exact average is at least the least ratio. Round-off of the transforms may be below.
+        # The exact average is at least the least ratio. Round-off of the
+        # transforms may be below.
         least = np.inf
         for i in range(nodes):
             least = min(least, multiplier[0] * strength[i] / profile[i])

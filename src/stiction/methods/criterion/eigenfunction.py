@@ -8,8 +8,8 @@ weight g of the local criterion is v with unit integral,
 
     g(cos t) = sum over odd m of b_m sin(m t),  b_m = 2 a_m/pi,  a_1 = 1.
 
-The weights of a grid must not be negative, so that an average lies between the least and the
-greatest strength.
+The weights of a grid must not be negative, so that an average lies between the
+least and the greatest strength.
 
 Algorithm
 ---------
@@ -49,7 +49,8 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
 
     a = np.diag(np.pi * k / 4.0)
     b = 0.5 * (integral(k[:, None] - k[None, :]) - integral(k[:, None] + k[None, :]))
-    # B is well conditioned only for the smallest eigenvalues, so solve for 1/lambda instead.
+    # B is well conditioned only for the smallest eigenvalues, so solve for
+    # 1/lambda instead.
     inverse, vectors = scipy.linalg.eigh(b, a)
     vector = vectors[:, -1] / vectors[0, -1]
     vector[1::2] = 0.0  # the first eigenfunction is even
@@ -83,9 +84,10 @@ def multiplier(z: Array) -> Array:
 def grid_weights(half_width: float) -> Array:
     """Return weights w_0, w_1 = w_-1, ... for nodes 0, 1, ... from the centre of a patch.
 
-    `half_width` is h_n/2 in nodes, and w_0 + 2 (w_1 + w_2 + ...) = 1. If weights are not negative,
-    an average lies between the least and the greatest strength even if the strength jumps. Weights
-    by a product with the transform of g would ring.
+    `half_width` is h_n/2 in nodes, and w_0 + 2 (w_1 + w_2 + ...) = 1. If weights
+    are not negative, an average lies between the least and the greatest strength
+    even if the strength jumps. Weights by a product with the transform of g would
+    ring.
 
     Inside a patch plain samples of g are accurate (the trapezoidal rule). Its ends, where g falls
     like a square root, need other weights (B. Alpert, SIAM J. Sci. Comput. 20, 1551, 1999). These

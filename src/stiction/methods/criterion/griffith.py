@@ -9,8 +9,8 @@ Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959) are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
-and the energy release rate is G = K |K|/(2 G*). A crack runs once G exceeds the fracture energy
-(A. Griffith, Phil. Trans. A 221, 1921).
+and the energy release rate is G = K |K|/(2 G*). A crack runs once G exceeds the
+fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
@@ -44,8 +44,8 @@ def energy_release_rate(
     Parameters
     ----------
     problem : Problem
-        A line. Its load profile, initial stress and residual strength give the stress drop
-        tau_i + tau_0 p - tau_r.
+        A line. Its load profile, initial stress and residual strength give the
+        stress drop tau_i + tau_0 p - tau_r.
     load : float
         tau_0, Pa.
     lengths : (m,) array or float
@@ -56,7 +56,8 @@ def energy_release_rate(
     Returns
     -------
     (m, 2) array, J/m²
-        At the left and the right tip. Negative if the stress drop acts against the crack there.
+        At the left and the right tip. Negative if the stress drop acts against
+        the crack there.
 
     Raises
     ------
@@ -112,8 +113,9 @@ def griffith_length(
     centre : float
         Centre of the crack, m, at equal distances from both tips.
     arrest : bool
-        False returns the shortest length above which the smaller of the two release rates exceeds
-        Gamma, True the next length at which it falls below Gamma again.
+        False returns the shortest length above which the smaller of the two
+        release rates exceeds Gamma, True the next length at which it falls below
+        Gamma again.
 
     Returns
     -------

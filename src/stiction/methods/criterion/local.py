@@ -45,11 +45,13 @@ OF_SPECIMENS = {
 class LocalCriterion:
     """Onset at the minimum of the nucleation stress, with each patch taken in isolation.
 
-    If no node reaches its residual strength (or zero) before the onset, this is an upper bound of
-    the exact onset, up to discretisation: interaction only makes patches unstable earlier. If nodes
-    do reach it, the onset comes later than predicted. Events are assumed not to be arrested, so
-    `first_instability` and `critical_stress` are equal. If a quick test leaves a doubt, `onset` and
-    `monte_carlo` compare samples with `Equilibrium` and warn of differences above 1 %.
+    If no node reaches its residual strength (or zero) before the onset, this is
+    an upper bound of the exact onset, up to discretisation: interaction only
+    makes patches unstable earlier. If nodes do reach it, the onset comes later
+    than predicted. Events are assumed not to be arrested, so `first_instability`
+    and `critical_stress` are equal. If a quick test leaves a doubt, `onset` and
+    `monte_carlo` compare samples with `Equilibrium` and warn of differences above
+    1 %.
 
     Notes
     -----
@@ -59,23 +61,26 @@ class LocalCriterion:
     `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A law that
     steepens raises an error.
 
-    If the interface ends, patches lie within its extent. Between half-spaces stresses leave out
-    what slip hands to the nodes beyond before the onset. They were too high by up to 15 % on a part
-    of four nucleation lengths, and by up to 0.04 % on a part of 17.
+    If the interface ends, patches lie within its extent. Between half-spaces
+    stresses leave out what slip hands to the nodes beyond before the onset. They
+    were too high by up to 15 % on a part of four nucleation lengths, and by up to
+    0.04 % on a part of 17.
 
-    On a plane the average is over critical ellipses with five aspect ratios. Each is the smallest
-    ellipse on which the stiffness K - W of the discrete problem is unstable, and its eigenvector is
-    the weight. The minimum is taken over nodes and ellipses. `critical_aspect`,
-    `critical_patch_extent` (m, along x and y) and `critical_patch_area` (m²) describe the critical
-    ellipse.
+    On a plane the average is over critical ellipses with five aspect ratios. Each
+    is the smallest ellipse on which the stiffness K - W of the discrete problem
+    is unstable, and its eigenvector is the weight. The minimum is taken over
+    nodes and ellipses. `critical_aspect`, `critical_patch_extent` (m, along x and
+    y) and `critical_patch_area` (m²) describe the critical ellipse.
 
-    On a specimen each place has its own nucleation length: the shortest run of nodes on which the
-    stiffness of the blocks is unstable, with the eigenvector as the weight. `critical_patch_length`
-    (m) is the nucleation length at the critical place. Behind a machine, stable slip lowers the
-    mean stress below the drive, `critical_load`. The stresses returned take off an estimate for the
-    critical patch alone. The slip of other patches is not known, so the stresses are too high, in
-    six set-ups by 0.2 to 5 % in mode II, like the drive itself. A pusher near the interface causes
-    events long before the interface slides. `critical_stress` is then far too low.
+    On a specimen each place has its own nucleation length: the shortest run of
+    nodes on which the stiffness of the blocks is unstable, with the eigenvector
+    as the weight. `critical_patch_length` (m) is the nucleation length at the
+    critical place. Behind a machine, stable slip lowers the mean stress below the
+    drive, `critical_load`. The stresses returned take off an estimate for the
+    critical patch alone. The slip of other patches is not known, so the stresses
+    are too high, in six set-ups by 0.2 to 5 % in mode II, like the drive itself.
+    A pusher near the interface causes events long before the interface slides.
+    `critical_stress` is then far too low.
 
     Examples
     --------
@@ -235,7 +240,8 @@ def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) ->
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
-    # The last row and column are the added equation and its unknown force, scaled like the others.
+    # The last row and column are the added equation and its unknown force, scaled
+    # like the others.
     matrix[[0, -2], -1] = matrix[-1, [0, -2]] = rate
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]
@@ -246,10 +252,11 @@ def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) ->
 def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
-    This is the load tau_0 at which an isolated patch of length h_n centred at x becomes unstable:
-    the average of tau_p - tau_i over h_n with the critical slip-rate profile as weight, divided by
-    the same average of the load profile (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020,
-    Eq. 9). On a plane it is the least over five ellipses.
+    This is the load tau_0 at which an isolated patch of length h_n centred at x
+    becomes unstable: the average of tau_p - tau_i over h_n with the critical
+    slip-rate profile as weight, divided by the same average of the load profile
+    (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020, Eq. 9). On a plane it
+    is the least over five ellipses.
 
     Parameters
     ----------
@@ -266,7 +273,8 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     Raises
     ------
     InputError
-        If the weakening rate varies along the interface, or if a critical patch does not fit on it.
+        If the weakening rate varies along the interface, or if a critical patch
+        does not fit on it.
 
     Examples
     --------
@@ -288,7 +296,8 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     windows = windows_of(problem, rate)
     samples = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(fields)) for fields in samples])
-    # These bounds hold for the exact average. Round-off of the transforms may exceed them.
+    # These bounds hold for the exact average. Round-off of the transforms may
+    # exceed them.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
     result = np.clip(result, low, high)

@@ -6,8 +6,9 @@ Does a line have an equilibrium at the load tau_0, that is a slip d >= 0 (m) wit
 
     K d + max(tau_p - W d, tau_r) >= tau_i + tau_0 p ?
 
-A predicted load is right to 1 % if there is an equilibrium at 0.99 times the load and no
-equilibrium at 1.01 times the load. If it is not, wider brackets tell by how much it is off.
+A predicted load is right to 1 % if there is an equilibrium at 0.99 times the load
+and no equilibrium at 1.01 times the load. If it is not, wider brackets tell by
+how much it is off.
 
 Algorithm
 ---------
@@ -55,8 +56,8 @@ GRIFFITH_MARGIN = 1.5
 def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
     """Return the relative distance of exact onsets from predicted onsets, rms over samples.
 
-    It is an estimate. Differences below the narrowest bracket, 1 %, count as zero. It is infinite
-    if a sample is undecided.
+    It is an estimate. Differences below the narrowest bracket, 1 %, count as
+    zero. It is infinite if a sample is undecided.
 
     Parameters
     ----------

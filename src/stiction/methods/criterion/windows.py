@@ -16,9 +16,9 @@ Rice (J. Geophys. Res. 108, 2003) as weights of the nodes (`eigenfunction`). On 
 ellipse, for each of five aspects:
 
 1. Start with a small box of nodes of the plane, made periodic with the stiffness between its own
-   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the problem on an
-   ellipse of at most half the length of the box stays the same. The cost follows the size of the
-   ellipse, not of the plane.
+   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the
+   problem on an ellipse of at most half the length of the box stays the same. The
+   cost follows the size of the ellipse, not of the plane.
 2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at most W
    (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
 3. If every ellipse in the box is stable, double the box and go to 2. If the box is the plane
@@ -42,8 +42,8 @@ from stiction.methods.criterion.eigenfunction import around, grid_weights
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 
-# Aspects of the ellipses, relative to the middle ellipse. With the paper's strength nine shapes
-# from 0.8 to 2 lower the bound by less than 0.05 % more.
+# Aspects of the ellipses, relative to the middle ellipse. With the paper's
+# strength nine shapes from 0.8 to 2 lower the bound by less than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
 EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
 MAX_ELLIPSE_ITERATIONS = 500

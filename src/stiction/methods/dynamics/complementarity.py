@@ -6,10 +6,11 @@ Find the increments u >= 0 of slip (m) of a step, such that at every node
 
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
-g is the stress at the end of a step without slip (`tables.trial_stress`). M is a circulant matrix
-with positive eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and radiation. The strength
-of a node follows a straight line, b - w u, and with u it may pass to another line. w is the rate at
-which the node weakens (`tables.falling`), and g - b is `tables.driving`.
+g is the stress at the end of a step without slip (`tables.trial_stress`). M is a
+circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity,
+memory and radiation. The strength of a node follows a straight line, b - w u, and
+with u it may pass to another line. w is the rate at which the node weakens
+(`tables.falling`), and g - b is `tables.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
@@ -19,9 +20,9 @@ Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
 1. Begin with the set S of nodes that slip already or whose trial stress is above their strength,
    on the straight lines of the first guess.
 2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`). This uses the
-   conjugate gradients by M. Hestenes and E. Stiefel (Journal of Research of the National Bureau
-   of Standards 49, 1952), preconditioned with M^-1, cut to S. Letters are theirs: residual r,
-   direction p, z = M^-1 r.
+   conjugate gradients by M. Hestenes and E. Stiefel (Journal of Research of the
+   National Bureau of Standards 49, 1952), preconditioned with M^-1, cut to S.
+   Letters are theirs: residual r, direction p, z = M^-1 r.
 3. Nodes outside S whose stress is above their strength join S, and nodes with u < 0 leave it.
    Every node takes the straight line that belongs to its u.
 4. Repeat from 2 until no node changes.

@@ -9,7 +9,8 @@ slip d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 
-The state of a node follows from the stress that it would carry at rest and its strength s(d):
+The state of a node follows from the stress that it would carry at rest and its
+strength s(d):
 
     V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.            (2)
 

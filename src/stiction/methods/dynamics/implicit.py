@@ -8,16 +8,16 @@ that step, and r = h/(h + h'). To second order the slip rate at the end of the s
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
-as in the two-step backward differences of C. F. Curtiss and J. O. Hirschfelder (Proceedings
-of the National Academy of Sciences 38, 1952). In the step the rate changes linearly, with
-the slope a = 2 r (u/h - V')/h. Without an earlier step r = 0, and the step is of first order.
-The stress at the end is, mode by mode,
+as in the two-step backward differences of C. F. Curtiss and J. O. Hirschfelder
+(Proceedings of the National Academy of Sciences 38, 1952). In the step the rate
+changes linearly, with the slope a = 2 r (u/h - V')/h. Without an earlier step r =
+0, and the step is of first order. The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
         + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
 
-with S, B and R of `memory`. This is linear in u, so u solves the complementarity problem of
-`complementarity` with a circulant matrix.
+with S, B and R of `memory`. This is linear in u, so u solves the complementarity
+problem of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
@@ -26,8 +26,9 @@ Algorithm
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
 4. Go to 1 with half the size if no u is found (a patch is unstable at this size), if a node
-   weakens too much (`_effect`), or if the interface accelerates too much (`_accelerates`). If
-   half the size is below the smallest size, explicit steps take over.
+   weakens too much (`_effect`), or if the interface accelerates too much
+   (`_accelerates`). If half the size is below the smallest size, explicit steps
+   take over.
 5. Take the step (`_accept`), and update the diagnostics (`diagnostics`).
 6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes change by powers of
    sqrt 2, so that tables can be used again.
@@ -70,7 +71,8 @@ _SMALL_DROP = 0.1  # a node with a smaller tau_p - tau_r is not resolved to `sli
 _FREE_LOAD_RISE = 5e-7  # rise of the load in a step with any acceleration
 _NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
 _MAX_ACCELERATION = 1.3  # largest factor of this growth
-# Sizes are powers of sqrt(2) times the smallest size, up to round-off, which must not decide.
+# Sizes are powers of sqrt(2) times the smallest size, up to round-off, which must
+# not decide.
 _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
@@ -189,7 +191,8 @@ def _accelerates(
     noticed = _NOTICED_RADIATION * now.scale
     allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
     growing = radiated > noticed and radiated > allowed
-    # At the smallest size, waves of an arrested event alone are no reason for explicit steps.
+    # At the smallest size, waves of an arrested event alone are no reason for
+    # explicit steps.
     halved = 0.5 * attempt.size >= _JUST_BELOW * thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
     return growing and matters and shorter and attempt.ratio > 0.0

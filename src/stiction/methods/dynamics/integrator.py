@@ -69,8 +69,9 @@ class Run:
     setting: Setting
     stop: str  # as `Rupture.stop`
     steepest_rate: float  # largest weakening rate at any slip of nodes that may break, Pa/m
-    # Load below which no patch runs away: the mean strength of the weakest nodes that make up half
-    # a nucleation length, Pa. A few nodes of almost no strength hardly lower this mean.
+    # Load below which no patch runs away: the mean strength of the weakest nodes
+    # that make up half a nucleation length, Pa. A few nodes of almost no strength
+    # hardly lower this mean.
     least_load: float
     # Tables of the last kind of step only, since they are large.
     tables: ExplicitTables | ImplicitTables | None = None
@@ -138,7 +139,8 @@ class Run:
         limit = self.strength_after(delta)
         excess = stress - limit
         rate = np.maximum(excess, 0.0) / impedance
-        # A node that has just reached its strength has not begun to slip: drop round-off.
+        # A node that has just reached its strength has not begun to slip: drop
+        # round-off.
         rate[rate * impedance < _REACHED_SHARE * nodes.strength] = 0.0
         stress = stress - impedance * rate
         diagnostics = np.zeros(1, DIAGNOSTICS)

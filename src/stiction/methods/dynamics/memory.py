@@ -10,9 +10,9 @@ It is therefore enough to know a memory variable for each pair (s_p, w_p) and mo
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
-The real and the imaginary part of V are two real signals, each with its own complex psi_p. On a
-plane the pairs before `Grid.split` have the weight (kx/k)² w_p. The pairs of mode III follow, with
-the weight (1 - (kx/k)²) w_p.
+The real and the imaginary part of V are two real signals, each with its own
+complex psi_p. On a plane the pairs before `Grid.split` have the weight (kx/k)²
+w_p. The pairs of mode III follow, with the weight (1 - (kx/k)²) w_p.
 
 Algorithm
 ---------
@@ -25,14 +25,16 @@ polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z)
 
        y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
 
-   (`advance_memory`). The sum is the part of S at the end of the next step that is already known.
-   The slip rate of that step adds V Re sum_p w_p B (`response` of `step_table`).
+   (`advance_memory`). The sum is the part of S at the end of the next step that
+   is already known. The slip rate of that step adds V Re sum_p w_p B (`response`
+   of `step_table`).
 2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are stored as psi:
 
        psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
 
-   (`advance_with_ramp`, with the tables of `tabulate`). Before that `fading_memory` sums
-   Re sum_p w_p E psi, the part of S at the end of the step that is already known.
+   (`advance_with_ramp`, with the tables of `tabulate`). Before that
+   `fading_memory` sums Re sum_p w_p E psi, the part of S at the end of the step
+   that is already known.
 3. Between the two kinds of steps `to_explicit` divides by B and `to_implicit` multiplies by B.
    They set `Phase`, which tells the form of `RuptureState.memory`.
 
@@ -176,8 +178,9 @@ def advance_memory(
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):
-        # Views begin at zero, so that the compiler can exclude negative indices. Make them once per
-        # block and not for each pair, since a view costs as much as a few modes.
+        # Views begin at zero, so that the compiler can exclude negative indices.
+        # Make them once per block and not for each pair, since a view costs as
+        # much as a few modes.
         e = table[table_block * size :][:size]
         for copy in range(multiplicity):
             block = table_block * multiplicity + copy
@@ -339,7 +342,8 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(TWO_ROWS):
             tables.packed[block * TWO_ROWS + j] = sums[0, j]
             tables.second_packed[block * TWO_ROWS + j] = sums[1, j]
-    # The tables do not hold the shares of the modes on a plane: weight the two sums here.
+    # The tables do not hold the shares of the modes on a plane: weight the two
+    # sums here.
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
         share_three = 1.0 - share

@@ -160,7 +160,8 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
-    # Weights of the corners (row, axis, column) in a mean strain, and in an hourglass mode.
+    # Weights of the corners (row, axis, column) in a mean strain, and in an
+    # hourglass mode.
     along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
     up = [0.5 * np.multiply.outer(sign, np.outer(axis, [1.0, 1.0])) for axis in axes]
     twist = [np.multiply.outer(sign, np.outer(axis, sign)) for axis in axes]
@@ -185,8 +186,8 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
 def _stencils(elements: Array, strips: Array) -> Array:
     """Return the coefficients of the force on a node, (rows, axis, 5, 3).
 
-    The last index is the row below, the row of the node, and the row above. The five coefficients
-    belong to
+    The last index is the row below, the row of the node, and the row above. The
+    five coefficients belong to
 
     - the sum of both neighbours in a row, and the node itself,
     - the difference of both neighbours in the other component,
@@ -223,7 +224,8 @@ def _limit(
 ) -> float:
     """Return the largest stable step of mesh, viscosity and correction together, s."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
-    # Bound of the squared frequency of an element, then of the correction on the interface.
+    # Bound of the squared frequency of an element, then of the correction on the
+    # interface.
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
     stiffest = float(
         scipy.linalg.eigvalsh(correction, subset_by_index=[len(correction) - 1] * 2)[0]

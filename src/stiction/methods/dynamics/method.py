@@ -74,53 +74,60 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, explicit steps its rupture. Initial
-    stress may be above the strength: such a patch breaks at once, at zero load.
+    Adaptive implicit steps follow the creeping interface, explicit steps its
+    rupture. Initial stress may be above the strength: such a patch breaks at
+    once, at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Between half-spaces, give either this or `load`.
     kernel_tolerance : float
-        Largest error (1) of the memory kernel, a sum of exponentials. The sum is fitted once for
-        each solid and stored on disk. The fit takes 1 s at 1e-6 (22 pairs) or half a minute at
-        1e-8 (35 pairs). Above about 1e-3 waves may grow at any time step, which raises an error.
+        Largest error (1) of the memory kernel, a sum of exponentials. The sum is
+        fitted once for each solid and stored on disk. The fit takes 1 s at 1e-6
+        (22 pairs) or half a minute at 1e-8 (35 pairs). Above about 1e-3 waves may
+        grow at any time step, which raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     slip_step : float
         Largest slip of a weakening node in an implicit step, in units of its d_c.
     load_step : float
-        Largest rise of the load in an implicit step, in units of the stress scale (see Notes).
+        Largest rise of the load in an implicit step, in units of the stress scale
+        (see Notes).
     start : {"equilibrium", "rest"}
-        "rest" starts at the first slip. "equilibrium" starts on the quasi-static path, as close
-        below the first instability as the estimated error allows. `start_load` is the load at the
-        start, and `start_error` the estimated error (Pa). These runs always start at the first
-        slip: with `load`, if the loading rate is too high, if a node loses half of its strength
-        before the first instability, on planes, with curved friction laws, with an extent, and with
-        stress above the strength.
+        "rest" starts at the first slip. "equilibrium" starts on the quasi-static
+        path, as close below the first instability as the estimated error allows.
+        `start_load` is the load at the start, and `start_error` the estimated
+        error (Pa). These runs always start at the first slip: with `load`, if the
+        loading rate is too high, if a node loses half of its strength before the
+        first instability, on planes, with curved friction laws, with an extent,
+        and with stress above the strength.
     end_time : float, optional
-        Latest end of a run, s. It may be exceeded by a part of the last explicit step.
+        Latest end of a run, s. It may be exceeded by a part of the last explicit
+        step.
     load : (times, values), optional
-        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate. They are interpolated
-        linearly, and the last slope continues.
+        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate. They
+        are interpolated linearly, and the last slope continues.
     arrival : float
-        Share of tau_p - tau_r that a node has lost when the front arrives, in (0, 1]. The middle
-        of the cohesive zone is 0.5, its tip 1e-3.
+        Share of tau_p - tau_r that a node has lost when the front arrives, in (0,
+        1]. The middle of the cohesive zone is 0.5, its tip 1e-3.
     stop : {"sliding", "onset", "rest", "time"}
-        End of a run. "sliding": every node that can break is at its residual strength and, if the
-        interface has an extent, has come to rest. "onset": the first instability has begun. "rest":
-        after an instability, slip has ended or only follows the load. An interface that slides and
-        is never unloaded also ends there. "time": at `end_time`. A sliding interface takes explicit
-        steps until then. Every run but "time" also ends when no node slips and the load has stopped
-        rising.
+        End of a run. "sliding": every node that can break is at its residual
+        strength and, if the interface has an extent, has come to rest. "onset":
+        the first instability has begun. "rest": after an instability, slip has
+        ended or only follows the load. An interface that slides and is never
+        unloaded also ends there. "time": at `end_time`. A sliding interface takes
+        explicit steps until then. Every run but "time" also ends when no node
+        slips and the load has stopped rising.
     implicit : bool
         False takes explicit steps only. Slow loading then needs a million steps.
     max_steps : int
         Number of steps after which a run, or an event on a specimen, is abandoned.
     events : int
-        Also return the first so many events of each sample over 'event', and NaN if there are
-        fewer, with the variables of `equilibrium_path` and `event_duration` (s). Between
-        half-spaces they also have `event_time` (s) and `event_radiated_energy` (J/m).
+        Also return the first so many events of each sample over 'event', and NaN
+        if there are fewer, with the variables of `equilibrium_path` and
+        `event_duration` (s). Between half-spaces they also have `event_time` (s)
+        and `event_radiated_energy` (J/m).
 
     Raises
     ------
@@ -136,47 +143,55 @@ class Rupture:
     result has the variables of `Equilibrium`, and `rupture_speed` and `median_rupture_speed` of
     the sliding event.
 
-    **Instabilities between half-spaces.** An instability is slip that the load does not drive. It
-    begins when the mean shear stress has a maximum, after which waves lower it by 1e-4 of the
-    stress scale. A fall by the load does not count. If the stress is above the strength at the
-    start, it begins there. `first_instability` is the mean stress at the beginning of the first
-    instability. The highest instability has `onset_time`, `critical_position` and `applied_load`
-    (the load factor at that time). If the interface slides, it also has `critical_stress` and
-    `critical_load`, the load factor that carries this stress statically. The two load factors
-    differ by the stress that waves radiate. Events that did not happen have the value NaN, with a
-    warning. An overstressed start has no `critical_load`.
+    **Instabilities between half-spaces.** An instability is slip that the load
+    does not drive. It begins when the mean shear stress has a maximum, after
+    which waves lower it by 1e-4 of the stress scale. A fall by the load does not
+    count. If the stress is above the strength at the start, it begins there.
+    `first_instability` is the mean stress at the beginning of the first
+    instability. The highest instability has `onset_time`, `critical_position` and
+    `applied_load` (the load factor at that time). If the interface slides, it
+    also has `critical_stress` and `critical_load`, the load factor that carries
+    this stress statically. The two load factors differ by the stress that waves
+    radiate. Events that did not happen have the value NaN, with a warning. An
+    overstressed start has no `critical_load`.
 
-    **Arrested events.** `arrested_events` counts instabilities in which Z V at a node exceeds 7.5 %
-    of the median tau_p - tau_r before the mean stress is as high again or all is calm.
-    `Equilibrium` also counts smaller jumps.
+    **Arrested events.** `arrested_events` counts instabilities in which Z V at a
+    node exceeds 7.5 % of the median tau_p - tau_r before the mean stress is as
+    high again or all is calm. `Equilibrium` also counts smaller jumps.
 
-    **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three times the drop
-    tau_0 p + tau_i - tau_r at the largest load so far, so that nodes far stronger than the load do
-    not count. The stress scale is the mean over nodes.
+    **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three
+    times the drop tau_0 p + tau_i - tau_r at the largest load so far, so that
+    nodes far stronger than the load do not count. The stress scale is the mean
+    over nodes.
 
-    **End.** `kinetic_stress` is the mean stress after the first step in which every node that can
-    break is at its residual strength. Energies and moment refer to the end of the run. A sliding
-    interface ends with that step, in which radiated energy and moment grow by about 2 %. The last
-    nodes beside the end of an extent may creep to their residual strength while the load still
-    rises. This is no instability, and `critical_stress` remains the mean stress at the highest
-    instability before. It is NaN if all nodes that can break did so without an instability.
+    **End.** `kinetic_stress` is the mean stress after the first step in which
+    every node that can break is at its residual strength. Energies and moment
+    refer to the end of the run. A sliding interface ends with that step, in which
+    radiated energy and moment grow by about 2 %. The last nodes beside the end of
+    an extent may creep to their residual strength while the load still rises.
+    This is no instability, and `critical_stress` remains the mean stress at the
+    highest instability before. It is NaN if all nodes that can break did so
+    without an instability.
 
-    With "onset" and "rest", critical values belong to the highest instability, which need not end
-    in sliding. With "onset", all values that are not final are NaN: kinetic stress, stress drop,
-    moment, energies, rupture speeds and arrested events.
+    With "onset" and "rest", critical values belong to the highest instability,
+    which need not end in sliding. With "onset", all values that are not final are
+    NaN: kinetic stress, stress drop, moment, energies, rupture speeds and
+    arrested events.
 
-    **Events.** An event is followed from its onset until the interface is calm, or until the next
-    event begins. The table of `events` holds it if a node slipped so fast as an arrested event
-    must. Its moment, energies and stress drops are the values at its end, and `event_duration` is
-    the time from its first to its last fast slip. An event that the end of the run cuts short is
+    **Events.** An event is followed from its onset until the interface is calm,
+    or until the next event begins. The table of `events` holds it if a node
+    slipped so fast as an arrested event must. Its moment, energies and stress
+    drops are the values at its end, and `event_duration` is the time from its
+    first to its last fast slip. An event that the end of the run cuts short is
     left out, such as the sliding of an interface without ends.
 
-    **Slow loading.** Let r be the rise of the load while shear waves cross the nucleation length,
-    as a share of the stress scale. On 60 heterogeneous faults of 43 nucleation lengths (mode III,
-    peak strength 25.2 to 36 MPa, residual strength 25 MPa), the moment of all events together was
-    too large by 3 % at r = 1.4e-4, 12 % at 4e-4, 50 % at 1.4e-3 and 140 % at 4e-3. The number of
-    arrested events rose from 60 to 107, 100, 141 and 125. If there are arrested events and r is
-    above 1e-3, a warning gives r and the rate to use.
+    **Slow loading.** Let r be the rise of the load while shear waves cross the
+    nucleation length, as a share of the stress scale. On 60 heterogeneous faults
+    of 43 nucleation lengths (mode III, peak strength 25.2 to 36 MPa, residual
+    strength 25 MPa), the moment of all events together was too large by 3 % at r
+    = 1.4e-4, 12 % at 4e-4, 50 % at 1.4e-3 and 140 % at 4e-3. The number of
+    arrested events rose from 60 to 107, 100, 141 and 125. If there are arrested
+    events and r is above 1e-3, a warning gives r and the rate to use.
 
     **No reverse slip.** A node whose slip rate would become negative sticks, keeps its weakened
     strength, and slips again only when the stress reaches it. If the stress fell below minus the
@@ -229,8 +244,8 @@ class Rupture:
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
             return 8e-3 + usual * (shape[0] / 1024) ** 2
-        # The number of steps grows with the nodes of the longer side, the time of a step with all
-        # nodes.
+        # The number of steps grows with the nodes of the longer side, the time of
+        # a step with all nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
@@ -366,7 +381,8 @@ def make_run(
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     """Return the mean load at which the weakest nodes of half a nucleation length slip, Pa."""
     interface = medium.interface
-    # Half the nucleation length of a line. On a plane, half the lengths along x and y multiplied.
+    # Half the nucleation length of a line. On a plane, half the lengths along x
+    # and y multiplied.
     half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
     weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
     # Nodes that never weaken cannot start a rupture.

@@ -126,17 +126,20 @@ class Save:
     fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
         Fields to keep in frames.
     every : int
-        Explicit steps between frames. While the interface creeps, a frame follows after a tenth as
-        many implicit steps, at least one. Steps shorten as slip accelerates, so that frames are
-        dense in time around the onset.
+        Explicit steps between frames. While the interface creeps, a frame follows
+        after a tenth as many implicit steps, at least one. Steps shorten as slip
+        accelerates, so that frames are dense in time around the onset.
     stations : mapping of str to float or (float, float)
-        Names and places of stations, x or on a plane (x, y), m. Slip, slip rate and shear stress
-        (traction) are recorded after every step at the node nearest to the place.
+        Names and places of stations, x or on a plane (x, y), m. Slip, slip rate
+        and shear stress (traction) are recorded after every step at the node
+        nearest to the place.
     to : path, optional
-        Folder to write to during the run. Memory then stays bounded, and the result holds no
-        fields; read them with `stiction.methods.dynamics.save.open_rupture`. If the folder holds
-        the same run, interrupted, the run resumes from the last state written, with results equal
-        to the bit. If it holds the same run, finished, the run is read.
+        Folder to write to during the run. Memory then stays bounded, and the
+        result holds no fields; read them with
+        `stiction.methods.dynamics.save.open_rupture`. If the folder holds the
+        same run, interrupted, the run resumes from the last state written, with
+        results equal to the bit. If it holds the same run, finished, the run is
+        read.
 
     Examples
     --------
@@ -282,7 +285,8 @@ class Recorder:
         the step at which `max_steps` ended it.
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
-        # A file for every frame would be slow, and a single file would have to fit in memory.
+        # A file for every frame would be slow, and a single file would have to
+        # fit in memory.
         full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
         if folder is None or not (full or ((at_once or last) and self._frames)):
             return
@@ -352,12 +356,14 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     ----------
     folder : path
     fields : sequence of str, optional
-        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load. By default all fields are loaded.
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load. By default all
+        fields are loaded.
 
     Returns
     -------
     xarray.Dataset
-        The dataset of `simulate_rupture`. Variables of the whole run are there once it has ended.
+        The dataset of `simulate_rupture`. Variables of the whole run are there
+        once it has ended.
 
     Raises
     ------

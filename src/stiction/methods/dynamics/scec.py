@@ -20,13 +20,14 @@ def write_scec(
 ) -> list[Path]:
     """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
-    The direction along strike is x, the direction of slip, and the direction down-dip is y. On
-    lines y is 0. Slip has no vertical component.
+    The direction along strike is x, the direction of slip, and the direction
+    down-dip is y. On lines y is 0. Slip has no vertical component.
 
     Parameters
     ----------
     run : xarray.Dataset
-        Result of `simulate_rupture` with slip, slip rate and shear stress, and with stations.
+        Result of `simulate_rupture` with slip, slip rate and shear stress, and
+        with stations.
     folder : path
     origin : float or (float, float)
         Origin of distances on the interface, m.
@@ -38,9 +39,9 @@ def write_scec(
     Returns
     -------
     list of pathlib.Path
-        A file for each station, such as ``faultst075dp045.txt`` for 7.5 km along strike and 4.5 km
-        down-dip, and ``cplot.txt`` with the distances j and k (m) and the rupture time t (s), 1e9
-        for nodes that do not break.
+        A file for each station, such as ``faultst075dp045.txt`` for 7.5 km along
+        strike and 4.5 km down-dip, and ``cplot.txt`` with the distances j and k
+        (m) and the rupture time t (s), 1e9 for nodes that do not break.
 
     Raises
     ------
@@ -85,7 +86,8 @@ def write_scec(
         record = run.sel(station=name)
         place = {dim: float(record[f"station_{dim}"]) for dim in dims}
         j, k, *_ = [place[dim] - middle[dim] for dim in dims] + [0.0]
-        # The record begins after the first step. The first frame is the state before it.
+        # The record begins after the first step. The first frame is the state
+        # before it.
         start = run.isel(time=0).sel(place, method="nearest")
         time = np.append(start.time, record.step_time)
         shown = [

@@ -155,7 +155,8 @@ class EventRecord:
                 "drive_travel": 2.0 * waves.now[TRAVEL],
             }
         )
-        # Pictures at given shares of the slip show the event better than at equal times.
+        # Pictures at given shares of the slip show the event better than at equal
+        # times.
         while self._due and self._due[0] <= waves.slip.mean():
             self._due.pop(0)
             self.blocks.append((waves.now[NOW], waves.u_rate.copy()))

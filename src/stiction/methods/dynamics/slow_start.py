@@ -18,12 +18,12 @@ Asymptotics of a fold: near the onset, the distance of slip from its limit falls
 3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z) in each memory variable,
    psi' = z psi + V with z = s_p |k| c_s (`memory.grown_memory`).
 4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>. Then stress that follows V
-   without delay needs no further force, and the remaining stress is inertia (the kernel is even
-   in a, except for the radiation of the mean).
+   without delay needs no further force, and the remaining stress is inertia (the
+   kernel is even in a, except for the radiation of the mean).
 5. At the slipping nodes, the difference of stress and strength estimates the error of the state,
-   and as a stress the amount by which the onset may be misplaced. If it is more than `_MAX_ERROR`
-   of the stress scale, go to 2 with a larger D: V falls as D^(-1/2), its second derivative as
-   D^(-5/2).
+   and as a stress the amount by which the onset may be misplaced. If it is more
+   than `_MAX_ERROR` of the stress scale, go to 2 with a larger D: V falls as
+   D^(-1/2), its second derivative as D^(-5/2).
 6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then begins at rest.
 """
 

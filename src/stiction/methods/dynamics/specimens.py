@@ -97,7 +97,8 @@ class DynamicEvent:
     start : (n,) array
         Stress of the static state at the start, less the initial stress, Pa.
     front : (n,) array
-        Slip with which the front arrives at a node, m. Infinite if it arrived before the event.
+        Slip with which the front arrives at a node, m. Infinite if it arrived
+        before the event.
     slides : bool
         Whether every node has slipped.
     steps : int
@@ -156,7 +157,8 @@ def begin(
     growth = INITIAL_GROWTH * sample.critical[fastest] / max(float(z[fastest]), 1e-300)
     slip = before.slip + growth * z
     start = load * sample.profile - stiffness @ slip
-    # The initial growth is not the arrival of a front: put the threshold just above it.
+    # The initial growth is not the arrival of a front: put the threshold just
+    # above it.
     front = arrival * sample.critical
     front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), np.inf)
     return DynamicEvent(sample, mesh, before, start, at_rest(mesh, slip), front)
@@ -165,8 +167,8 @@ def begin(
 class RuptureProgram(DenseProgram):
     """Search for equilibria of a specimen, with waves between them.
 
-    Between events loading is slow. Nodes that waves carried beyond the next equilibrium rest below
-    their strength afterwards.
+    Between events loading is slow. Nodes that waves carried beyond the next
+    equilibrium rest below their strength afterwards.
 
     Parameters
     ----------

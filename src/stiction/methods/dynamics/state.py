@@ -1,13 +1,14 @@
 """State of a rupture: constants of a run, variables, and diagnostics of every step.
 
-A run takes two kinds of steps. Implicit steps of adaptive size follow a creeping interface
-(`implicit`), and explicit steps of fixed size follow its waves (`explicit`). The diagnostic
-`phase` tells which kind comes next. Both solve, at every node,
+A run takes two kinds of steps. Implicit steps of adaptive size follow a creeping
+interface (`implicit`), and explicit steps of fixed size follow its waves
+(`explicit`). The diagnostic `phase` tells which kind comes next. Both solve, at
+every node,
 
     tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
 
-tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f the stress
-that slip elsewhere transfers, mode by mode with the memory kernel C of
+tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f
+the stress that slip elsewhere transfers, mode by mode with the memory kernel C of
 `elasticity.memory_kernels`:
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
@@ -93,11 +94,13 @@ DIAGNOSTICS = np.dtype(
         ("maximum_load", "f8"),
         ("maximum_work", "f8"),
         ("maximum_node", "i8"),  # the fastest
-        # Instabilities. Stresses, times and loads are NaN until the first instability.
+        # Instabilities. Stresses, times and loads are NaN until the first
+        # instability.
         ("instabilities", "i8"),  # number of instabilities so far
         ("in_event", "i8"),  # whether an instability is under way
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
-        # The event that `Run` follows until all is calm, or until the next one begins.
+        # The event that `Run` follows until all is calm, or until the next one
+        # begins.
         ("event_open", "i8"),  # whether there is one
         ("event_begun", "i8"),  # whether one has just begun,
         ("event_calm", "i8"),  # or has just ended

@@ -19,11 +19,11 @@ through the rows:
 2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
    (`_move`).
 3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate that its
-   strength leaves, and rests if this rate is negative. `Mesh.correction`, K of the closed form less
-   K of the mesh, acts on the slip of the interface.
+   strength leaves, and rests if this rate is negative. `Mesh.correction`, K of
+   the closed form less K of the mesh, acts on the slip of the interface.
 4. Move the top with its platen (`_move_platen`), or let the pusher act on the ends
-   (`_move_pusher`). The spring of the machine is half implicit. An infinitely stiff machine holds
-   the drive.
+   (`_move_pusher`). The spring of the machine is half implicit. An infinitely
+   stiff machine holds the drive.
 
 The force on row j + 1 needs row j before it moves, so the force on a row is computed before the
 row below it moves.
@@ -162,7 +162,8 @@ def _slide(
     if fast:
         now[FAST_SINCE] = now[TIME] if np.isnan(now[FAST_SINCE]) else now[FAST_SINCE]
         now[FAST_UNTIL] = now[TIME]
-    # Update the stress of the correction by the added slip only: most nodes rest most of the time.
+    # Update the stress of the correction by the added slip only: most nodes rest
+    # most of the time.
     for j in range(slip.shape[0]):
         added = step * waves.slip_rate[j]
         if added > 0.0:
@@ -184,7 +185,8 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
         now[FORCE] = -total
         return
     mass = force.shape[0] * mesh.mass[top]
-    # The spring acts at the mean travel of the step, which keeps stiff machines stable.
+    # The spring acts at the mean travel of the step, which keeps stiff machines
+    # stable.
     inert = (mass + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
     lost = 0.5 * mesh.attenuation * mass
     total -= mesh.stiffness * now[TRAVEL]
@@ -250,7 +252,8 @@ def wave_steps(
     u, v, u_rate, v_rate = waves.u, waves.v, waves.u_rate, waves.v_rate
     for taken in range(steps):
         never = n
-        # Forces on row j and motion of row j - 1 alternate, so that two rows of forces suffice.
+        # Forces on row j and motion of row j - 1 alternate, so that two rows of
+        # forces suffice.
         for j in range(rows + 1):
             if j < rows:  # stencils are zero beyond the interface and the top
                 low, up, stencil = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]

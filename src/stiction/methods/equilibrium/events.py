@@ -10,10 +10,10 @@ releases the stress K delta at the load at which it begins. The table has these 
 2. The moment is G times the integral of delta. The magnitude of a plane follows from it:
    Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori, 1979, in SI units).
 3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is the mean of
-   K delta over the patch, the second its mean weighted by delta. The third is twice the energy that
-   the slip releases beyond friction at the residual strength, over the integral of delta. Waves and
-   weakening share this energy. If the stress comes to rest at the residual strength, the third
-   equals the second.
+   K delta over the patch, the second its mean weighted by delta. The third is
+   twice the energy that the slip releases beyond friction at the residual
+   strength, over the integral of delta. Waves and weakening share this energy. If
+   the stress comes to rest at the residual strength, the third equals the second.
 4. The fracture energy is dissipated above the residual strength.
 5. Methods with inertia know how long an event takes and, between half-spaces, when it begins and
    what it radiates.

@@ -46,35 +46,40 @@ ON_NODES = {
 class Equilibrium:
     """Exact quasi-static onset with every interaction between patches.
 
-    A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes about 0.15 s.
+    A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes
+    about 0.15 s.
 
-    The load rises until no equilibrium is left. While strength falls linearly, this is a linear
-    programme, solved to round-off with a certificate. After the first instability, or after the
-    first corner of a `PiecewiseWeakening`, the equilibria are followed event by event. That is
-    exact, too, and costs 5 times as much for two pieces and 50 times for 32. On planes the path
-    between events is followed in steps of the load. Weakening rate, residual strength, initial
+    The load rises until no equilibrium is left. While strength falls linearly,
+    this is a linear programme, solved to round-off with a certificate. After the
+    first instability, or after the first corner of a `PiecewiseWeakening`, the
+    equilibria are followed event by event. That is exact, too, and costs 5 times
+    as much for two pieces and 50 times for 32. On planes the path between events
+    is followed in steps of the load. Weakening rate, residual strength, initial
     stress and load profile may vary along the interface.
 
-    On planes the programme is solved with Fourier transforms. Its bounds are a share `gap` of the
-    load apart, and the results give the lower bound, at which there is an equilibrium.
+    On planes the programme is solved with Fourier transforms. Its bounds are a
+    share `gap` of the load apart, and the results give the lower bound, at which
+    there is an equilibrium.
 
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at fixed weakening rates. It is
-        NaN if a law steepens and a node passes a corner before the first instability, and on
-        planes if the turning point is not found. If a node of a specimen stops before the first
-        instability, the derivatives are difference quotients, which take a path for every node.
+        Also return d first_instability / d tau_p at every node, at fixed
+        weakening rates. It is NaN if a law steepens and a node passes a corner
+        before the first instability, and on planes if the turning point is not
+        found. If a node of a specimen stops before the first instability, the
+        derivatives are difference quotients, which take a path for every node.
     slip : bool
         Also return the slip at the first instability.
     events : int
-        Also return this number of arrested events of each sample over 'event', padded with NaN. The
-        event in which an interface that ends slides is among them.
-        They form a sequence: stress and slip continue from event to event. The variables are
-        described in `equilibrium_path`.
+        Also return this number of arrested events of each sample over 'event',
+        padded with NaN. The event in which an interface that ends slides is among
+        them. They form a sequence: stress and slip continue from event to event.
+        The variables are described in `equilibrium_path`.
     gap : float
-        On planes, the distance of the bounds as a share of the load, 1e-10 to 1e-2. Lines are
-        solved to round-off, or to 1e-9 if thousands of nodes slip.
+        On planes, the distance of the bounds as a share of the load, 1e-10 to
+        1e-2. Lines are solved to round-off, or to 1e-9 if thousands of nodes
+        slip.
 
     Notes
     -----
@@ -84,15 +89,17 @@ class Equilibrium:
     reached its residual strength before the interface slid), and `sliding_position` (m), which
     differs from `critical_position` only after an arrested event.
 
-    Equilibrium decides about arrest; inertia may carry a rupture through. There is no upper bound,
-    and `certificate_gap` is NaN, if a law steepens and a node passes a corner before the first
-    instability, or if a node of a specimen stops before it.
+    Equilibrium decides about arrest; inertia may carry a rupture through. There
+    is no upper bound, and `certificate_gap` is NaN, if a law steepens and a node
+    passes a corner before the first instability, or if a node of a specimen stops
+    before it.
 
-    On planes, positions have two components, along 'direction'. `critical_patch_extent` (m, along
-    'direction') and `critical_patch_area` (m²) replace the length. `certified` is true if the
-    bounds are rigorous, which requires that no node reaches its residual strength before the first
-    instability. Slipping nodes belong to the same patch if their cells share an edge, also across
-    the borders.
+    On planes, positions have two components, along 'direction'.
+    `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²)
+    replace the length. `certified` is true if the bounds are rigorous, which
+    requires that no node reaches its residual strength before the first
+    instability. Slipping nodes belong to the same patch if their cells share an
+    edge, also across the borders.
 
     Examples
     --------

@@ -66,7 +66,8 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     if length == n:
         # The run has no ends: cut the circle opposite the peak.
         start = (peak + n // 2 + 1) % n
-    # The centroid is taken along the run, so that it is defined across the ends of the circle.
+    # The centroid is taken along the run, so that it is defined across the ends
+    # of the circle.
     weight = 0.0
     moment = 0.0
     for q in range(length):

@@ -117,7 +117,8 @@ def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> S
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
     excess = (rows.strength[row] - initial).reshape(shape)
     residual = (rows.residual_strength[row] - initial).reshape(shape)
-    # Copy the rate: numba would compile each kernel again for a read-only array, as laws return.
+    # Copy the rate: numba would compile each kernel again for a read-only array,
+    # as laws return.
     rate = rows.weakening_rate[row].reshape(shape).copy()
     return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
 
@@ -151,11 +152,12 @@ class EquilibriumState:
     by_events: bool = False  # a linear programme failed before to find the next instability
     jumped: bool = False  # an instability came to rest on the way
     stopped: bool = False  # a slipping node stopped on the way
-    # Largest mean stress on the way here, divided by the mean of the load profile, Pa. Without a
-    # machine it is the load itself (None).
+    # Largest mean stress on the way here, divided by the mean of the load
+    # profile, Pa. Without a machine it is the load itself (None).
     peak: float | None = None
     K_direction: Array | None = None  # (n,): K times the direction, if it is known
-    # The exact y with <p, y> = 1, if the direction is exact; otherwise the direction replaces it.
+    # The exact y with <p, y> = 1, if the direction is exact; otherwise the
+    # direction replaces it.
     multiplier: Array | None = None
 
     @property

@@ -1,6 +1,7 @@
 """Onsets of samples by exact equilibrium, on lines, specimens and planes.
 
-Algorithm of a sample (`follow_to_sliding`), for which a `Program` supplies the two searches:
+Algorithm of a sample (`follow_to_sliding`), for which a `Program` supplies the
+two searches:
 
 1. Start from rest and raise the load to the next instability (`Program.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
@@ -169,8 +170,8 @@ class OnsetSolver:
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
-        # On lines a known multiplier means that a linear programme found the instability, so no
-        # node has passed a corner before it.
+        # On lines a known multiplier means that a linear programme found the
+        # instability, so no node has passed a corner before it.
         straight = last is first and first.multiplier is not None and not interface.is_plane
         if last is not first and last.direction.any():
             sliding_patch = critical_patch(last.direction, interface)
@@ -296,8 +297,9 @@ def _sensitivity(
         return _quotients(problem, program, sample, state)
     if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
-    # The program's derivative is by the present piece continued to zero slip, which is
-    # share tau_p + (1 - share) tau_r. The chain rule gives the derivative by tau_p.
+    # The program's derivative is by the present piece continued to zero slip,
+    # which is share tau_p + (1 - share) tau_r. The chain rule gives the
+    # derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
     return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 

@@ -187,9 +187,10 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p - tau_r)/d_c
-        varies with the strength. With Gamma, W = (tau_p - tau_r)²/(2 Gamma) does. Leave
-        all three out if the scale is a profile or random (`RandomInterface`).
+        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p -
+        tau_r)/d_c varies with the strength. With Gamma, W = (tau_p - tau_r)²/(2
+        Gamma) does. Leave all three out if the scale is a profile or random
+        (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -222,8 +223,9 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The law has the parameters of `LinearWeakening`. W is the rate at zero slip, d_c the
-    slip at which 1/e of tau_p - tau_r remains, and Gamma = (tau_p - tau_r) d_c.
+    The law has the parameters of `LinearWeakening`. W is the rate at zero slip,
+    d_c the slip at which 1/e of tau_p - tau_r remains, and Gamma = (tau_p -
+    tau_r) d_c.
 
     Examples
     --------
@@ -261,12 +263,13 @@ class PiecewiseWeakening(FrictionLaw):
     Parameters
     ----------
     slip : sequence of float
-        Corners u = d/d_c, rising from above 0 to 1. The corner at zero slip is implied.
+        Corners u = d/d_c, rising from above 0 to 1. The corner at zero slip is
+        implied.
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
-        As for `LinearWeakening`. W is the rate of the first piece, and the strength is
-        residual from d_c on.
+        As for `LinearWeakening`. W is the rate of the first piece, and the
+        strength is residual from d_c on.
 
     Examples
     --------
@@ -343,8 +346,9 @@ class PiecewiseWeakening(FrictionLaw):
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
         """Approximate another law by a number of linear `pieces`, at least 2.
 
-        Corners lie on the law at equal steps of strength. If the law never reaches its
-        residual strength, the last piece dissipates as much as the rest of the law.
+        Corners lie on the law at equal steps of strength. If the law never
+        reaches its residual strength, the last piece dissipates as much as the
+        rest of the law.
 
         Examples
         --------

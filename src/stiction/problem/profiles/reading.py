@@ -121,8 +121,9 @@ def read_profile(
         Distance of the points of an array, a matrix or an image along x, and along
         y, m.
     rows : {"x", "y"}, optional
-        Direction in which the lines of a matrix in a text follow each other. It is y if
-        comments state the width and height of the map, as Gwyddion writes them.
+        Direction in which the lines of a matrix in a text follow each other. It
+        is y if comments state the width and height of the map, as Gwyddion writes
+        them.
     interface : Interface, optional
         Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
     offset : float, (float, float) or "centre"

@@ -7,8 +7,9 @@ the list of the slipping nodes, in the order of the rows of L. This folder solve
 
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
 
-for sets S and rates W that change a little from one system to the next. A pivot that is not
-positive shows that A_SS is not positive definite: then the equilibrium is unstable.
+for sets S and rates W that change a little from one system to the next. A pivot
+that is not positive shows that A_SS is not positive definite: then the
+equilibrium is unstable.
 
 Algorithm
 ---------
@@ -17,20 +18,21 @@ Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix Computatio
 section 6.5).
 
 1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj - l'l)^1/2. If
-   A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has z'Az = A_jj - l'l <= 0, and
-   A z = 0 on S (`singular_direction`).
+   A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has z'Az = A_jj -
+   l'l <= 0, and A z = 0 on S (`singular_direction`).
 2. Remove a node (`remove`). The rows below it move up, which leaves one entry in each of them
    above the diagonal. Plane rotations of neighbouring columns make it zero.
 3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is the unit vector of
    the node. Plane rotations of the columns of L with a^1/2 e make the latter zero.
 4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose nodes still slip
-   and weaken no more than before, raise the entries of those that weaken less, and append the
-   other nodes.
+   and weaken no more than before, raise the entries of those that weaken less,
+   and append the other nodes.
 
 Departures from the textbook, all for speed:
 
 - The rows of L lie one after the other in a flat array, each padded to a multiple of eight numbers.
-  This takes half the memory of a square, and no two rows compete for the same cache sets.
+  This takes half the memory of a square, and no two rows compete for the same
+  cache sets.
 - Four rows are appended together, so that each row of L is read once for four new ones.
 - A pivot counts as not positive if its square is below `PIVOT_RTOL` of the diagonal entry.
 
@@ -158,7 +160,8 @@ def raise_diagonal(
     for r in range(position, n_rows):
         start = row_start(r)
         row = factor[start : start + r + 1]
-        # The entry of this row in the column a^1/2 e, after the rotations of the rows above.
+        # The entry of this row in the column a^1/2 e, after the rotations of the
+        # rows above.
         added = math.sqrt(amount) if r == position else 0.0
         for k in range(position, r):
             L_rk = row[k]
@@ -371,8 +374,8 @@ def factor_slipping(workspace: Workspace) -> int:
             rise = diagonal[i] - factored_diagonal[t]
             raise_diagonal(workspace.factor, n_kept, t, rise, workspace.rotations)
             factored_diagonal[t] = diagonal[i]
-    # Nodes that weaken no more come first. Most nodes of a growing crack are such, and the rows
-    # at the top of L are kept longest.
+    # Nodes that weaken no more come first. Most nodes of a growing crack are
+    # such, and the rows at the top of L are kept longest.
     count = ZERO
     for may_weaken in (False, True):
         for i in range(is_slipping.shape[0]):

@@ -8,28 +8,32 @@ strength less initial stress (Pa), which falls along straight pieces, and p the 
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-A node is driven if load p - K d - s(d), its overload, is not negative. If K has no positive entry
-off its diagonal, and strength only falls with slip, a field of slip at which all slipping nodes are
-driven lies below the least equilibrium, and so do the fields of steps 1 and 2.
+A node is driven if load p - K d - s(d), its overload, is not negative. If K has
+no positive entry off its diagonal, and strength only falls with slip, a field of
+slip at which all slipping nodes are driven lies below the least equilibrium, and
+so do the fields of steps 1 and 2.
 
 Algorithm
 ---------
 Our own: two kinds of step that do not pass the least equilibrium.
 
 1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S = (load p - s)_S.
-   Slip moves to this solution, where it is larger. K_SS is factored once and only grows.
+   Slip moves to this solution, where it is larger. K_SS is factored once and only
+   grows.
 2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W of the present
-   pieces. If A_SS is positive definite, move towards the solution of the linear problem of these
-   pieces. If not, move along z >= 0 with A z <= 0 (step 1 in `cholesky`). The move ends where the
-   first node reaches the next corner of its law.
+   pieces. If A_SS is positive definite, move towards the solution of the linear
+   problem of these pieces. If not, move along z >= 0 with A z <= 0 (step 1 in
+   `cholesky`). The move ends where the first node reaches the next corner of its
+   law.
 3. After each step of either kind, the resting nodes that are overstressed join S.
 4. Step 1 is repeated as long as nodes join or pass corners, at most `MAX_ELASTIC_STEPS` times in a
-   row; then follows a step 2, and so on. Step 2 costs another factor. It is needed because step 1
-   alone creeps towards an equilibrium without reaching it.
+   row; then follows a step 2, and so on. Step 2 costs another factor. It is
+   needed because step 1 alone creeps towards an equilibrium without reaching it.
 5. The interface slides if all nodes slip, if its mean strength cannot carry the load, if a run of
-   nodes at their residual strength is longer than a given length (Griffith's, which no fracture
-   energy can stop), or if nothing bounds a step 2. It is arrested if a step 2 ends at the solution
-   of the linear problem and no node joins.
+   nodes at their residual strength is longer than a given length (Griffith's,
+   which no fracture energy can stop), or if nothing bounds a step 2. It is
+   arrested if a step 2 ends at the solution of the linear problem and no node
+   joins.
 
 On a specimen K may have positive entries off its diagonal (`may_stop`), so that a step unloads a
 node that slips. Slip does not go back. In step 1 such a node leaves S and rests until it is
@@ -219,7 +223,8 @@ def _write_direction(
     It is 1 if the direction leads to the solution of the linear problem, otherwise infinite.
     """
     slip, may_stop = state.slip, state.may_stop
-    # Leave out nodes that would move back, and solve again, until no such node is left.
+    # Leave out nodes that would move back, and solve again, until no such node is
+    # left.
     direction, solution = true_pieces.direction, true_pieces.solution
     while True:
         n_factored = factor_slipping(true_pieces)

@@ -8,10 +8,11 @@ an equilibrium is, with A = K - diag(W), slip d >= 0 (m) and load profile p > 0,
     max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
       = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
 
-Every feasible d bounds the load from below and every feasible y, a multiplier, from above. If K has
-no positive entry off its diagonal, the equilibrium at a load is the least feasible slip there
-(R. Cottle, J.-S. Pang and R. Stone, The Linear Complementarity Problem, 1992, section 3.11), and
-nodes only have to be added to the set S of the slipping nodes.
+Every feasible d bounds the load from below and every feasible y, a multiplier,
+from above. If K has no positive entry off its diagonal, the equilibrium at a load
+is the least feasible slip there (R. Cottle, J.-S. Pang and R. Stone, The Linear
+Complementarity Problem, 1992, section 3.11), and nodes only have to be added to
+the set S of the slipping nodes.
 
 Algorithm
 ---------
@@ -22,12 +23,14 @@ bound of (2), for example the weakest window, and from a load below it.
    most overstressed first, each as a row of the factor L of A_SS (`cholesky`).
 2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S, and go to 1.
 3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is feasible in (2): a
-   cut. Lower the bound and the load to <excess, y>/<p, y>. Solve for the slip there, take out the
-   nodes that would slip backwards, and go to 1. If the cut lowers the load by round-off only, the
-   load is the solution: `_back_off` makes its slip feasible, and the algorithm ends.
+   cut. Lower the bound and the load to <excess, y>/<p, y>. Solve for the slip
+   there, take out the nodes that would slip backwards, and go to 1. If the cut
+   lowers the load by round-off only, the load is the solution: `_back_off` makes
+   its slip feasible, and the algorithm ends.
 4. If no node is overstressed, the load has an equilibrium. If it is the upper bound, it is the
-   solution. Otherwise raise it towards the bound by `SHARE_TOWARDS_BOUND` of the way, or up to the
-   bound once within `CLOSE_RTOL` of it, solve for the slip, and go to 1.
+   solution. Otherwise raise it towards the bound by `SHARE_TOWARDS_BOUND` of the
+   way, or up to the bound once within `CLOSE_RTOL` of it, solve for the slip, and
+   go to 1.
 
 The order of the nodes in step 1 and the share in step 4 are for speed. In another order the search
 stalls near the solution, and at too high a load far too many nodes join before a pivot fails.
@@ -280,6 +283,7 @@ def certificate(
     infeasible = 0.0
     for i in range(n):
         p_y += multiplier[i] * sample.profile[i]
-        # Round-off may leave A y slightly positive. Its effect on the bound, <A y, d>, is added.
+        # Round-off may leave A y slightly positive. Its effect on the bound, <A
+        # y, d>, is added.
         infeasible += max(Ky[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
     return max((excess_y + infeasible) / p_y - lower, 0.0)

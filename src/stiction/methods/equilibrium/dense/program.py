@@ -1,15 +1,16 @@
 """Equilibria of a line or a specimen, with dense factors: which algorithm is used when.
 
 1. The next instability is a linear programme of the present pieces of the friction law
-   (`linear_program`), if no node reaches a corner of its law before. A line on which very many
-   nodes slip is handed over to transforms (`plane_onset`), which are faster there.
+   (`linear_program`), if no node reaches a corner of its law before. A line on
+   which very many nodes slip is handed over to transforms (`plane_onset`), which
+   are faster there.
 2. Otherwise the path is followed event by event (`stable_path`). The programme is not tried again
    on this path, except from rest.
 3. Behind a machine the path is always followed: slip lowers the force, whose largest value may lie
    before the instability. If all nodes slip without one, the interface slides stably.
 4. If only part of a line or specimen can break, the other nodes have an infinite strength. They
-   hold the part, whose K is positive definite, so that each instability ends at an equilibrium. It
-   slides if all slips there that can break.
+   hold the part, whose K is positive definite, so that each instability ends at
+   an equilibrium. It slides if all slips there that can break.
 5. Beyond an instability of a line, the quick test for sliding comes first (`runaway`). If it does
    not decide, and on specimens always, the jump is followed to its end (`jump`).
 """
@@ -122,7 +123,8 @@ class DenseProgram:
         bound, multiplier = self.bound(sample)
         if bound == cap == np.inf:  # no window fits within the extent
             return None
-        # Dense factors cost the cube of the slipping nodes, transforms little more than all nodes.
+        # Dense factors cost the cube of the slipping nodes, transforms little
+        # more than all nodes.
         if cap == np.inf and self.nodes > MAX_WEAK_NODES:
             weak_nodes = np.count_nonzero(sample.excess < bound * sample.profile)
             if weak_nodes > MAX_WEAK_NODES:
@@ -156,7 +158,8 @@ class DenseProgram:
         )  # fmt: skip
         if not onset.closed:
             return None
-        # The multiplier was lifted everywhere to be feasible. At nodes at rest it must be zero.
+        # The multiplier was lifted everywhere to be feasible. At nodes at rest it
+        # must be zero.
         multiplier = onset.multiplier - onset.multiplier.min()
         multiplier[multiplier < RESTING_MULTIPLIER_RTOL * multiplier.max()] = 0.0
         multiplier /= multiplier @ sample.profile
@@ -195,7 +198,8 @@ class DenseProgram:
             peak=end.peak, by_events=by_events, jumped=state.jumped,
             stopped=end.stopped or state.stopped,
         )  # fmt: skip
-        # No multiplier bounds the load from above if a law steepens or a node stopped.
+        # No multiplier bounds the load from above if a law steepens or a node
+        # stopped.
         reached.certified = reached.unstable and not (self.pieces.steepens or reached.stopped)
         if reached.certified and from_rest:
             present = present_sample(sample, slip)
@@ -286,16 +290,17 @@ class DenseProgram:
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the multiplier y, or, where slip lowers the mean stress, its derivative.
 
-        With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D, and y is the
-        derivative of the largest D by the strengths s. Up to the instability (K - W) d = D p - s on
-        the slipping nodes, and no node has stopped. So d grows with D at the rate
-        d' = (K - W)^-1 p, the derivative of <p, d> by s is -d', and the mean stress has the
-        derivative
+        With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D,
+        and y is the derivative of the largest D by the strengths s. Up to the
+        instability (K - W) d = D p - s on the slipping nodes, and no node has
+        stopped. So d grows with D at the rate d' = (K - W)^-1 p, the derivative
+        of <p, d> by s is -d', and the mean stress has the derivative
 
             y - (r/n) (<p, d'> y - d').
 
-        If the interface ends, the mean stress of the n nodes that can break is D - <c, d>, over the
-        mean of their p, with c = K 1/(n <p>) and 1 on these nodes. The derivative is then
+        If the interface ends, the mean stress of the n nodes that can break is D
+        - <c, d>, over the mean of their p, with c = K 1/(n <p>) and 1 on these
+        nodes. The derivative is then
 
             y - <c, d'> y + (K - W)^-1 c.
         """

@@ -18,8 +18,9 @@ length (`unstoppable_length`).
    does, the interface slides.
 2. Nodes beside the run that are overloaded join it, as far as the stress there is known.
 3. Elastic step: with the strengths of the moment, solve K_RR x = (load p - K d - s(d))_R on the run
-   R, cut the right side at zero, and add x to the slip. Blocks of K on runs with the same length
-   are equal, so that a single Cholesky factor serves all runs and samples.
+   R, cut the right side at zero, and add x to the slip. Blocks of K on runs with
+   the same length are equal, so that a single Cholesky factor serves all runs and
+   samples.
 4. The interface slides if nodes at their residual strength form a run of the unstoppable length,
    or if the mean strength of the interface cannot carry the load.
 5. The test gives up (UNDECIDED) if slip hardly grows any more, after `MAX_RUN_STEPS` steps, or if
@@ -75,7 +76,8 @@ def block_factor(column: Array, width: int) -> Array:
     lower = upper.copy()
     for k in range(width):
         if k > 0:
-            # One step down, and the hyperbolic rotation that clears entry k of the second vector.
+            # One step down, and the hyperbolic rotation that clears entry k of
+            # the second vector.
             shifted, remaining = upper[k - 1 : -1], lower[k:]
             reflection = lower[k] / upper[k - 1]
             scale = np.sqrt((1.0 - reflection) * (1.0 + reflection))
@@ -152,8 +154,8 @@ def runs_away(
     first, length, _ = main_patch(direction)
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
         return Outcome.UNDECIDED, unstoppable
-    # Places q on the circle are counted from `origin`, so that the patch lies in the middle:
-    # the run is begin..end-1, and the stress is known in low..high-1.
+    # Places q on the circle are counted from `origin`, so that the patch lies in
+    # the middle: the run is begin..end-1, and the stress is known in low..high-1.
     begin = (n - length) // 2
     end = begin + length
     low = begin

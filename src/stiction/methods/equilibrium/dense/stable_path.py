@@ -8,18 +8,19 @@ equilibrium at a load (Pa) if no stress is above its strength, and equal to it w
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-With A = K - diag(W), slip and the rate v at which it grows with the load (m/Pa) follow from
+With A = K - diag(W), slip and the rate v at which it grows with the load (m/Pa)
+follow from
 
     A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,                                (2)
 
-where d_rest is the slip of nodes that slipped before and rest. (2) holds until a node enters or
-leaves S, or reaches a corner of its friction law. The equilibrium is stable as long as A_SS is
-positive definite.
+where d_rest is the slip of nodes that slipped before and rest. (2) holds until a
+node enters or leaves S, or reaches a corner of its friction law. The equilibrium
+is stable as long as A_SS is positive definite.
 
-On a line K has no positive entry off its diagonal, and a node that slips never stops. On a specimen
-it may have some (`may_stop`), so that slip at one node can unload another. Slip never goes back: a
-node that is unloaded rests. The rates at the nodes that reach their strength then minimise
-v'Av/2 - p'v over v >= 0:
+On a line K has no positive entry off its diagonal, and a node that slips never
+stops. On a specimen it may have some (`may_stop`), so that slip at one node can
+unload another. Slip never goes back: a node that is unloaded rests. The rates at
+the nodes that reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
     v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
 
@@ -32,18 +33,21 @@ Optimization, 2006, section 16.5).
 
 1. Find S and factor A_SS = L L'. If a pivot fails, go to 5.
 2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from its former value
-   towards the solution. The first node whose rate reaches zero on the way stops: take it out of S
-   and solve again.
+   towards the solution. The first node whose rate reaches zero on the way stops:
+   take it out of S and solve again.
 3. Find the smallest rise of the load at which a resting node reaches its strength (a start) or a
-   slipping node a corner of its law, and go there. If a node at its strength would be overstressed
-   by any rise, it starts at once, which is how A v >= p comes about.
+   slipping node a corner of its law, and go there. If a node at its strength
+   would be overstressed by any rise, it starts at once, which is how A v >= p
+   comes about.
 4. After a start, append a row to L. After a corner, A_SS changes in one diagonal entry: rotate the
-   rows of L from there on, or compute them again if the node now weakens more steeply.
+   rows of L from there on, or compute them again if the node now weakens more
+   steeply.
 5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the direction
-   z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds slip along z: it jumps at
-   constant load, and the path ends, unstable. Otherwise, for (3) only, v moves along z until a rate
-   reaches zero. If a start failed, that node stops, and the start is tried again. If a corner or
-   the first factor failed, the nodes without a row in L leave S, and may start again. Those that
+   z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds slip
+   along z: it jumps at constant load, and the path ends, unstable. Otherwise, for
+   (3) only, v moves along z until a rate reaches zero. If a start failed, that
+   node stops, and the start is tried again. If a corner or the first factor
+   failed, the nodes without a row in L leave S, and may start again. Those that
    do not before the load rises have stopped.
 6. The path ends at the target, or when every node has slipped. It is given up if S outgrows L, or
    if nodes stop and start without end.
@@ -295,8 +299,9 @@ def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: 
     singular_direction(workspace, n_factored, direction)
     if not state.may_stop:
         return NOBODY
-    # `direction` is z clipped at zero, by node. z itself is left in `solution`, in S, without its
-    # last entry: the failed node, which `append` left in `slipping[n_factored]`.
+    # `direction` is z clipped at zero, by node. z itself is left in `solution`,
+    # in S, without its last entry: the failed node, which `append` left in
+    # `slipping[n_factored]`.
     z = workspace.solution
     z[n_factored] = 1.0
     first, share = _first_to_stop(state, n_factored + 1, v_nodes, z, endless=True)
@@ -349,7 +354,8 @@ def _pass_corner(
         raise_diagonal(workspace.factor, n_slipping, corner, W_before - W, workspace.rotations)
         workspace.factored_diagonal[corner] = workspace.diagonal[i]
         return n_slipping
-    # The node weakens more steeply: compute L again from its row on. `append` reads the queue.
+    # The node weakens more steeply: compute L again from its row on. `append`
+    # reads the queue.
     for t in range(corner, n_slipping):
         workspace.queue[t - corner] = workspace.slipping[t]
     return append(workspace, corner, n_slipping - corner)
@@ -447,7 +453,8 @@ def follow_stable_path(
         # 3. On to the next event.
         event = _next_event(state, load, target, piece, n_slipping)
         if some_left and event.step > MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load):
-            # Nodes that left S and belong to it have started again: the others have stopped.
+            # Nodes that left S and belong to it have started again: the others
+            # have stopped.
             stopped = stopped or _some_rest(state)
             some_left = False
         at_target = event.starting_node == NOBODY and event.corner_position == NOBODY

@@ -7,9 +7,10 @@ p > 0, the onset without corners is
 
     max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
-Any d >= 0 bounds it from below, by min (A d + s)/p. Any y >= 0 bounds it from above, after a
-multiple of a field z > 0 with A z < 0 has been added to make A y <= 0. This holds whatever d and y
-were computed with, and whatever the signs of the entries of K.
+Any d >= 0 bounds it from below, by min (A d + s)/p. Any y >= 0 bounds it from
+above, after a multiple of a field z > 0 with A z < 0 has been added to make A y
+<= 0. This holds whatever d and y were computed with, and whatever the signs of
+the entries of K.
 
 Algorithm
 ---------
@@ -20,8 +21,9 @@ of steps, so it only starts `turning_point`, which closes the bracket, and takes
    stable load (`held_equilibrium`).
 2. If there is one, it gives a lower bound.
 3. If a direction of negative curvature was met, the load is too high. The direction is the guess
-   for the lowest eigenvector of A on the slipping nodes. If the eigenvalue is not positive, the
-   eigenvector gives an upper bound, and lowers the upper end of the interval to it.
+   for the lowest eigenvector of A on the slipping nodes. If the eigenvalue is not
+   positive, the eigenvector gives an upper bound, and lowers the upper end of the
+   interval to it.
 """
 
 import numpy as np

@@ -15,10 +15,12 @@ As `dense.stable_path`, with solutions by conjugate gradients (`solve_inside`) i
 1. Solve for the slip at the first load, revising the pieces of the nodes, and for the rates v.
 2. Find the smallest rise of the load to an event, and go there. If the target comes first, end.
 3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. The change c of W_j by its next
-   piece, W before less W after, adds c to one diagonal entry, so that A_SS stays positive definite
-   if 1 + c y_j > 0, and v becomes v - c v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
+   piece, W before less W after, adds c to one diagonal entry, so that A_SS stays
+   positive definite if 1 + c y_j > 0, and v becomes v - c v_j/(1 + c y_j) y (the
+   formula of Sherman and Morrison).
 4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other slipping nodes. A stays
-   positive definite if y'Ay = (A y)_j > 0. With c_j = p_j - (K v)_j, v becomes v + c_j/(y'Ay) y.
+   positive definite if y'Ay = (A y)_j > 0. With c_j = p_j - (K v)_j, v becomes v
+   + c_j/(y'Ay) y.
 5. If it does not stay positive definite, the path turns in the direction y. Otherwise go to 2.
 """
 

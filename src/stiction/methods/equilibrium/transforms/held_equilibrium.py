@@ -8,10 +8,10 @@ at zero slip (Pa), p the load profile, phi (|phi| = 1) the shape of a patch. Fin
     d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
     mu = spring (alpha - <phi, d>),
 
-the stress mu of the spring being zero if the spring holds nothing. Without a spring, and if K has
-no positive entry off its diagonal, the solution is the least equilibrium at this load. With a
-spring there are solutions on both sides of the turning point. They are equilibria of the interface
-itself where mu = 0.
+the stress mu of the spring being zero if the spring holds nothing. Without a
+spring, and if K has no positive entry off its diagonal, the solution is the least
+equilibrium at this load. With a spring there are solutions on both sides of the
+turning point. They are equilibria of the interface itself where mu = 0.
 
 Algorithm
 ---------

@@ -13,8 +13,8 @@
 4. From rest, the next instability is the onset without corners, if no node reaches a corner of its
    law before. A coarse grid shows most often whether a node does.
 5. Otherwise, and after a jump, the path is followed in steps of the load, each of which is proved
-   to be stable (`relaxation.stable_equilibrium`). A step that is not is shortened, until it is as
-   short as the gap that was asked for.
+   to be stable (`relaxation.stable_equilibrium`). A step that is not is
+   shortened, until it is as short as the gap that was asked for.
 6. The end of the path is then followed event by event (`fold`), to see whether it turns, and how.
 7. A jump goes to the least equilibrium a little above the load of the turn
    (`relaxation.least_equilibrium`).
@@ -164,7 +164,8 @@ def plane_onset(
     while slip is None:
         shape = grids[-1][0].shape
         stiffest, steepest = float(half_spaces.symbol(shape).max()), float(grids[-1][2].max())
-        # A coarse grid takes every other node, so that an odd number of nodes cannot be halved.
+        # A coarse grid takes every other node, so that an odd number of nodes
+        # cannot be halved.
         odd = any(nodes % 2 for nodes in shape)
         resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
         if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
@@ -298,7 +299,8 @@ class PlaneProgram:
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
                 operator = operator._replace(soft_mode=growth / np.sqrt(work))
-            # The last few states are enough to restart before a turn that was passed unseen.
+            # The last few states are enough to restart before a turn that was
+            # passed unseen.
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
         return EquilibriumState(load, slip, np.zeros_like(slip), unstable=False)

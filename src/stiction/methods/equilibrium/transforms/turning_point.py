@@ -8,13 +8,15 @@ mu (`held_equilibrium`). On the slipping nodes
 
     A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
 
-where a dash is the derivative by a at a fixed load. The interface itself is in equilibrium where
-mu = 0, and its load turns where mu' = 0, too. Find (load, a) with mu = mu' = 0.
+where a dash is the derivative by a at a fixed load. The interface itself is in
+equilibrium where mu = 0, and its load turns where mu' = 0, too. Find (load, a)
+with mu = mu' = 0.
 
-Bounds: d is feasible at a load with mu >= 0, and bounds the onset from below. Let y combine two
-slopes d', of a state with mu' > 0 and one with mu' < 0, so that A y = 0 where both slip. It is a
-multiplier, and bounds the onset from above. A node that slips in one state only has A y <= 0 and
-hardly slips at the turning point, so that the error of this bound is of second order.
+Bounds: d is feasible at a load with mu >= 0, and bounds the onset from below. Let
+y combine two slopes d', of a state with mu' > 0 and one with mu' < 0, so that A y
+= 0 where both slip. It is a multiplier, and bounds the onset from above. A node
+that slips in one state only has A y <= 0 and hardly slips at the turning point,
+so that the error of this bound is of second order.
 
 Algorithm
 ---------
