@@ -90,7 +90,7 @@ def scattering(mean, cv, of_factor):
 def test_specimens_of_each_solved_sample_are_those_of_its_draws():
     """Also of other interfaces of the same field: onsets of their draws are as counted."""
     several = [scattering(1e6, 0.2, cv) for cv in (0.05, 0.1)] + [scattering(9e5, 0.1, 0.08)]
-    random = EquallyLikely(tuple(several), fields=(0, 0, 1))
+    random = EquallyLikely(tuple(several))
     state = LimitState(Experiment(LINE, random, LOCAL["method"], seed=4))
     counts = solve(state, 0, 20)
     assert counts.values.shape == (20, 128)

@@ -47,9 +47,11 @@ def a_fit_to_records_of_unlike_length():
     )
     one, other = found.interfaces(2, seed=3)
     grid = st.Interface(0.03, 80)
+    # Round-off decides which repetition ends the interval of the noise: 4 % between processors.
+    ends = {name: ends for name, ends in found.interval.items() if name != "noise"}
     return {
-        "fit": found,
-        "widths": {name: high - low for name, (low, high) in found.interval.items()},
+        "fit": dataclasses.replace(found, interval=ends),
+        "widths": {name: high - low for name, (low, high) in ends.items()},
         "one": one.profiles(grid, samples=2, seed=1),
         "other": repr(other.strength),
     }

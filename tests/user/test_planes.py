@@ -33,7 +33,7 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch):
     def path_lost(*given):
         return dataclasses.replace(follow_on(*given), unstable=False, known=False)
 
-    def at_rest(own, sample, state):
+    def at_rest(own, sample, state, to_rest):
         monkeypatch.setattr(program.PlaneProgram, "next", path_lost)
         return Jump(True, True, state)
 

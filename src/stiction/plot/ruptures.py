@@ -105,7 +105,7 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=128)
+    >>> problem = st.paper.problem(nodes=192)
     >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
     >>> method = st.Rupture(loading_rate=1e8)
     >>> run = st.simulate_rupture(problem, tau_p[0], method=method, progress=False)
@@ -161,7 +161,7 @@ def events(
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=128)
+    >>> problem = st.paper.problem(nodes=192)
     >>> field = st.paper.strength(problem, correlation_ratio=2.0)
     >>> method = st.Equilibrium(events=4)
     >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)

@@ -264,7 +264,7 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=128)
+    >>> problem = st.paper.problem(nodes=192)
     >>> field = st.paper.strength(problem, correlation_ratio=2.0)
     >>> method = st.Equilibrium(events=4)
     >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)
