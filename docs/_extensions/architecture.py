@@ -52,7 +52,7 @@ def draw() -> Figure:
     figure = Figure(figsize=(7.0, 0.5 * len(rows)))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     for room, targets in imports.items():
-        for target in targets:
+        for target in sorted(targets):
             (x, y), (to_x, to_y) = at[room], at[target]
             next_to = abs(y - to_y) < 1.5
             axes.plot(
