@@ -44,6 +44,8 @@ BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
 SHOWN_RATE = 0.01
 """Moment rate from which on a rupture is drawn, as a share of its largest."""
+FRONT_SHARE = 0.9
+"""Share of the nodes that the front has reached at the last of its contours."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
@@ -340,7 +342,9 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     draw_map(axes, interface, strength * factor, text, cmap="Greys")
     since, begin = _since_onset(run, "arrival_time")
     scale, time_unit = unit_for("s", since)
-    latest = scale * float(np.nanmax(since, initial=0.0))
+    # Beside the ends of an interface, nodes creep long after the front has passed.
+    after = since[since > 0.0]
+    latest = scale * float(np.quantile(after, FRONT_SHARE)) if after.size else 0.0
     length, _ = unit_for("m", interface.lengths)
     if latest > 0.0:
         x, y = (length * place for place in interface.coordinates.values())
