@@ -140,7 +140,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
 html_theme_options = {
-    "logo": {"text": "stiction"},
+    "logo": {"text": f"stiction {version}"},
     "icon_links": [
         {"name": "Source", "url": URLS[name], "icon": "fa-solid fa-code"}
         for name in ("Repository",)

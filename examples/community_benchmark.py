@@ -117,8 +117,10 @@ def report(spacing: float, out: Path) -> None:
         top, slip = float(record.station_slip_rate.max()), float(record.station_slip[-1])
         print(f"  {name}: peak slip rate {top:.2f} m/s, slip at the end {slip:.2f} m")
     files = out / f"{spacing:g}m"  # as the community exchanges them
-    about = {"normal_stress": NORMAL, "benchmark": "TPV3"}
-    st.external.write_scec(found.run, files, origin=np.array(PERIOD) / 2, **about)
+    origin = np.array(PERIOD) / 2
+    st.external.write_scec(
+        found.run, files, origin=origin, normal_stress=NORMAL, benchmark="TPV3"
+    )
     figure = draw(found, f"rupture time, nodes {spacing:g} m apart")
     figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=150)
 
