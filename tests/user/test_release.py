@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -129,6 +130,7 @@ def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
     config = tmp_path / "pyrightconfig.json"
     config.write_text('{"include": ["right.py"], "typeCheckingMode": "strict"}')
     options = ["-m", "basedpyright", "--level", "error", "--outputjson"]
+    options += ["--pythonpath", sys.executable]  # else the first Python of the path
     right = json.loads(python(*options, "-p", config))["generalDiagnostics"]
     assert [one["message"] for one in right] == []
     found = json.loads(python(*options, tmp_path / "wrong.py", code=1))["generalDiagnostics"]
