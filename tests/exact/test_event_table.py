@@ -99,7 +99,7 @@ def test_a_spectrum_is_that_of_the_lines_between_the_times():
     time = np.sort(np.concatenate([[0.0, 1.0, 2.0], inner]))
     frequencies, amplitude = rate_spectrum(
         make_problem(128, 0.05), 5.0 + time, 7.0 * (1.0 - np.abs(time - 1.0))
-    ).values()
+    )
     np.testing.assert_allclose(amplitude[0], 7.0 * np.sinc(frequencies[0]) ** 2, atol=1e-9)
     assert frequencies[0][0] == pytest.approx(0.5)
 

@@ -159,14 +159,13 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
 
 @jit_inside
-def _mean_where_breakable(strength: Array, stress: Array) -> float:
-    """Return the mean stress of the nodes of finite strength, Pa."""
-    total, count = 0.0, 0
+def _mean_where_breakable(strength: Array, stress: Array, breakable: int) -> float:
+    """Return the mean stress of the `breakable` nodes of finite strength, Pa."""
+    total = 0.0
     for i in range(stress.size):
         if strength[i] < np.inf:
             total += stress[i]
-            count += 1
-    return total / count
+    return total / breakable
 
 
 @jit_inside
@@ -207,7 +206,9 @@ def finish_step(
     now.whole_stress, now.weakened_nodes = whole_stress, weakened
     now.mean_stress = whole_stress
     if setting.thresholds.held:
-        now.mean_stress = _mean_where_breakable(setting.nodes.strength, stress)
+        now.mean_stress = _mean_where_breakable(
+            setting.nodes.strength, stress, setting.thresholds.breakable
+        )
     now.top_slip_rate, now.top_node = top_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / setting.thresholds.breakable

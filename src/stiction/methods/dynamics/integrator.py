@@ -47,9 +47,7 @@ from stiction.problem.friction.kernels import strengths
 # Shares of the stress scale:
 _OVERSTRESS = 1e-6  # stress above the strength from which a run begins with explicit steps
 _RESTING_STRESS = 1e-9  # Z V below which the interface rests
-_STOPPED_SHARE = (
-    0.1  # slip rate, as a share of `unstable_rate`, above which an interface slides on
-)
+_STOPPED_SHARE = 0.1  # slip rate, over `unstable_rate`, above which an interface slides on
 _REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
 _STEPS_BETWEEN_CHECKS = 1000  # steps after which a run checks whether it has ended
 

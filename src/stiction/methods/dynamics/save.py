@@ -47,7 +47,8 @@ from stiction.methods.dynamics.state import (
     StepRecord,
     event_type,
 )
-from stiction.methods.dynamics.summary import energy_balance, moment_of
+from stiction.methods.dynamics.summary import energy_balance
+from stiction.methods.equilibrium.events import moment_of
 from stiction.problem.interface import Interface
 from stiction.problem.results import along, coordinate, per_area, to_dataset
 

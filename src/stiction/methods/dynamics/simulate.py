@@ -186,7 +186,7 @@ def _record_to_end(
     return "max_steps"
 
 
-def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> dict[str, Any]:
+def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
     """Return the spectrum of the highest instability, up to the next one or the end of the run."""
     problem, interface = run.medium.problem, run.medium.interface
     stiffness = problem.solid.shear_modulus * interface.breakable_measure
@@ -209,8 +209,7 @@ def _complete(
         "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
     }
-    coordinates = {}
-    coordinates["frequency"], spectrum = _spectrum(dataset, run, state).values()
+    frequency, spectrum = _spectrum(dataset, run, state)
     values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
     with np.errstate(over="ignore", invalid="ignore"):  # after a run that became non-finite
         values |= summary(run, state)
@@ -220,4 +219,4 @@ def _complete(
     # Energies and moment are there already, over 'time'. Their last value is the
     # total.
     added = {name: value for name, value in values.items() if name not in SCALARS}
-    return dataset.merge(to_dataset(added, variables, coordinates, {}, interface))
+    return dataset.merge(to_dataset(added, variables, {"frequency": frequency}, {}, interface))

@@ -22,9 +22,10 @@ from stiction.methods.dynamics.specimens import (
     front_speeds,
     refuse_overstress,
 )
-from stiction.methods.dynamics.summary import SPEEDS, moment_of, rate_spectrum
+from stiction.methods.dynamics.summary import SPEEDS, rate_spectrum
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
+from stiction.methods.equilibrium.events import moment_of
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding
 from stiction.problem.problem import Problem
@@ -222,7 +223,7 @@ class EventRecord:
         if problem.area is not None:
             values |= forces(values, problem.area)
             variables |= force_variables(variables)
-        frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"]).values()
+        frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"])
         values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
         coordinates = {
             "frequency": frequency,

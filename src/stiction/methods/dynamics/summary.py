@@ -8,7 +8,7 @@ from stiction.base.arrays import Array
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Floats, RuptureState, Spectrum
-from stiction.methods.equilibrium.events import ArrestedEvent
+from stiction.methods.equilibrium.events import ArrestedEvent, moment_of
 from stiction.methods.equilibrium.sample import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
@@ -58,14 +58,9 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     return variables
 
 
-def moment_of(problem: Problem, slip: Array) -> float:
-    """Return the moment of a slip (m), N, or its rate by a slip rate, N/s; times m on a plane."""
-    return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
-
-
 def rate_spectrum(
     problem: Problem, time: Array, rate: Array
-) -> dict[str, tuple[Array, Variable]]:
+) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
     """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N; on a plane N m.
 
     The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with straight lines between the
@@ -87,10 +82,7 @@ def rate_spectrum(
         bends = np.diff(phases) @ (np.diff(rate) / steps)
         amplitude[i] = abs(ends / (1j * omega) + bends / omega**2)
     variable = per_area(problem.interface, SPECTRUM)
-    return {
-        "frequency": (frequencies, Variable("Hz", "frequency", ("frequency",))),
-        "moment_rate_spectrum": (amplitude, variable),
-    }
+    return (frequencies, Variable("Hz", "frequency", ("frequency",))), (amplitude, variable)
 
 
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:

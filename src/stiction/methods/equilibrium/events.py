@@ -154,7 +154,7 @@ def _measures(
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
-    moment = problem.solid.shear_modulus * float(added.sum()) * interface.cell
+    moment = moment_of(problem, added)
     # 3. and 4. Stress drops and fracture energy. Waves and weakening share what the mean of the
     # stress before and after does on the slip beyond the residual strength.
     drop, residual = problem.released_stress(added), rows.residual_strength[row]
@@ -191,6 +191,11 @@ def _measures(
             "event_start": float(np.argmax(inside)) * interface.spacing,
         }
     return values
+
+
+def moment_of(problem: Problem, slip: Array) -> float:
+    """Return the moment of a slip (m), N, or its rate by a slip rate, N/s; times m on a plane."""
+    return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
 
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
