@@ -7,12 +7,13 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import COLOURS, DARK, GREY, OVER_MEAN, RED, XI
+from reproduction.figures.common import OVER_MEAN, XI
 from reproduction.measures import arrest_shares, arrested, largest_energy, trend, with_inertia
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.runner import Data
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
 from reproduction.studies import DRIVING, LOAD_SHARES
+from stiction.plot.style import ACCENT, INK, QUIET, color
 
 
 def figure_8(d: Data):
@@ -23,7 +24,7 @@ def figure_8(d: Data):
         ordered = 100 * np.sort(d.excess(ratio))
         left = 1.0 - np.arange(ordered.size) / ordered.size
         axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
-    axes.axvline(0, color=GREY, lw=0.8)
+    axes.axvline(0, color=QUIET, lw=0.8)
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
     axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(-0.06, 10),
              xlabel="local criterion above the exact onset (%)",
@@ -43,15 +44,15 @@ def figure_9(d: Data):
         rows = trend(d, function, factor)
         for drawn, face, text in ((finer, "white", "finer grid, other draws"),
                                   (rows, None, "median less lower quartile")):  # fmt: skip
-            common.numbers(axes, *zip(*drawn, strict=True), color=COLOURS[0], mfc=face, label=text,
+            common.numbers(axes, *zip(*drawn, strict=True), color=color(0), mfc=face, label=text,
                            marker="o", ls="-")  # fmt: skip
     rows = trend(d, deviation, 1e-3)
-    bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=GREY,
+    bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=QUIET,
                 label="standard deviation")  # fmt: skip
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="#eeeeee", lw=0, zorder=0)
     top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}")
-    top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.95, "Figures 5 and 6", ha="center", color=GREY,
+    top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.95, "Figures 5 and 6", ha="center", color=QUIET,
              transform=top.get_xaxis_transform())  # fmt: skip
     bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
     common.log_ticks(bottom.yaxis)
@@ -75,11 +76,11 @@ def figure_10(d: Data):
     study = d["mechanism"]
     x = (PROBLEM.interface.x - 0.5 * L) / H
     load = float(study["one_load"])
-    single.plot(x, study["one_stress"] / load, color=COLOURS[0], label="stress over load")
-    single.plot(x, study["one_strength"] / load, "--", color=GREY, label="strength over load")
+    single.plot(x, study["one_stress"] / load, color=color(0), label="stress over load")
+    single.plot(x, study["one_strength"] / load, "--", color=QUIET, label="strength over load")
     single.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
     single.legend(loc="lower right")
-    lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=COLOURS[0], ms=4)
+    lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=color(0), ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
     common.log_ticks(lowering.yaxis)
@@ -100,12 +101,12 @@ def figure_11(d: Data):
         top.plot(
             length, unit * length * drop**2, **common.line(ratio), label=f"{XI} = {ratio:g}"
         )
-    top.axhline(1, color=RED, lw=1)
+    top.axhline(1, color=ACCENT, lw=1)
     top.text(
-        0.02 * length[-1], 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=RED
+        0.02 * length[-1], 1.03, r"largest fracture energy $\Gamma_\mathrm{max}$", color=ACCENT
     )
     top.axvspan(0, 1, color="#eeeeee", lw=0, zorder=0)
-    top.text(0.5, 0.6, "not yet\nunstable", ha="center", color=GREY)
+    top.text(0.5, 0.6, "not yet\nunstable", ha="center", color=QUIET)
     events = d["arrest"]
     moving = events["dynamic"].values > 0
     for chosen, y, marker, text in (
@@ -113,13 +114,13 @@ def figure_11(d: Data):
         (moving, 0.12, "X", "arrested with inertia, too"),
     ):
         place = events["length"].values[chosen] / H
-        top.plot(place, y + 0 * place, marker, color=DARK, ms=5, mfc="none", label=text)
+        top.plot(place, y + 0 * place, marker, color=INK, ms=5, mfc="none", label=text)
     top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, length[-1]),
             ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.09), ncols=3)
     for function, shift, colour, marker, text in (
-        (arrested, 0.0, COLOURS[0], "o", "without inertia"),
-        (with_inertia, 0.1, RED, "D", "with inertia (drawn beside)"),
+        (arrested, 0.0, color(0), "o", "without inertia"),
+        (with_inertia, 0.1, ACCENT, "D", "with inertia (drawn beside)"),
     ):
         rows = [function(d, ratio) * 100 for ratio in RATIOS]
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
@@ -140,9 +141,9 @@ def figure_12(d: Data):
     figure = common.new(5.2)
     top, bottom = figure.subplots(2, 1, height_ratios=(0.8, 1.2))
     x = PROBLEM.interface.x / L
-    for (case, load), colour in zip(DRIVING.items(), COLOURS, strict=False):
+    for i, (case, load) in enumerate(DRIVING.items()):
         profile = dataclasses.replace(PROBLEM, load=load).load_profile
-        top.plot(x, np.broadcast_to(profile, x.shape), color=colour, label=case)
+        top.plot(x, np.broadcast_to(profile, x.shape), color=color(i), label=case)
     top.set(xlabel="$x/L$", ylabel="load over its mean", xlim=(0, 1), ylim=(0, None))
     top.legend()
     study = d["driving"]
@@ -150,13 +151,13 @@ def figure_12(d: Data):
         here = study.sel(case=case)
         length = here["event_length"].values.ravel() / H
         griffith = np.minimum(here["griffith"].values.ravel() / H, ENDLESS)
-        bottom.plot(griffith, length, "osv"[i], color=COLOURS[2 - i], ms=4,
+        bottom.plot(griffith, length, "osv"[i], color=color(2 - i), ms=4,
                     label=f"{case}, without inertia ({np.isfinite(length).sum()})")  # fmt: skip
     moving = study["dynamic_length"].values / H
-    bottom.plot(study["griffith"].sel(case="edge")[:, 0] / H, moving, "D", color=RED, mfc="none",
+    bottom.plot(study["griffith"].sel(case="edge")[:, 0] / H, moving, "D", color=ACCENT, mfc="none",
                 label=f"edge, first event, with inertia ({np.isfinite(moving).sum()})")  # fmt: skip
-    bottom.axline((1, 1), (10, 10), color=GREY, lw=0.8)
-    bottom.axvline(L / H, color=GREY, lw=0.8, ls=":")
+    bottom.axline((1, 1), (10, 10), color=QUIET, lw=0.8)
+    bottom.axvline(L / H, color=QUIET, lw=0.8, ls=":")
     bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
                ylabel=r"arrested length over $h_\mathrm{n}$", ylim=(0.8, 200))  # fmt: skip
     common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
@@ -182,8 +183,8 @@ def figure_13(d: Data):
     titles = ("range of the strength", "random initial stress", "random residual strength")
     names = ("wide_strength", "random_load", "random_residual")
     for axes, name, title in zip(panels, names, titles, strict=True):
-        _points(axes, arrest_shares(d, name), -0.12, color=COLOURS[0], label="without inertia")
-        _points(axes, arrest_shares(d, f"{name}-inertia"), 0.12, color=RED, fmt="D",
+        _points(axes, arrest_shares(d, name), -0.12, color=color(0), label="without inertia")
+        _points(axes, arrest_shares(d, f"{name}-inertia"), 0.12, color=ACCENT, fmt="D",
                 label="with inertia")  # fmt: skip
         axes.set(xlim=(-3, 103), title=title)
     panels[1].legend(loc="upper right")

@@ -1,25 +1,14 @@
-"""What all figures share: width, colours, letters of panels, ticks and error bars."""
+"""What all figures share: width, letters of panels, ticks and error bars."""
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from reproduction.setting import HIGH, LOW, MAX_RATIOS, MEAN, RATIOS
+from reproduction.setting import HIGH, LOW, MEAN, RATIOS
+from stiction.plot.style import series
 
 WIDTH = 4.5
 """Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
-DARK, GREY, LIGHT, RED = "#1a1a1a", "#7a7a7a", "#d0d0d0", "#b5322a"
-COLOURS = ("#14213d", "#2a6f97", "#c8553d", "#e0a030", "#6a994e", "#7b4f9e")
-DASHES = (
-    "-",
-    (0, (5.0, 1.4)),
-    (0, (3.5, 1.2, 1.0, 1.2)),
-    (0, (1.2, 1.0)),
-    "-",
-    (0, (5.0, 1.4)),
-)
-MARKERS = ("o", "s", "^", "D", "v", "P")
-assert len(COLOURS) == len(DASHES) == len(MARKERS) == MAX_RATIOS
 STRENGTHS = (LOW / MEAN, HIGH / MEAN)
 """The range of the strength over its mean."""
 XI = r"$\xi_0/h_\mathrm{n}$"
@@ -41,14 +30,12 @@ def mosaic(height: float, rows, height_ratios, **shape):
 
 def line(ratio: float) -> dict:
     """Return colour and dashes of a correlation length."""
-    i = RATIOS.index(ratio)
-    return {"color": COLOURS[i], "linestyle": DASHES[i]}
+    return series(RATIOS.index(ratio))
 
 
 def dots(ratio: float) -> dict:
     """Return colour and marker of a correlation length."""
-    i = RATIOS.index(ratio)
-    return {"color": COLOURS[i], "marker": MARKERS[i], "linestyle": "none"}
+    return series(RATIOS.index(ratio), marker=True) | {"linestyle": "none"}
 
 
 def letters(*panels) -> None:

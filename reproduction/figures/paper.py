@@ -1,17 +1,18 @@
 """Figures 1 to 7, those of the paper."""
 
 import numpy as np
-from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.colors import LogNorm
 from scipy.stats import norm
 
 import stiction as st
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import COLOURS, DARK, GREY, MEAN_P, OVER_MEAN, RED, TAU_CR, XI
+from reproduction.figures.common import MEAN_P, OVER_MEAN, TAU_CR, XI
 from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
+from stiction.plot.style import ACCENT, INK, PALE, QUIET, SLIP_RATE, color
 
 TAU_P = rf"$\tau_\mathrm{{p}}{OVER_MEAN}"
 TAU_N = rf"$\tau_\mathrm{{n}}{OVER_MEAN}"
@@ -25,19 +26,19 @@ def figure_1(d: Data):
     figure, panels = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
     system, load, law, field, density = panels.values()
     _system(system)
-    load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=COLOURS[0])
-    load.plot(1, 1, "o", color=DARK, ms=4)
+    load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=color(0))
+    load.plot(1, 1, "o", color=INK, ms=4)
     load.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
     load.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
-    for peak, style, colour in ((1.0, "-", COLOURS[0]), (0.8, "--", GREY), (1.2, "--", GREY)):
+    for peak, style, colour in ((1.0, "-", color(0)), (0.8, "--", QUIET), (1.2, "--", QUIET)):
         law.plot([0, peak - 0.2, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
-    law.plot([0.8, 0.8], [0, 0.2], ":", color=DARK, lw=0.8)
+    law.plot([0.8, 0.8], [0, 0.2], ":", color=INK, lw=0.8)
     law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
     law.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
     law.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
     law.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
     tau_p = d["representative"]["strength"].values / MEAN
-    field.plot(X, tau_p, color=COLOURS[0], lw=0.9)
+    field.plot(X, tau_p, color=color(0), lw=0.9)
     low, high = common.span(tau_p, common.STRENGTHS)
     # The upper half is for the inset.
     field.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
@@ -46,12 +47,12 @@ def figure_1(d: Data):
         ("correlation", "-", r"$\tau_\mathrm{p}$"), ("gaussian_correlation", ":", "$z$")
     ):  # fmt: skip
         correlation = d.at("theory", name, FIRST)
-        inset.plot(X * L / H, correlation, style, color=DARK, lw=0.9, label=label)
+        inset.plot(X * L / H, correlation, style, color=INK, lw=0.9, label=label)
     inset.set(xlim=(0, 2.4 * FIRST), ylabel=r"$C$", yticks=(0, 1))
     inset.text(1.2 * FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend(loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
-    density.plot(LAW.pdf(s) * MEAN, s / MEAN, color=COLOURS[0])
+    density.plot(LAW.pdf(s) * MEAN, s / MEAN, color=color(0))
     density.set(ylim=field.get_ylim(), xlabel=rf"$f(\tau_\mathrm{{p}})\,${MEAN_P}")
     density.tick_params(labelleft=False)
     common.letters(system, load, law, field)
@@ -61,14 +62,14 @@ def figure_1(d: Data):
 def _system(axes) -> None:
     axes.axhspan(0, 0.9, color="#e8edf2", lw=0)
     axes.axhspan(-0.9, 0, color="#f2ece8", lw=0)
-    axes.axhline(0, color=COLOURS[1], lw=3)
+    axes.axhline(0, color=color(1), lw=3)
     for y, sign in ((0.72, 1), (-0.72, -1)):
         for start in (0.15, 0.45, 0.75):
             axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
-                          arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 0.9})  # fmt: skip
+                          arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 0.9})  # fmt: skip
     axes.text(0.5, 0.36, r"elastic half-space: $G,\ \nu,\ \rho$", ha="center", va="center")
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
-    axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color=COLOURS[1])
+    axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color=color(1))
     axes.text(0.93, 0.72, r"$\tau_0(t)$", va="center")
     axes.set(xlim=(0, 1), ylim=(-0.9, 0.9))
     axes.axis("off")
@@ -80,12 +81,12 @@ def figure_2(d: Data):
     left, right, axes = panels.values()
     z, s = np.linspace(-3.5, 3.5, 300), np.linspace(*common.span((LOW, HIGH)), 300)
     peak = max(LAW.pdf(s)) * MEAN
-    left.plot(z, norm.cdf(z), color=COLOURS[0], label=r"$\Phi$")
-    left.plot(z, norm.pdf(z), "--", color=GREY, label="density")
-    right.plot(s / MEAN, LAW.cdf(s), color=COLOURS[2], label="$F$")
+    left.plot(z, norm.cdf(z), color=color(0), label=r"$\Phi$")
+    left.plot(z, norm.pdf(z), "--", color=QUIET, label="density")
+    right.plot(s / MEAN, LAW.cdf(s), color=color(2), label="$F$")
     density = LAW.pdf(s) * MEAN / peak
-    right.plot(s / MEAN, density, "--", color=GREY, label=f"density / {peak:.2g}")
-    for value, colour in ((-0.6, COLOURS[1]), (1.1, RED)):
+    right.plot(s / MEAN, density, "--", color=QUIET, label=f"density / {peak:.2g}")
+    for value, colour in ((-0.6, color(1)), (1.1, ACCENT)):
         level = norm.cdf(value)
         strength = LAW.ppf(level) / MEAN
         left.plot([value, 3.5], [level, level], ":o", color=colour, lw=0.9, markevery=[0])
@@ -101,19 +102,16 @@ def figure_2(d: Data):
     cutoff = spectrum.cutoff() / unit
     k = np.geomspace(0.03, max(10.0, 1.5 * cutoff), 300)
     value = spectrum.density(unit * k) / spectrum.density(np.zeros(1))
-    axes.loglog(k, value, color=COLOURS[0])
+    axes.loglog(k, value, color=color(0))
     floor = max(float(value[k <= 1.2 * cutoff].min()) / 10.0, 1e-12)
     for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
-        axes.axvline(place, color=GREY, lw=0.8, ls=":")
+        axes.axvline(place, color=QUIET, lw=0.8, ls=":")
         axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
     axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(floor, 3))
     common.letters(left, axes)
     return figure
 
 
-SLOW_TO_FAST = LinearSegmentedColormap.from_list(
-    "slip rate", ["white", "#b5d3e6", "#2a6f97", "#c8553d", "#5a1a12"]
-)
 PLACE = 0.75
 """x/L of the onset of the shown sample: the periodic interface is shifted, as in the paper."""
 
@@ -137,7 +135,7 @@ def figure_3(d: Data):
     rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
     top = float(rate.max()) / 2.0  # colours over five decades below the fastest
     late = (time[-1] - 1.0) * 1e4
-    style = {"cmap": SLOW_TO_FAST, "rasterized": True}
+    style = {"cmap": SLIP_RATE, "rasterized": True}
     picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, rate, norm=LogNorm(1e-5 * top, 3.0 * top),
                               **style)  # fmt: skip
     zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
@@ -148,25 +146,25 @@ def figure_3(d: Data):
         way = 0.6 * late * 1e-4 * onset * speed / L
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
-        zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color=DARK, lw=1.2, ls="--")
+        zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color=INK, lw=1.2, ls="--")
         zoom.text(PLACE - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
     label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
     figure.colorbar(picture, ax=zoom, label=label)
     stress = mean_stress / mean_stress.max()
-    load.plot(stress, time, color=COLOURS[0])
+    load.plot(stress, time, color=color(0))
     wide.pcolormesh(X, time, rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
     load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03), ylabel="$t/T$",
              xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
     wide.set(xlim=(0, 1), xlabel="$x/L$")
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, PLACE)):
-        axes.plot(place, 1, "o", color=DARK, ms=4, clip_on=False)
+        axes.plot(place, 1, "o", color=INK, ms=4, clip_on=False)
         axes.set_ylim(time[0] - 0.01, 1.005)
     tau_p = _shifted(study, "strength") / MEAN
-    strength.plot(X, tau_p, color=COLOURS[0], lw=0.9)
+    strength.plot(X, tau_p, color=color(0), lw=0.9)
     above = tau_p.max() + 0.08
-    strength.errorbar(PLACE, above, xerr=0.5 * H / L, color=RED, capsize=3, lw=1.4)
-    strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color=RED)
+    strength.errorbar(PLACE, above, xerr=0.5 * H / L, color=ACCENT, capsize=3, lw=1.4)
+    strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color=ACCENT)
     strength.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(None, above + 0.08))
     common.letters(zoom, load, strength)
     return figure
@@ -179,24 +177,24 @@ def figure_4(d: Data):
     tau_p, tau_n = (
         _shifted(d["representative"], name) / MEAN for name in ("strength", "tau_n")
     )
-    top.plot(X, tau_p, "--", color=GREY, lw=0.8, label=r"$\tau_\mathrm{p}$")
-    top.plot(X, tau_n, color=COLOURS[1], label=r"$\tau_\mathrm{n}$")
-    top.plot(X[tau_n.argmin()], tau_n.min(), "o", color=DARK, ms=5)
+    top.plot(X, tau_p, "--", color=QUIET, lw=0.8, label=r"$\tau_\mathrm{p}$")
+    top.plot(X, tau_n, color=color(1), label=r"$\tau_\mathrm{n}$")
+    top.plot(X[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
-    bottom.plot([0, 1], [0, 1], color=GREY, lw=0.8)
+    bottom.plot([0, 1], [0, 1], color=QUIET, lw=0.8)
     for ratio in SIMULATED:
         stress, style = d.stress(ratio, "ruptures") / MEAN, common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
         place, predicted, off = is_misplaced(d, ratio)
         bottom.plot(predicted / L, place / L, **style, ms=4)
-        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=RED, ms=9)
+        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=ACCENT, ms=9)
         if "printed" in d:
-            pale = style | {"color": common.LIGHT, "mfc": "none", "ms": 3, "zorder": 1}
+            pale = style | {"color": PALE, "mfc": "none", "ms": 3, "zorder": 1}
             middle.plot(stress, 100 * offsets(d, ratio, "printed"), **pale)
             place, predicted, off = is_misplaced(d, ratio, "printed")
-            bottom.plot(predicted[off] / L, place[off] / L, "x", color=RED, ms=6)
-    middle.axhline(0, color=GREY, lw=0.8)
+            bottom.plot(predicted[off] / L, place[off] / L, "x", color=ACCENT, ms=6)
+    middle.axhline(0, color=QUIET, lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
     middle.legend(title=XI, ncols=3)
@@ -215,7 +213,7 @@ def figure_5(d: Data):
     fields = [panels.pop(f"field {ratio}") for ratio in RATIOS]
     strengths, minima, nucleation, densities, stress, place = panels.values()
     s = np.linspace(LOW, HIGH, 300)
-    strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color=DARK)
+    strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color=INK)
     low, high = common.span(common.STRENGTHS)
     strengths.set(ylim=(low, high), title=r"$f(\tau_\mathrm{p})$")
     shown = {minima: [], nucleation: [], stress: []}
@@ -263,7 +261,7 @@ def figure_5(d: Data):
     error = 2 * np.sqrt(20.0 / d.size.samples)
     place.axhspan(1 - error, 1 + error, color="#eeeeee", lw=0, zorder=0)
     if setting.SUPPORT[0] > 0.0:
-        stress.axvline(LOW / MEAN, color=GREY, lw=0.8, ls=":")
+        stress.axvline(LOW / MEAN, color=QUIET, lw=0.8, ls=":")
         shown[stress].append(LOW / MEAN)
     stress.set(xlim=common.span(*shown[stress], margin=0.02), ylim=(0, None),
                xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
@@ -280,8 +278,8 @@ _PLACES = np.array([np.log2(FIRST) - 1.2, *np.log2(RATIOS), np.log2(LAST) + 1.2]
 
 def _statistics(axes, table, end) -> None:
     """Draw mean, median and lower quartile; `end` has them at infinity, all are 1 at zero."""
-    styles = (("mean", "-", "o", COLOURS[0]), ("median", "--", "s", COLOURS[1]),
-              ("25 % quantile", ":", "^", COLOURS[2]))  # fmt: skip
+    styles = (("mean", "-", "o", color(0)), ("median", "--", "s", color(1)),
+              ("25 % quantile", ":", "^", color(2)))  # fmt: skip
     for i, (name, dashes, marker, colour) in enumerate(styles):
         rows = [numbers[i] for numbers in table]
         style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
@@ -316,17 +314,19 @@ def figure_6(d: Data):
     low = LOW / MEAN if setting.SUPPORT[0] > 0.0 else np.nan  # no limit without a bound
     _statistics(bottom, table, [low, low, low])
     bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}")
-    bottom.axhline(low, color=GREY, lw=0.8, ls=":")
+    bottom.axhline(low, color=QUIET, lw=0.8, ls=":")
     places = np.log2(SIMULATED)
     raw = [d.stress(ratio, "ruptures").mean() / MEAN for ratio in SIMULATED]
     errors = [2 * d.stress(ratio, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
               for ratio in SIMULATED]  # fmt: skip
     inset = bottom.inset_axes((0.42, 0.46, 0.56, 0.52))
     for axes in (bottom, inset):
-        drawn = axes.errorbar(places, raw, errors, fmt="D", color=RED, mfc="none", ms=6, lw=0.8)
+        drawn = axes.errorbar(
+            places, raw, errors, fmt="D", color=ACCENT, mfc="none", ms=6, lw=0.8
+        )
     best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
-    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color=COLOURS[0], ms=4)
-    inset.plot(places, best, "x", color=RED, ms=7)
+    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color=color(0), ms=4)
+    inset.plot(places, best, "x", color=ACCENT, ms=7)
     common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
     bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc=(0.02, 0.12))
@@ -346,20 +346,20 @@ def figure_7(d: Data):
                     ylabel=r"$C(\xi)$")  # fmt: skip
     correlation.legend(title=XI)
     s = np.linspace(-1, 1, 200)
-    eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=COLOURS[0])
+    eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=color(0))
     eigenfunction.set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
     slope = float(theory["infinite"][0] / theory["ratio"][0])
     powers = d["moments"]["powers"].mean("sample")
     sampled = (powers[:, 1] - powers[:, 0] ** 2) * (MEAN / setting.DEVIATION) ** 2
     for axes, high in zip(variances, (8, 1), strict=True):
-        axes.plot(theory["ratio"], theory["infinite"], color=COLOURS[0],
+        axes.plot(theory["ratio"], theory["infinite"], color=color(0),
                   label="infinite interface")  # fmt: skip
-        axes.plot(theory["usable"], theory["periodic"], "--", color=COLOURS[1],
+        axes.plot(theory["usable"], theory["periodic"], "--", color=color(1),
                   label="this interface")  # fmt: skip
-        axes.plot([0, 1.0 / slope], [0, 1.0], ":", color=RED, label=rf"{slope:.2f} {XI}")
-        axes.plot(RATIOS, sampled, "o", color=DARK, ms=4)
+        axes.plot([0, 1.0 / slope], [0, 1.0], ":", color=ACCENT, label=rf"{slope:.2f} {XI}")
+        axes.plot(RATIOS, sampled, "o", color=INK, ms=4)
         axes.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
-        axes.axhline(1.0, color=GREY, lw=0.8, ls="--")
+        axes.axhline(1.0, color=QUIET, lw=0.8, ls="--")
     variances[0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     variances[0].legend(loc="lower right")
     common.letters(correlation, eigenfunction, *variances)

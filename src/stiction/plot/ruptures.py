@@ -28,14 +28,23 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.fields import draw_map, map_height, name_line
-from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style, series
+from stiction.plot.style import (
+    ACCENT,
+    INK,
+    PAGE,
+    PALE,
+    QUIET,
+    SLIP_RATE,
+    color,
+    paper_style,
+    series,
+)
 from stiction.problem.problem import Problem
 
 Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]
 """Moving parts of a figure: an artist, the name of its data, and the data by frame."""
 
-COLORS = "inferno_r"
 FRAME_TIME = 50
 """Milliseconds that a film shows each frame."""
 DECADES = 7.0
@@ -324,7 +333,7 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     along = interface.x[0] + (np.arange(interface.size + 1) - 0.5) * interface.spacing
     edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
-        along * length, edges * factor, rate, norm=norm, cmap=COLORS, rasterized=True
+        along * length, edges * factor, rate, norm=norm, cmap=SLIP_RATE, rasterized=True
     )
     if begin:
         place = float(run["critical_position"]) * length
@@ -408,7 +417,7 @@ def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     low, high = np.quantile(stress[:, breaks], [0.001, 0.999])
     figure = Figure(figsize=(PAGE * 1.15, 3.4))
     left, right = figure.subplots(1, 2, sharey=True)
-    slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=COLORS)
+    slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=SLIP_RATE)
     text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}
     load = draw_map(right, interface, stress[0], text, cmap="cividis", **ends)
     right.label_outer()

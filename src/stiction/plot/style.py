@@ -25,14 +25,18 @@ PALE = "#d9d9d9"
 BAND = "#cfe0ea"
 ACCENT = "#b5322a"
 
-# Dark to light, for print in grey; each also has its own dashes and marker.
+SLIP_RATE = "inferno_r"
+"""Colours of slip rates."""
+
+# Each colour also has its own dashes and marker. To readers with deuteranopia, protanopia or
+# tritanopia, two colours differ by at least 19 units of CAM02-UCS.
 _SERIES: tuple[tuple[str, Any, str], ...] = (
     ("#14213d", "-", "o"),
     ("#2a6f97", (0, (5.0, 1.4)), "s"),
     ("#c8553d", (0, (3.5, 1.2, 1.0, 1.2)), "^"),
     ("#e0a030", (0, (1.2, 1.0)), "D"),
-    ("#5c8d4e", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), "v"),
-    ("#9a7fb8", (0, (2.5, 2.5)), "P"),
+    ("#62b4a4", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), "v"),
+    ("#b391e3", (0, (2.5, 2.5)), "P"),
 )
 
 _RC: dict[str, Any] = {
