@@ -7,13 +7,12 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import OVER_MEAN, XI
+from reproduction.figures.common import ACCENT, INK, OVER_MEAN, QUIET, XI
 from reproduction.measures import arrest_shares, arrested, largest_energy, trend, with_inertia
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.runner import Data
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
 from reproduction.studies import DRIVING, LOAD_SHARES
-from stiction.plot.style import ACCENT, INK, QUIET, color
 
 
 def figure_8(d: Data):
@@ -44,7 +43,7 @@ def figure_9(d: Data):
         rows = trend(d, function, factor)
         for drawn, face, text in ((finer, "white", "finer grid, other draws"),
                                   (rows, None, "median less lower quartile")):  # fmt: skip
-            common.numbers(axes, *zip(*drawn, strict=True), color=color(0), mfc=face, label=text,
+            common.numbers(axes, *zip(*drawn, strict=True), color="C0", mfc=face, label=text,
                            marker="o", ls="-")  # fmt: skip
     rows = trend(d, deviation, 1e-3)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color=QUIET,
@@ -76,11 +75,11 @@ def figure_10(d: Data):
     study = d["mechanism"]
     x = (PROBLEM.interface.x - 0.5 * L) / H
     load = float(study["one_load"])
-    single.plot(x, study["one_stress"] / load, color=color(0), label="stress over load")
+    single.plot(x, study["one_stress"] / load, color="C0", label="stress over load")
     single.plot(x, study["one_strength"] / load, "--", color=QUIET, label="strength over load")
     single.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
     single.legend(loc="lower right")
-    lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color=color(0), ms=4)
+    lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color="C0", ms=4)
     lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
     common.log_ticks(lowering.yaxis)
@@ -119,7 +118,7 @@ def figure_11(d: Data):
             ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.09), ncols=3)
     for function, shift, colour, marker, text in (
-        (arrested, 0.0, color(0), "o", "without inertia"),
+        (arrested, 0.0, "C0", "o", "without inertia"),
         (with_inertia, 0.1, ACCENT, "D", "with inertia (drawn beside)"),
     ):
         rows = [function(d, ratio) * 100 for ratio in RATIOS]
@@ -143,7 +142,7 @@ def figure_12(d: Data):
     x = PROBLEM.interface.x / L
     for i, (case, load) in enumerate(DRIVING.items()):
         profile = dataclasses.replace(PROBLEM, load=load).load_profile
-        top.plot(x, np.broadcast_to(profile, x.shape), color=color(i), label=case)
+        top.plot(x, np.broadcast_to(profile, x.shape), color=f"C{i}", label=case)
     top.set(xlabel="$x/L$", ylabel="load over its mean", xlim=(0, 1), ylim=(0, None))
     top.legend()
     study = d["driving"]
@@ -151,7 +150,7 @@ def figure_12(d: Data):
         here = study.sel(case=case)
         length = here["event_length"].values.ravel() / H
         griffith = np.minimum(here["griffith"].values.ravel() / H, ENDLESS)
-        bottom.plot(griffith, length, "osv"[i], color=color(2 - i), ms=4,
+        bottom.plot(griffith, length, "osv"[i], color=f"C{2 - i}", ms=4,
                     label=f"{case}, without inertia ({np.isfinite(length).sum()})")  # fmt: skip
     moving = study["dynamic_length"].values / H
     bottom.plot(study["griffith"].sel(case="edge")[:, 0] / H, moving, "D", color=ACCENT, mfc="none",
@@ -183,7 +182,7 @@ def figure_13(d: Data):
     titles = ("range of the strength", "random initial stress", "random residual strength")
     names = ("wide_strength", "random_load", "random_residual")
     for axes, name, title in zip(panels, names, titles, strict=True):
-        _points(axes, arrest_shares(d, name), -0.12, color=color(0), label="without inertia")
+        _points(axes, arrest_shares(d, name), -0.12, color="C0", label="without inertia")
         _points(axes, arrest_shares(d, f"{name}-inertia"), 0.12, color=ACCENT, fmt="D",
                 label="with inertia")  # fmt: skip
         axes.set(xlim=(-3, 103), title=title)

@@ -5,10 +5,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from reproduction.setting import HIGH, LOW, MEAN, RATIOS
-from stiction.plot.style import series
 
 WIDTH = 4.5
 """Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
+INK, QUIET, PALE, ACCENT = "#1a1a1a", "#7a7a7a", "#d9d9d9", "#b5322a"
+DASHES = ("-", "--", "-.", ":", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (2.5, 2.5)))
 STRENGTHS = (LOW / MEAN, HIGH / MEAN)
 """The range of the strength over its mean."""
 XI = r"$\xi_0/h_\mathrm{n}$"
@@ -30,12 +31,14 @@ def mosaic(height: float, rows, height_ratios, **shape):
 
 def line(ratio: float) -> dict:
     """Return colour and dashes of a correlation length."""
-    return series(RATIOS.index(ratio))
+    i = RATIOS.index(ratio)
+    return {"color": f"C{i}", "linestyle": DASHES[i]}
 
 
 def dots(ratio: float) -> dict:
     """Return colour and marker of a correlation length."""
-    return series(RATIOS.index(ratio), marker=True) | {"linestyle": "none"}
+    i = RATIOS.index(ratio)
+    return {"color": f"C{i}", "marker": "os^DvP"[i], "linestyle": "none"}
 
 
 def letters(*panels) -> None:

@@ -7,12 +7,11 @@ from scipy.stats import norm
 import stiction as st
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import MEAN_P, OVER_MEAN, TAU_CR, XI
+from reproduction.figures.common import ACCENT, INK, MEAN_P, OVER_MEAN, PALE, QUIET, TAU_CR, XI
 from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from stiction.plot.style import ACCENT, INK, PALE, QUIET, SLIP_RATE, color
 
 TAU_P = rf"$\tau_\mathrm{{p}}{OVER_MEAN}"
 TAU_N = rf"$\tau_\mathrm{{n}}{OVER_MEAN}"
@@ -26,11 +25,11 @@ def figure_1(d: Data):
     figure, panels = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
     system, load, law, field, density = panels.values()
     _system(system)
-    load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color=color(0))
+    load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color="C0")
     load.plot(1, 1, "o", color=INK, ms=4)
     load.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
     load.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
-    for peak, style, colour in ((1.0, "-", color(0)), (0.8, "--", QUIET), (1.2, "--", QUIET)):
+    for peak, style, colour in ((1.0, "-", "C0"), (0.8, "--", QUIET), (1.2, "--", QUIET)):
         law.plot([0, peak - 0.2, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
     law.plot([0.8, 0.8], [0, 0.2], ":", color=INK, lw=0.8)
     law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
@@ -38,7 +37,7 @@ def figure_1(d: Data):
     law.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
     law.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
     tau_p = d["representative"]["strength"].values / MEAN
-    field.plot(X, tau_p, color=color(0), lw=0.9)
+    field.plot(X, tau_p, color="C0", lw=0.9)
     low, high = common.span(tau_p, common.STRENGTHS)
     # The upper half is for the inset.
     field.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
@@ -52,7 +51,7 @@ def figure_1(d: Data):
     inset.text(1.2 * FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend(loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
-    density.plot(LAW.pdf(s) * MEAN, s / MEAN, color=color(0))
+    density.plot(LAW.pdf(s) * MEAN, s / MEAN, color="C0")
     density.set(ylim=field.get_ylim(), xlabel=rf"$f(\tau_\mathrm{{p}})\,${MEAN_P}")
     density.tick_params(labelleft=False)
     common.letters(system, load, law, field)
@@ -62,14 +61,14 @@ def figure_1(d: Data):
 def _system(axes) -> None:
     axes.axhspan(0, 0.9, color="#e8edf2", lw=0)
     axes.axhspan(-0.9, 0, color="#f2ece8", lw=0)
-    axes.axhline(0, color=color(1), lw=3)
+    axes.axhline(0, color="C1", lw=3)
     for y, sign in ((0.72, 1), (-0.72, -1)):
         for start in (0.15, 0.45, 0.75):
             axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
                           arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 0.9})  # fmt: skip
     axes.text(0.5, 0.36, r"elastic half-space: $G,\ \nu,\ \rho$", ha="center", va="center")
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
-    axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color=color(1))
+    axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color="C1")
     axes.text(0.93, 0.72, r"$\tau_0(t)$", va="center")
     axes.set(xlim=(0, 1), ylim=(-0.9, 0.9))
     axes.axis("off")
@@ -81,12 +80,12 @@ def figure_2(d: Data):
     left, right, axes = panels.values()
     z, s = np.linspace(-3.5, 3.5, 300), np.linspace(*common.span((LOW, HIGH)), 300)
     peak = max(LAW.pdf(s)) * MEAN
-    left.plot(z, norm.cdf(z), color=color(0), label=r"$\Phi$")
+    left.plot(z, norm.cdf(z), color="C0", label=r"$\Phi$")
     left.plot(z, norm.pdf(z), "--", color=QUIET, label="density")
-    right.plot(s / MEAN, LAW.cdf(s), color=color(2), label="$F$")
+    right.plot(s / MEAN, LAW.cdf(s), color="C2", label="$F$")
     density = LAW.pdf(s) * MEAN / peak
     right.plot(s / MEAN, density, "--", color=QUIET, label=f"density / {peak:.2g}")
-    for value, colour in ((-0.6, color(1)), (1.1, ACCENT)):
+    for value, colour in ((-0.6, "C1"), (1.1, ACCENT)):
         level = norm.cdf(value)
         strength = LAW.ppf(level) / MEAN
         left.plot([value, 3.5], [level, level], ":o", color=colour, lw=0.9, markevery=[0])
@@ -102,7 +101,7 @@ def figure_2(d: Data):
     cutoff = spectrum.cutoff() / unit
     k = np.geomspace(0.03, max(10.0, 1.5 * cutoff), 300)
     value = spectrum.density(unit * k) / spectrum.density(np.zeros(1))
-    axes.loglog(k, value, color=color(0))
+    axes.loglog(k, value, color="C0")
     floor = max(float(value[k <= 1.2 * cutoff].min()) / 10.0, 1e-12)
     for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
         axes.axvline(place, color=QUIET, lw=0.8, ls=":")
@@ -135,7 +134,7 @@ def figure_3(d: Data):
     rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
     top = float(rate.max()) / 2.0  # colours over five decades below the fastest
     late = (time[-1] - 1.0) * 1e4
-    style = {"cmap": SLIP_RATE, "rasterized": True}
+    style = {"cmap": "inferno_r", "rasterized": True}
     picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, rate, norm=LogNorm(1e-5 * top, 3.0 * top),
                               **style)  # fmt: skip
     zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
@@ -151,7 +150,7 @@ def figure_3(d: Data):
     label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
     figure.colorbar(picture, ax=zoom, label=label)
     stress = mean_stress / mean_stress.max()
-    load.plot(stress, time, color=color(0))
+    load.plot(stress, time, color="C0")
     wide.pcolormesh(X, time, rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
     load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03), ylabel="$t/T$",
              xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
@@ -161,7 +160,7 @@ def figure_3(d: Data):
         axes.plot(place, 1, "o", color=INK, ms=4, clip_on=False)
         axes.set_ylim(time[0] - 0.01, 1.005)
     tau_p = _shifted(study, "strength") / MEAN
-    strength.plot(X, tau_p, color=color(0), lw=0.9)
+    strength.plot(X, tau_p, color="C0", lw=0.9)
     above = tau_p.max() + 0.08
     strength.errorbar(PLACE, above, xerr=0.5 * H / L, color=ACCENT, capsize=3, lw=1.4)
     strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color=ACCENT)
@@ -178,7 +177,7 @@ def figure_4(d: Data):
         _shifted(d["representative"], name) / MEAN for name in ("strength", "tau_n")
     )
     top.plot(X, tau_p, "--", color=QUIET, lw=0.8, label=r"$\tau_\mathrm{p}$")
-    top.plot(X, tau_n, color=color(1), label=r"$\tau_\mathrm{n}$")
+    top.plot(X, tau_n, color="C1", label=r"$\tau_\mathrm{n}$")
     top.plot(X[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
@@ -278,8 +277,8 @@ _PLACES = np.array([np.log2(FIRST) - 1.2, *np.log2(RATIOS), np.log2(LAST) + 1.2]
 
 def _statistics(axes, table, end) -> None:
     """Draw mean, median and lower quartile; `end` has them at infinity, all are 1 at zero."""
-    styles = (("mean", "-", "o", color(0)), ("median", "--", "s", color(1)),
-              ("25 % quantile", ":", "^", color(2)))  # fmt: skip
+    styles = (("mean", "-", "o", "C0"), ("median", "--", "s", "C1"),
+              ("25 % quantile", ":", "^", "C2"))  # fmt: skip
     for i, (name, dashes, marker, colour) in enumerate(styles):
         rows = [numbers[i] for numbers in table]
         style = {"color": colour, "ls": dashes, "marker": marker, "label": name}
@@ -325,7 +324,7 @@ def figure_6(d: Data):
             places, raw, errors, fmt="D", color=ACCENT, mfc="none", ms=6, lw=0.8
         )
     best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
-    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color=color(0), ms=4)
+    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color="C0", ms=4)
     inset.plot(places, best, "x", color=ACCENT, ms=7)
     common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
@@ -346,15 +345,15 @@ def figure_7(d: Data):
                     ylabel=r"$C(\xi)$")  # fmt: skip
     correlation.legend(title=XI)
     s = np.linspace(-1, 1, 200)
-    eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color=color(0))
+    eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color="C0")
     eigenfunction.set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
     slope = float(theory["infinite"][0] / theory["ratio"][0])
     powers = d["moments"]["powers"].mean("sample")
     sampled = (powers[:, 1] - powers[:, 0] ** 2) * (MEAN / setting.DEVIATION) ** 2
     for axes, high in zip(variances, (8, 1), strict=True):
-        axes.plot(theory["ratio"], theory["infinite"], color=color(0),
+        axes.plot(theory["ratio"], theory["infinite"], color="C0",
                   label="infinite interface")  # fmt: skip
-        axes.plot(theory["usable"], theory["periodic"], "--", color=color(1),
+        axes.plot(theory["usable"], theory["periodic"], "--", color="C1",
                   label="this interface")  # fmt: skip
         axes.plot([0, 1.0 / slope], [0, 1.0], ":", color=ACCENT, label=rf"{slope:.2f} {XI}")
         axes.plot(RATIOS, sampled, "o", color=INK, ms=4)

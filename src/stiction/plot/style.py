@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib.colors
 import matplotlib.style
 import numpy as np
+from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
@@ -46,6 +47,7 @@ _RC: dict[str, Any] = {
     "axes.labelsize": 9.0,
     "axes.titlesize": 9.0,
     "axes.linewidth": 0.6,
+    "axes.prop_cycle": cycler(color=[color for color, _, _ in _SERIES]),
     "axes.spines.top": False,
     "axes.spines.right": False,
     "xtick.labelsize": 8.0,
@@ -66,7 +68,7 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Set fonts, widths and ticks of a printed page for the figures drawn inside.
+    """Set fonts, widths, colours and ticks of a printed page for the figures drawn inside.
 
     A style of the user, such as a dark style, has no effect inside.
     """
