@@ -1,11 +1,13 @@
-"""A method of somebody else that does not do as its members promise."""
+"""Classes of somebody else that do not do as their members promise."""
 
 import numpy as np
 import pytest
-from refusals import refuses
+import scipy.stats
+from refusals import refusals, refuses
 from setups import beta_strength, make_problem
 
 import stiction as st
+from stiction import extensions
 from stiction.base.variables import Variable
 from stiction.inference.prior import make_prior
 from stiction.inference.scaling import find_scaling
@@ -106,3 +108,54 @@ def test_an_onset_at_minus_infinity_is_refused():
     assert never.interval[1] == never.stress == np.inf
     assert "no stress has P = 0.1: the event happens in 0" in str(never)
     assert never.warnings
+
+
+class Unlisted(Broken):
+    def supports(self, problem):
+        return "it does not take lines"
+
+
+class ShortLoad(extensions.LoadShape):
+    type = "short"
+
+    def values(self, interface):
+        return np.ones(3)
+
+
+class FromScipy(extensions.Marginal):
+    type = "from_scipy"
+
+    def __init__(self, distribution):
+        self.given = distribution
+
+    @property
+    def distribution(self):
+        return self.given
+
+
+class Negative(st.PowerLawSpectrum):
+    def density(self, wavenumber, dimensions=1):
+        return np.where(wavenumber < 100.0, -1.0, 1.0)
+
+
+def field_of(distribution):
+    return st.RandomField(FromScipy(distribution), st.PowerLawSpectrum(correlation_length=2e-3))
+
+
+test_a_class_whose_members_return_the_wrong_thing_is_refused = refusals(
+    {
+        "supports must return a list of reasons, got 'it does": lambda: st.onset(
+            st.paper.problem(nodes=256), np.full(256, 1e6), method=Unlisted({})
+        ),
+        "ShortLoad.values must have the shape (256,) ... got (3,)": lambda: ShortLoad().on(
+            st.paper.problem(nodes=256).interface
+        ),
+        "from_scipy: its distribution must be frozen": lambda: field_of(scipy.stats.norm),
+        "must have a finite mean ... got nan": lambda: field_of(
+            scipy.stats.triang(2.0, 1e6, 1e6)
+        ),
+        "positive and finite ... -1 in a mode": lambda: st.RandomField(
+            scipy.stats.uniform(1e6, 1e6), Negative(correlation_length=2e-3)
+        ).sample(st.paper.problem(nodes=256).interface, seed=0),
+    }
+)

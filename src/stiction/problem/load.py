@@ -44,11 +44,18 @@ class LoadShape(ABC):
 
     def on(self, interface: Interface) -> Array:
         """Return the profile p at the nodes, (*shape), with a mean of 1."""
-        values = np.asarray(self.values(interface), dtype=np.float64)
+        values, name = np.asarray(self.values(interface), np.float64), type(self).__name__
+        try:
+            np.broadcast_to(values, interface.shape)
+        except ValueError:
+            raise InputError(
+                f"load.profile: {name}.values must have the shape {interface.shape} of the nodes,"
+                f" got {values.shape}"
+            ) from None
         values = values / values.mean()
         if not np.all(values > 0.0):
             raise InputError(
-                f"load.profile: {type(self).__name__} must be positive everywhere, smallest over"
+                f"load.profile: {name} must be positive everywhere, smallest over"
                 f" its mean is {values.min():g}"
             )
         return np.ascontiguousarray(np.broadcast_to(values, interface.shape))

@@ -757,7 +757,7 @@ class Problem:
 
 def refusals(problem: Problem, method: Any) -> list[str]:
     """Return why a method does not take a problem, an empty list if it does."""
-    return [
-        f"method: the {method.label} cannot take this: {reason}"
-        for reason in method.supports(problem)
-    ]
+    reasons = method.supports(problem)
+    if not isinstance(reasons, list):
+        return [f"method: supports must return a list of reasons, got {describe(reasons)}"]
+    return [f"method: the {method.label} cannot take this: {reason}" for reason in reasons]

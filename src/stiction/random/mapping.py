@@ -168,7 +168,7 @@ def _standard(marginal: Any) -> tuple[Any, float, float]:
     a lower bound below zero keeps its own table, since subtraction would magnify the relative
     error.
     """
-    family = getattr(marginal, "scipy_family", None)
+    family = marginal.scipy_family
     if family is None or marginal.low < 0.0:
         return marginal, 0.0, 1.0
     *shapes, low, scale = marginal.distribution.args

@@ -26,15 +26,36 @@ Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 
 
 class Marginal(ABC):
-    """Base class of marginals."""
+    """Base class of marginals.
+
+    A class may also have ``of_normal(z)``, which returns F^-1(Phi(z)) in closed form in place of
+    the tables of `mapping`. Its marginals share tables if `scipy_family` is their family of scipy,
+    and `distribution` the family with shapes, `low` and scale in this order.
+    """
 
     family: ClassVar[str] = "marginals"
     type: str
+    scipy_family: ClassVar[Any] = None
 
     @property
     @abstractmethod
     def distribution(self) -> Any:
         """Frozen `scipy.stats` distribution of the marginal."""
+
+    def check_moments(self, given: object = "") -> None:
+        """Raise an `InputError` unless the distribution is frozen and its moments are finite."""
+        distribution = self.distribution
+        if not hasattr(distribution, "dist"):
+            raise InputError(
+                f"{self.type}: its distribution must be frozen, such as scipy.stats.norm(1e6, 2e5),"
+                f" got {type(distribution).__name__}"
+            )
+        mean, deviation = distribution.mean(), distribution.std()
+        if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
+            raise InputError(
+                f"{self.type}: must have a finite mean and a positive, finite standard deviation,"
+                f" got {mean:g} and {deviation:g} from {given or self}"
+            )
 
 
 @register
@@ -78,16 +99,11 @@ class Beta(Marginal):
 
 @model(kw_only=True)
 class _ByMoments(Marginal):
-    """Families above a lower bound, given by mean and coefficient of variation.
-
-    `scipy_family` is the family of scipy with the arguments shape, `low` and scale, or `None`. Its
-    marginals share the tables of `mapping`.
-    """
+    """Families above a lower bound, given by mean and coefficient of variation."""
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
     low: Bound = 0.0
-    scipy_family: ClassVar[Any] = None
 
     @model_validator(mode="after")
     def _has_a_distribution(self) -> Self:
@@ -254,12 +270,7 @@ class ScipyMarginal(Marginal):
     frozen: Any = None
 
     def __post_init__(self) -> None:
-        mean, deviation = self.distribution.mean(), self.distribution.std()
-        if not (np.isfinite(mean) and np.isfinite(deviation) and deviation > 0.0):
-            raise InputError(
-                f"{self.type}: must have a finite mean and a positive, finite standard deviation,"
-                f" got {mean:g} and {deviation:g} from {dict(self.parameters)}"
-            )
+        self.check_moments(dict(self.parameters))
 
     @cached_property
     def distribution(self) -> Any:
@@ -309,12 +320,14 @@ def marginal_of(value: Any) -> Marginal:
     Raises an `InputError` for any other value, or if a moment is not finite.
     """
     if isinstance(value, Marginal):
+        if not type(value).__module__.startswith("stiction."):
+            value.check_moments()
         return value
     if isinstance(value, Mapping):
         name, rest = value.get("type"), {k: v for k, v in value.items() if k != "type"}
         theirs = name in ("beta", "gamma") and {"a", "b", "loc", "scale"} & rest.keys()
         if not isinstance(name, str) or (name in MARGINALS and not theirs):
-            return from_table(MARGINALS, value)
+            return marginal_of(from_table(MARGINALS, value))
         return _of_scipy(name, rest)
     family: Any = getattr(value, "dist", None)
     if not isinstance(family, scipy.stats.rv_continuous):

@@ -141,12 +141,12 @@ def make_modes(
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
     if mean_mode:
         # A mode j >= 1 stands for k and -k, the mean mode for a single wave vector.
-        power[0] = 0.5 * float(spectrum.density(np.zeros(1), dimensions)[0])
+        power[0] = 0.5 * float(np.ravel(spectrum.density(np.zeros(1), dimensions))[0])
     total = power.sum()
-    if not 0.0 < total < np.inf:
+    if not (0.0 < total < np.inf and power.min() >= 0.0):
         raise InputError(
             "spectrum: its power in the modes of this interface must be positive and finite,"
-            f" got {total:g}"
+            f" got {total:g} in all and {power.min():g} in a mode"
         )
     sigma = np.sqrt(power / total)
     for array in (sigma, numbers, ranks):
