@@ -186,7 +186,7 @@ def test_the_page_of_messages_quotes_messages():
             texts.add("#".join(str(getattr(part, "value", "")) for part in parts))
     messages = "\n".join(texts)
     page = (ROOT / "docs" / "faq.md").read_text("utf-8")
-    quotes = re.findall(r"(?:^|or |and )\*\*`([^`]+)`", page, re.MULTILINE)
+    quotes = re.findall(r"(?:^- |or |and )\*\*`([^`]+)`", page, re.MULTILINE)
     assert len(quotes) > 60
     for part in (part.strip() for quote in quotes for part in quote.split("...")):
         assert part in messages
