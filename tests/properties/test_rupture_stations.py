@@ -59,7 +59,7 @@ def test_files_of_a_line_read_back(tmp_path):
     )
     np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
     np.testing.assert_allclose(table["t"], run.arrival_time.fillna(1e9), rtol=1e-6)
-    with pytest.raises(st.InputError, match="lacks station_slip. Give simulate_rupture"):
+    with pytest.raises(st.InputError, match="lacks station_slip. Call st.simulate_rupture"):
         st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **about)
 
 

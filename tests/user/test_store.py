@@ -195,7 +195,7 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
 def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
     older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
     store.Store.open(tmp_path / "run", older)
-    words = "cannot be read by this installation: method: unknown 'weights'"
+    words = "cannot read its study: method: unknown 'weights'"
     with pytest.raises(StoreError, match=words):
         st.open_run(tmp_path / "run")
 

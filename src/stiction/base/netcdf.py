@@ -166,7 +166,9 @@ def _check_chunks(dataset: Any) -> None:
     dataset.id.chunk_iter(chunks.append)
     values = math.prod(dataset.chunks)
     if len(chunks) * values > _padded_size(dataset):
-        raise InputError(f"{dataset.name!r} has more chunks than its shape")
+        raise InputError(
+            f"{dataset.name!r} has more chunks than its shape. Write the file again"
+        )
     size = values * dataset.id.get_type().get_size()
     for chunk in chunks:
         skipped, data = dataset.id.read_direct_chunk(chunk.chunk_offset)
@@ -189,7 +191,10 @@ def _texts(dataset: Any, budget: list[int]) -> Any:
         texts.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
         budget[0] -= max(len(texts[-1]), 1)
         if budget[0] < 0:
-            raise InputError("its texts are larger than the file")
+            raise InputError(
+                "its strings need more memory than the whole file. The file may be damaged: write"
+                " it again"
+            )
     return np.array(texts, dtype=str)
 
 

@@ -660,7 +660,9 @@ def reliability(
     if page is not None:
         asked["page"] = 0.0
     if asked:
-        raise InputError(f"--out: is for the whole curve. Leave it or {_options_of(asked)} out")
+        raise InputError(
+            f"--out: computes a whole curve. Leave out --out or {_options_of(asked)}"
+        )
     with _resumable(out), _executor(scheduler) as executor:
         curve = loaded.failure_curve(
             out=out, workers=workers, executor=executor, part=part,
@@ -703,8 +705,8 @@ def _answer(
             raise InputError(texts) from None
     if question is None:
         raise InputError(
-            "--out: give the folder of a curve, or ask a question with --force, --stress,"
-            " --friction-coefficient or --probability, or in the table [reliability] of the study"
+            "pass --force, --stress, --friction-coefficient or --probability, or add a table"
+            " [reliability] to the study. For a whole failure curve, pass --out FOLDER"
         )
     for point, experiment in zip(study.points, study.experiments, strict=True):
         where = f"{point}: " if point.values else ""

@@ -260,8 +260,8 @@ def _result(future: Future[Table], span: Span) -> Table:
             ) from error
         last = span.first + span.samples - 1
         raise WorkerError(
-            f"the worker on items {span.first} to {last} of point {span.point} was lost:"
-            f" {type(error).__name__}: {error}"
+            f"the worker that computed items {span.first} to {last} of point {span.point} was lost"
+            f" ({type(error).__name__}: {error}). Run again, with fewer workers if memory is short"
         ) from error
     if table.versions != versions():
         raise WorkerError(

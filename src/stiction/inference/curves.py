@@ -321,7 +321,10 @@ def _columns(
     at, at_si = _in_si(at, at_unit, travel_unit, TRAVEL_UNITS, "travel")
     values, si = _in_si(values, value_unit, unit, FORCE_UNITS, "force")
     if at.shape != values.shape or at.ndim != 1:
-        raise InputError(f"travel and force have shapes {at.shape} and {values.shape}")
+        raise InputError(
+            "travel and force must be 1-d arrays of equal length, got shapes"
+            f" {at.shape} and {values.shape}"
+        )
     if at_si == "s" and speed is not None:
         at, at_si = at * speed, "m"
     return Columns(at, values, si, at_si, np.asarray(lines))
@@ -342,7 +345,7 @@ def _in_si(
     si = next((si for si in units if is_in(name, si)), None)
     if si is None:
         raise InputError(
-            f"the {quantity} is in {name}. It must be in {', '.join(units)} or a multiple"
+            f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
         )
     try:
         return real_array(values) * factor_to(si, name), si

@@ -237,8 +237,8 @@ class FieldFit(Result):
         """Return likely fields from all families in proportion to their weights (step 6)."""
         if self.quantity not in ("strength", "friction_coefficient"):
             raise InputError(
-                f"interfaces: need a strength, but the fit is of {self.quantity}. Put the"
-                " `repetitions` into random interfaces"
+                f"interfaces: need a strength, but this fit describes {self.quantity}. Pass fields"
+                f" of `fit.repetitions` to st.RandomInterface(strength=..., {self.quantity}=...)"
             )
         rng = np.random.default_rng([seed, 5])
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])

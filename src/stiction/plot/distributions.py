@@ -86,8 +86,8 @@ def monte_carlo(
         along = _swept(dataset[quantity])
         if len(along) > 1:
             raise InputError(
-                f"result: is swept over {', '.join(along)}. Choose a step of each but the last with"
-                f" result.isel({along[0]}=0)"
+                f"result: is swept over {', '.join(along)}, but a plot shows one axis. Choose a"
+                f" step of every axis but the last, for example with result.isel({along[0]}=0)"
             )
         curves += _steps(dataset[quantity], along[0]) if along else [(name, dataset[quantity])]
     single = isinstance(result, xr.Dataset) and not along

@@ -32,7 +32,9 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
     if not isinstance(value, list | tuple):
         return read(value)
     if len(value) != 2:
-        raise ValueError("must be a number for a line, or two, (along x, along y), for a plane")
+        raise ValueError(
+            "must be a number for a line, or two numbers (along x, along y) for a plane"
+        )
     return tuple(read(in_si(item, "length")) for item in value)
 
 

@@ -376,7 +376,7 @@ class Problem:
         """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
         if self.specimen is not None:
             raise InputError(
-                f"problem.specimen: {what} holds for half-spaces, not for finite blocks: {instead}"
+                f"problem.specimen: {what} applies to half-spaces, not to finite blocks. {instead}"
             )
 
     @property

@@ -179,7 +179,7 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
         means = np.atleast_1d(interface.mean(array) if array.ndim else array)
         if means.min() <= 0.0:
             worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
-            raise InputError(f"must be positive on average, {worst}")
+            raise InputError(f"must be positive on average, but {worst}")
 
 
 def no_coefficients(values: Array, pressure: Array) -> list[str]:

@@ -76,8 +76,8 @@ def _known(given: Any) -> Any:
         if not isinstance(entry, RandomInterface | RandomField):
             raise InputError(
                 f"{f'[{number}] ' * several}must be a RandomInterface or a RandomField, got"
-                f" {describe(entry)}. A profile goes into st.onset, or st.fit_field fits a field"
-                " to it"
+                f" {describe(entry)}. Pass a profile to st.onset, or fit a field to it with"
+                " st.fit_field"
             )
     return given
 

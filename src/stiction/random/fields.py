@@ -133,7 +133,7 @@ class RandomField:
         """Return the modes of the field on an interface, or raise an `InputError` without modes."""
         if self.anisotropy is not None and not interface.is_plane:
             raise InputError(
-                f"anisotropy: leave it out on a line, which has no y, got {self.anisotropy:g}"
+                f"anisotropy: got {self.anisotropy:g}, but it applies to planes only. Leave it out"
             )
         return make_modes(self.spectrum, self.mean_mode, self.anisotropy or 1.0, interface)
 
@@ -677,7 +677,7 @@ def as_random_interface(given: Any) -> RandomInterface:
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):
         raise InputError(
-            f"random: must be a RandomInterface or a RandomField, got {describe(given)}. A"
-            " profile goes into st.onset, or st.fit_field fits a field to it"
+            f"random: must be a RandomInterface or a RandomField, got {describe(given)}."
+            " Pass a profile to st.onset, or fit a field to it with st.fit_field"
         )
     return given

@@ -104,7 +104,10 @@ def _integrate(
     pieces = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
     integrals, errors = np.array(pieces).T
     if not errors.sum() <= MAX_INTEGRAL_ERROR * (power or np.abs(integrals).sum()):
-        raise InputError("function: its integral over wavenumbers does not converge")
+        raise InputError(
+            "function: its integral over wavenumbers does not converge. Use a density that falls"
+            " faster at large wavenumbers"
+        )
     return float(integrals.sum())
 
 

@@ -694,7 +694,7 @@ def open_run(path: Any) -> StoredRun:
         study = Study.from_dict(plain)
     except InputError as error:
         raise StoreError(
-            f"{place}: its study cannot be read by this installation: {'; '.join(error.problems)}."
-            " Install the version, or the package with the class, that wrote it"
+            f"{place}: this installation cannot read its study: {'; '.join(error.problems)}. "
+            " Install the version that wrote it, or the package that defines the missing class"
         ) from None
     return StoredRun(store, study, settings)

@@ -68,7 +68,9 @@ def at_first_slip(run: Run) -> RuptureState | None:
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
-        raise InputError("initial_stress: too far from the strength. Check the units of both")
+        raise InputError(
+            "initial_stress: is too far below the strength. Check the units of both"
+        )
     rise = run.slope(time) * step / scale
     if rise > _COARSE_RISE:
         courant = step / run.medium.largest_step * _COARSE_RISE / rise

@@ -55,7 +55,9 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
         raise InputError("must be two arrays of numbers, (times, values)") from None
     if times.ndim != 1 or times.shape != values.shape or times.size < 2:
         shapes = f"{times.shape} and {values.shape}"
-        raise InputError(f"needs two 1-d arrays of equal length, two or more, got {shapes}")
+        raise InputError(
+            f"needs two 1-d arrays of equal length, 2 or more, got shapes {shapes}"
+        )
     if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
         raise InputError("times and values must be finite")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
@@ -352,8 +354,8 @@ def make_run(
         critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
     if not np.all(np.isfinite(critical[finite])):
         raise InputError(
-            f"friction: a weakening rate of {weakening.min():.3g} Pa/m needs infinite slip."
-            " Check its unit"
+            f"friction: a weakening rate of {weakening.min():.3g} Pa/m gives an infinite critical"
+            " slip. Check the unit of the rate"
         )
     profiles = (strength, residual, weakening, critical, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))

@@ -71,7 +71,7 @@ def write_scec(
     ]
     if lacking:
         raise InputError(
-            f"run: lacks {', '.join(lacking)}. Give simulate_rupture save=st.Save("
+            f"run: lacks {', '.join(lacking)}. Call st.simulate_rupture with save=st.Save("
             f"{list(STATION_UNITS)}, stations=...)"
         )
     dims = run.arrival_time.dims

@@ -292,7 +292,9 @@ class PiecewiseWeakening(FrictionLaw):
             given = f"{slip.size - 1} and {strength.size - 1}"
             raise InputError(f"slip and strength: give a number for each corner, got {given}")
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
-            raise InputError(f"slip: must rise from above 0 to exactly 1, got {self.slip}")
+            raise InputError(
+                f"slip: must increase, begin above 0 and end at exactly 1, got {self.slip}"
+            )
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
             raise InputError(
                 "strength: must fall at every corner, from below 1 to exactly 0, got"

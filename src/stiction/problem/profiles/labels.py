@@ -209,7 +209,8 @@ def labelled(
     name = getattr(data, "name", None)
     if name in (HEIGHT, GREY_VALUE) and quantity != "height":
         raise InputError(
-            f"holds {name}s. Pass strength= with a map to strengths (Pa), or read quantity='height'"
+            f"holds {name}s. Pass strength=, a function that maps them to strengths (Pa), or keep"
+            " them with quantity='height'"
         )
     if name == GREY_VALUE:
         unit = unit or "m"  # a map to strengths takes grey values as they are

@@ -91,9 +91,9 @@ def place(
         flat, at = steps[0], places["x"]
         if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
             raise InputError(
-                f"x reaches from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
-                f" of {interface.measure:g} m. Crop the record, place it with offset= or 'centre',"
-                " or pass interpolate=True"
+                f"x extends from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
+                f" of {interface.measure:g} m. Crop the record, shift it (offset=-0.01 or"
+                " offset='centre'), or pass interpolate=True"
             )
     else:
         flat = np.ravel_multi_index(steps, shape, mode="wrap")
@@ -140,8 +140,8 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
         period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
-            f"{dim} reaches from {x.min():g} to {x.max():g} m, the interface is {length:g} m long:"
-            f" check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
+            f"{dim} extends from {x.min():g} to {x.max():g} m, the interface is {length:g} m long."
+            f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
     if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
@@ -151,11 +151,11 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     if coarse or np.abs(deviation).max() > TOLERANCE:
         if interpolate:
             return None
-        advice = "" if interface.is_plane else ", or interpolate linearly with interpolate=True"
+        advice = "" if interface.is_plane else ", or pass interpolate=True"
         raise InputError(
-            f"{dim} does not coincide with the {interface.shape[axis]} nodes {formula}, which"
-            f" are {spacing:.6g} m apart: {at.size} points from {x.min():.6g} to {x.max():.6g} m."
-            f" Check the unit of {dim}, give values at the nodes, interface.{dim}{advice}"
+            f"the {at.size} points of {dim}, from {x.min():.6g} to {x.max():.6g} m, do not coincide"
+            f" with the {interface.shape[axis]} nodes {formula}, which are {spacing:.6g} m apart."
+            f" Check the unit of {dim}, give values at the nodes (interface.{dim}){advice}"
         )
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
