@@ -109,7 +109,7 @@ def solve_increment(
     straight line that replaces it.
     """
     law, nodes = setting.law, setting.nodes
-    peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
     driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size

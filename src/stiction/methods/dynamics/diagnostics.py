@@ -83,11 +83,11 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     mean of tau_p - tau_r. Nodes far stronger than the load, or unbreakable, do not raise it. It
     grows with the load as the load comes to break them.
     """
-    strength, residual = nodes.strength, nodes.residual
+    peak, residual = nodes.peak, nodes.residual
     profile, initial = nodes.profile, nodes.initial
     # Loads between which the term of a node rises, with this slope.
     first = (residual - initial) / profile
-    last = first + (strength - residual) / (MAX_DROP_RATIO * profile)
+    last = first + (peak - residual) / (MAX_DROP_RATIO * profile)
     slope = MAX_DROP_RATIO * profile / profile.size
     ends = np.isfinite(last)
     loads, kink = np.unique(np.concatenate([first, last[ends]]), return_inverse=True)
@@ -159,11 +159,11 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
 
 @jit_inside
-def _mean_where_breakable(strength: Array, stress: Array, breakable: int) -> float:
-    """Return the mean stress of the `breakable` nodes of finite strength, Pa."""
+def _mean_where_breakable(peak: Array, stress: Array, breakable: int) -> float:
+    """Return the mean stress of the `breakable` nodes of finite peak strength, Pa."""
     total = 0.0
     for i in range(stress.size):
-        if strength[i] < np.inf:
+        if peak[i] < np.inf:
             total += stress[i]
     return total / breakable
 
@@ -185,7 +185,8 @@ def finish_step(
     Without rows the record stays empty.
     """
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
-    critical, arrival, share = setting.nodes.critical, state.arrival, setting.thresholds.arrival
+    residual_slip, arrival = setting.nodes.residual_slip, state.arrival
+    front_share = setting.thresholds.front_share
     top_rate, top_node, weakened, slip_sum = -1.0, 0, 0, 0.0
     margin, margin_node = now.reverse_margin, now.reverse_node
     for i in range(slip.size):
@@ -193,12 +194,12 @@ def finish_step(
             top_rate, top_node = rate[i], i
         if stress[i] + strength[i] < margin:
             margin, margin_node = stress[i] + strength[i], i
-        if slip[i] >= critical[i]:
+        if slip[i] >= residual_slip[i]:
             weakened += 1
         # A node that does not weaken has d_c = 0: there the first slip counts.
-        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= share * critical[i]:
+        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= front_share * residual_slip[i]:
             # Assume that slip grew at a constant rate in the step, and interpolate.
-            passed = (slip[i] - share * critical[i]) / max(increments[i], 1e-300)
+            passed = (slip[i] - front_share * residual_slip[i]) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]
     whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
@@ -207,7 +208,7 @@ def finish_step(
     now.mean_stress = whole_stress
     if setting.thresholds.held:
         now.mean_stress = _mean_where_breakable(
-            setting.nodes.strength, stress, setting.thresholds.breakable
+            setting.nodes.peak, stress, setting.thresholds.breakable
         )
     now.top_slip_rate, now.top_node = top_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node

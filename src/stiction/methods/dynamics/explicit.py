@@ -81,11 +81,11 @@ def _predict(
     """Step 1: write the rate at the end, if the present rate acts all along, to `predicted`."""
     nodes, law = setting.nodes, setting.law
     slip, rate, transfer, predicted = state.slip, state.rate, tables.transfer, tables.predicted
-    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial, step = nodes.profile, nodes.initial, tables.step
     for i in range(slip.size):
         next_slip = slip[i] + step * rate[i]
-        limit = strength_at(law, strength[i], residual[i], weakening[i], next_slip)
+        limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
         predicted[i] = max(at_rest - limit, 0.0) / impedance
 
@@ -102,14 +102,14 @@ def _correct(
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
     transfer, predicted = tables.transfer, tables.predicted
-    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial = nodes.profile, nodes.initial
     work, total = 0.0, 0.0
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     for i in range(slip.size):
         increment = 0.5 * step * (rate[i] + predicted[i])
         next_slip = slip[i] + increment
-        limit = strength_at(law, strength[i], residual[i], weakening[i], next_slip)
+        limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
         v = max(at_rest - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])

@@ -62,9 +62,7 @@ from stiction.methods.dynamics.state import (
 from stiction.problem.friction.kernels import strength_at
 
 LARGEST_STEP = 1e20  # s
-_ROUND_OFF_SHARE = (
-    1e-14  # accuracy as a share of the largest stress: ten times the transforms' error
-)
+_ROUND_OFF_SHARE = 1e-14  # of the largest stress: ten times the error of the transforms
 # Shares of the stress scale:
 _SOLVED_STRESS = 1e-9  # stress at which a step counts as solved
 _SMALL_DROP = 0.1  # a node with a smaller tau_p - tau_r is not resolved to `slip_step`
@@ -164,18 +162,18 @@ def _effect(
     Weakening is a share of tau_p - tau_r. Creep at the residual strength counts if it is fast.
     """
     nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
-    peak, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
-    critical, size, ratio = nodes.critical, attempt.size, attempt.ratio
+    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
+    residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
     scale = state.diagnostics[0].scale
     largest, total, radiated = 0.0, 0.0, 0.0
     smallest_drop, fast_slip = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
-        if slip[i] < critical[i] and u[i] > 0.0:
+        if slip[i] < residual_slip[i] and u[i] > 0.0:
             lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
             lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
             largest = max(largest, lost / max(peak[i] - residual[i], smallest_drop))
-        elif u[i] > fast_slip and critical[i] > 0.0:
-            largest = max(largest, u[i] / critical[i])
+        elif u[i] > fast_slip and residual_slip[i] > 0.0:
+            largest = max(largest, u[i] / residual_slip[i])
         total += u[i]
         radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
     return largest, total, radiated * (impedance / u.size)
@@ -229,7 +227,7 @@ def _accept(
         transfer_hat[q] = complex(real, imaginary)
     backward(grid.transform, transfer_hat, transfer)
     slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
-    strength, residual, weakening = nodes.strength, nodes.residual, nodes.weakening
+    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial, limit = nodes.profile, nodes.initial, tables.driving
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     work = 0.0
@@ -239,7 +237,7 @@ def _accept(
         rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
-        limit[i] = strength_at(law, strength[i], residual[i], weakening[i], slip[i])
+        limit[i] = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
     return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
 
 

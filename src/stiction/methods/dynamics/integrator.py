@@ -92,7 +92,7 @@ class Run:
     def strength_after(self, slip: Floats) -> Floats:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
-        strength: Floats = strengths(law, nodes.strength, nodes.residual, nodes.weakening, slip)
+        strength: Floats = strengths(law, nodes.peak, nodes.residual, nodes.weakening, slip)
         return strength
 
     def scale_at(self, load: float) -> float:
@@ -103,7 +103,7 @@ class Run:
     def first_load(self) -> float:
         """Load at which the first node reaches its strength, before any slip, Pa."""
         nodes = self.setting.nodes
-        return float(np.min((nodes.strength - nodes.initial) / nodes.profile))
+        return float(np.min((nodes.peak - nodes.initial) / nodes.profile))
 
     def first_slip(self) -> float:
         """Return when the first node reaches its strength, s, or infinity."""
@@ -139,7 +139,7 @@ class Run:
         rate = np.maximum(excess, 0.0) / impedance
         # A node that has just reached its strength has not begun to slip: drop
         # round-off.
-        rate[rate * impedance < _REACHED_SHARE * nodes.strength] = 0.0
+        rate[rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
         stress = stress - impedance * rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
         now = diagnostics[0]
@@ -162,10 +162,10 @@ class Run:
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
         now["reverse_margin"], now["reverse_node"] = margin.min(), int(np.argmin(margin))
         now["top_slip_rate"], now["mean_slip"] = rate.max(), self.mean(delta)
-        now["weakened_nodes"] = np.count_nonzero(delta >= nodes.critical)
+        now["weakened_nodes"] = np.count_nonzero(delta >= nodes.residual_slip)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale
-        front = thresholds.arrival * nodes.critical
+        front = thresholds.front_share * nodes.residual_slip
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size

@@ -351,13 +351,15 @@ def make_run(
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     friction, finite = medium.problem.friction, np.isfinite(strength)
     with np.errstate(over="ignore"):
-        critical = friction.reach * friction.critical_slip_of(strength - residual, weakening)
-    if not np.all(np.isfinite(critical[finite])):
+        residual_slip = friction.reach * friction.critical_slip_of(
+            strength - residual, weakening
+        )
+    if not np.all(np.isfinite(residual_slip[finite])):
         raise InputError(
             f"friction: a weakening rate of {weakening.min():.3g} Pa/m gives an infinite critical"
             " slip. Check the unit of the rate"
         )
-    profiles = (strength, residual, weakening, critical, rows.load_profile, initial)
+    profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
     steepest = steepest_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
@@ -386,9 +388,9 @@ def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     # Half the nucleation length of a line. On a plane, half the lengths along x
     # and y multiplied.
     half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
-    weakens = np.isfinite(nodes.strength) & (nodes.critical > 0.0)
+    weakens = np.isfinite(nodes.peak) & (nodes.residual_slip > 0.0)
     # Nodes that never weaken cannot start a rupture.
-    loads = ((nodes.strength - nodes.initial) / nodes.profile)[weakens]
+    loads = ((nodes.peak - nodes.initial) / nodes.profile)[weakens]
     weakest = round(min(max(half / interface.cell, 1.0), loads.size))
     return float(np.partition(loads, weakest - 1)[:weakest].mean())
 
@@ -401,15 +403,15 @@ def _thresholds(
     A run is calm if, while shear waves cross the interface, no node slips faster than a crack of
     half the length of the interface driven by the load alone, or no node faster than before.
     """
-    friction, finite = medium.problem.friction, np.isfinite(nodes.strength)
+    friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()
     stress = load.values[-1] * nodes.profile + nodes.initial  # at the end of the samples
     unloaded = load.values[-1] < load.values[-2] or stress.mean() < nodes.residual.mean()
     rests_later = method.stop == "rest" and unloaded and not held
     frequency = medium.grid.frequency
     crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
-    typical = float(np.median((nodes.strength - nodes.residual)[finite]))
-    arrival = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
+    typical = float(np.median((nodes.peak - nodes.residual)[finite]))
+    front_share = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
     breakable = int(np.count_nonzero(finite))
     return Thresholds(
         slid_stop=np.inf if method.stop == "time" or rests_later else float(breakable),
@@ -424,7 +426,7 @@ def _thresholds(
         load_step=method.load_step,
         smallest_step=_EXPLICIT_STEPS_IN_IMPLICIT * medium.step,
         unstable_rate=UNSTABLE_STRESS * typical / medium.impedance,
-        arrival=float(arrival),
+        front_share=float(front_share),
         curved=not friction.linear,
         explicit_only=not method.implicit,
     )

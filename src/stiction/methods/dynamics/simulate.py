@@ -206,7 +206,7 @@ def _complete(
     for name, variable in replace(method, events=0).variables(problem).items():
         variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     values: dict[str, Any] = {
-        "peak_strength": run.setting.nodes.strength.reshape(interface.shape),
+        "peak_strength": run.setting.nodes.peak.reshape(interface.shape),
         "arrival_time": state.arrival.reshape(interface.shape),
     }
     frequency, spectrum = _spectrum(dataset, run, state)

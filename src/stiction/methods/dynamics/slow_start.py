@@ -59,7 +59,7 @@ def slow_start(
     `number` is the row of the sample, `rate` the loading rate (Pa/s).
     """
     nodes = run.setting.nodes
-    if not np.all(np.isfinite(nodes.strength)) or np.any(nodes.strength <= nodes.initial):
+    if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):
         return None
     static = sample_of(rows, program.pieces, number)
     onset = program.solve(static)
@@ -104,8 +104,8 @@ def _state_at(
     present, before = (program.solve(static, cap) for cap in (load, load - load_rise))
     if present is None or before is None or exceeds(static, present.slip):
         return None
-    weakens = nodes.critical > 0.0
-    front = run.setting.thresholds.arrival * nodes.critical
+    weakens = nodes.residual_slip > 0.0
+    front = run.setting.thresholds.front_share * nodes.residual_slip
     arrived = present.slip[weakens] >= front[weakens]
     if np.any(arrived) or np.any(present.slip[~weakens] > 0.0):
         return None

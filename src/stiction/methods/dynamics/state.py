@@ -116,10 +116,7 @@ DIAGNOSTICS = np.dtype(
         ("onset_time", "f8"),
         ("onset_load", "f8"),
         ("onset_node", "i8"),
-        (
-            "all_broken",
-            "i8",
-        ),  # whether all breakable nodes have been at their residual strength
+        ("all_broken", "i8"),  # whether all breakable nodes have reached residual strength
         ("kinetic_stress", "f8"),  # mean stress when that happened
         # Choice of steps.
         ("phase", "i8"),  # a `Phase`
@@ -178,12 +175,10 @@ class Thresholds(NamedTuple):
     calm_slip: float  # slip of a calm step per rise of the load, m/Pa; see `explicit._calm`
     calm_count: int  # calm steps in a row after which implicit steps take over
     slip_step: float  # weakening of a node in an implicit step, in units of tau_p - tau_r
-    load_step: (
-        float  # largest rise of the load in an implicit step, in units of the stress scale
-    )
+    load_step: float  # largest rise of the load in a step, in units of the stress scale
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
     unstable_rate: float  # slip rate, m/s, that only an instability reaches
-    arrival: float  # slip at which a front has arrived, in units of `Nodes.critical`
+    front_share: float  # slip at which a front arrives, as a share of `Nodes.residual_slip`
     curved: bool  # whether the law is not linear; a linear law's pieces are met to the bit
     explicit_only: bool
 
@@ -208,10 +203,10 @@ class Grid(NamedTuple):
 class Nodes(NamedTuple):
     """Properties of the nodes that do not change in a run, each (nodes,)."""
 
-    strength: Array  # tau_p, Pa; infinite beyond the extent of the interface
+    peak: Array  # tau_p, Pa; infinite beyond the extent of the interface
     residual: Array  # tau_r, Pa
     weakening: Array  # W at zero slip, Pa/m
-    critical: Array  # slip from which a node counts as being at its residual strength, m
+    residual_slip: Array  # slip from which a node counts as being at its residual strength, m
     profile: Array  # p
     initial: Array  # tau_i, Pa
 

@@ -98,7 +98,7 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     of friction follows from the slip alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
-    drop = np.where(np.isfinite(nodes.strength), nodes.strength - nodes.residual, 0.0)
+    drop = np.where(np.isfinite(nodes.peak), nodes.peak - nodes.residual, 0.0)
     fracture = friction.dissipated(slip, drop, nodes.weakening)
     share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
@@ -150,7 +150,7 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     began = now["start_load"] * nodes.profile + nodes.initial
-    overstressed = bool(np.any(began - nodes.strength > margin))
+    overstressed = bool(np.any(began - nodes.peak > margin))
     return load if not overstressed or load > now["start_load"] + margin else np.nan
 
 
