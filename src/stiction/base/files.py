@@ -59,7 +59,7 @@ def read_regular(
     if not follow_links:
         extra |= getattr(os, "O_NOFOLLOW", 0)
         if stat.S_ISLNK(os.lstat(path).st_mode):
-            raise InputError("is a link where the file itself is expected")
+            raise InputError("is a symbolic link. Give the path of the file itself")
     _check_regular(os.stat(path), max_bytes)
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | extra)) as file:
         state = os.fstat(file.fileno())

@@ -77,10 +77,10 @@ class Kinds(Mapping[str, Any]):
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:
             if len(points) > 1:
-                raise ImportError("two packages offer it, uninstall either")
+                raise ImportError("two packages offer it. Uninstall either")
             kind = register(points[0].load())
             if self._registered.get(name) is not kind:
-                raise ImportError(f"{kind} is no such class of this type")
+                raise ImportError(f"{kind} is not such a class, or has another type")
         except Exception as error:  # of any kind: the code is another's
             packages = ", ".join(str(point.dist and point.dist.name) for point in points)
             text = f"{type(error).__name__}: {' '.join(str(error).split())}"

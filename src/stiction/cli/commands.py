@@ -654,7 +654,9 @@ def reliability(
     if out is None:
         given = [name for name, value in of_curve.items() if value is not None]
         if given:
-            raise InputError(f"{_options_of(given)}: belongs to a whole curve. Give --out too")
+            raise InputError(
+                f"{_options_of(given)}: applies to a whole curve, which needs --out FOLDER"
+            )
         _answer(loaded, asked, workers, page)
         return
     if page is not None:

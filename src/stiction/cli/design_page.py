@@ -178,5 +178,8 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
     add(plain, "")
     keys = {row[0] for row in rows}
     if unknown := [key for key in sources if key not in keys]:
-        raise InputError(f"sources: {unknown[0]!r} is no input. Inputs are {', '.join(keys)}")
+        raise InputError(
+            f"sources: {unknown[0]!r} is not an input of this problem. The inputs are"
+            f" {', '.join(keys)}"
+        )
     return rows

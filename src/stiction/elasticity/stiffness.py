@@ -186,7 +186,7 @@ def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., An
     if kind is DenseEntries:
         return dense
     raise TypingError(
-        f"entries: kernels do not know the stiffness of {entries}; give CircularEntries or"
+        f"entries: kernels do not know the stiffness of {entries}. Give CircularEntries or"
         " DenseEntries, or add a case to each overload of stiction.elasticity.stiffness"
     )
 

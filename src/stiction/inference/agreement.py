@@ -203,7 +203,7 @@ def agreement(
     measured = make_peaks(peaks, unit)
     if isinstance(prediction, Posterior):
         if load_cell_error:
-            raise InputError("load_cell_error: leave it out. The posterior has its own")
+            raise InputError("load_cell_error: the posterior has its own. Leave it out")
         return _with_posterior(prediction, measured, replicates, rng)
     values = _values(prediction, measured)
     factor = 1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit)
@@ -271,7 +271,9 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
         )
     values = np.asarray(prediction[name].values, dtype=np.float64)
     if missing := int(np.isnan(values).sum()):
-        warn_accuracy(f"{missing} of {values.size} predicted samples have no peak: left out")
+        warn_accuracy(
+            f"{missing} of {values.size} predicted samples have no peak and are left out"
+        )
     if missing == values.size:
         raise InputError("prediction: no sample has a peak")
     return values[np.isfinite(values)]

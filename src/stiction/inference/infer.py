@@ -265,7 +265,8 @@ def infer(
         raise InputError(refused)
     if grid is None or u is None:
         raise InputError(
-            "peaks: no point of the prior can produce all. Widen it, or give load_cell_error="
+            "peaks: no point of the prior can produce all of them. Widen it, or give"
+            " load_cell_error="
         )
     error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(

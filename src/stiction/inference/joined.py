@@ -252,8 +252,9 @@ def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list
     notes = []
     if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
         notes.append(
-            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. A force by both is"
-            " then wrong. Check units, method and surfaces, and design by the lower of both alone"
+            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. A force from"
+            " both is then wrong. Check units, method and surfaces. Until they agree, use the lower"
+            " of the two forces from peaks alone and from profiles alone"
         )
     if profiles.levels.size + tests < 2:
         notes.append("one specimen has no scatter between specimens: its prior decides")

@@ -114,7 +114,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     if different < MIN_PEAKS:
         raise InputError(
             f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Fewer than"
-            " about ten constrain little. See st.design_of_tests"
+            " about ten say little (st.design_of_tests)"
         )
     return Peaks(lengths, values, si_of(unit))
 

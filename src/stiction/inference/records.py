@@ -85,7 +85,9 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         spacings.append(spacing)
     shape = [number.max() + 1 for number in index]
     if np.unique(np.ravel_multi_index(index, shape)).size < index[0].size:
-        raise InputError("x or y repeats: there are two values at one place of the map")
+        raise InputError(
+            "x or y repeats, so that one place of the map has two values. Keep one of them"
+        )
     rows = values.reshape(-1, values.shape[-1])
     full = np.full((rows.shape[0], *shape), np.nan)
     full[(slice(None), *index)] = rows

@@ -289,7 +289,8 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         evidence = float(logsumexp(after))
         if not math.isfinite(evidence):
             raise InputError(
-                "peaks: no mean and scatter give the peaks and the profiles or prior"
+                "peaks: no mean and scatter can produce both the peaks and the profiles or prior."
+                " Check their units, and leave out tests of another kind of specimen"
             )
         mass = np.exp(after - evidence)
         along = [mass.sum(axis=(0, 1, 2))]

@@ -73,7 +73,7 @@ def expected_widths(
         tables, mass = Tables(profiles, method, (onsets,), error, (np.zeros(0),)), np.ones(1)
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
         raise InputError(
-            "designs: profiles: need a fit, whose profiles tell how long further ones are"
+            "designs: profiles: need a fit. Further profiles are as long as its profiles"
         )
     tables = _fewer(tables, mass)
     _, now = grid_of_profiles(tables.profiles, tables)

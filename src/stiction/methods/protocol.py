@@ -124,7 +124,7 @@ MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
 def as_method(value: Any) -> Any:
     """Return a method, or raise a ValueError that names the members it lacks."""
     if isinstance(value, type):
-        raise ValueError(f"must be an object; write st.{value.__name__}(...)")
+        raise ValueError(f"must be an object. Write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
     if missing:
         raise ValueError(

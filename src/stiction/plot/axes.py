@@ -103,7 +103,7 @@ def named(results: Any) -> dict[str, xr.Dataset]:
             by_name[f"{name}, result {number}" if name in by_name else name] = result
         results = by_name
     if not results:
-        raise InputError("result: is empty. Give a result or several")
+        raise InputError("result: is empty. Give one or more results")
     return dict(results)
 
 

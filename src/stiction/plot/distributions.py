@@ -378,7 +378,7 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     table = design.sensitivities
     if not table.sizes.get("source"):
         raise InputError(
-            "design: has no sensitivities, pass sensitivities=True to st.design_stress"
+            "design: has no sensitivities. Pass sensitivities=True to st.design_stress"
         )
     quantity = "force" if np.isfinite(design.area) else "stress"
     area = design.area if quantity == "force" else 1.0

@@ -149,11 +149,13 @@ def force_travel(
     """
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     if not results:
-        raise InputError("result: is empty. Give a path or several")
+        raise InputError("result: is empty. Give one or more paths")
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
-        raise InputError("result: some paths are forces, others stresses. Draw them apart")
+        raise InputError(
+            "result: some paths are forces, others stresses. Draw them in separate figures"
+        )
     units = str(results[0][name].attrs["units"])
     if measured is not None and (measured.unit, measured[0].travel_unit) != (units, "m"):
         raise InputError(

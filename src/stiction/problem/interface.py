@@ -194,7 +194,8 @@ class Interface:
     def _one_geometry(self) -> Interface:
         if isinstance(self.length, tuple) != isinstance(self.nodes, tuple):
             raise InputError(
-                "length and nodes: give a number each for a line or two each for a plane, got"
+                "length and nodes: give one number of each for a line, or two of each for a"
+                " plane, got"
                 f" length = {self.length}, nodes = {self.nodes}"
             )
         if self.width is not None and self.is_plane:

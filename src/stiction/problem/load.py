@@ -55,8 +55,8 @@ class LoadShape(ABC):
         values = values / values.mean()
         if not np.all(values > 0.0):
             raise InputError(
-                f"load.profile: {name} must be positive everywhere, smallest over"
-                f" its mean is {values.min():g}"
+                f"load.profile: {name} must be positive everywhere. Its smallest"
+                f" value over its mean is {values.min():g}"
             )
         return np.ascontiguousarray(np.broadcast_to(values, interface.shape))
 
@@ -166,7 +166,7 @@ class Load:
         if isinstance(pressure, float | np.ndarray) and np.mean(pressure) <= 0.0:
             mean = np.mean(pressure)
             problems.append(
-                f"normal_pressure must be positive on average, its mean is {mean:g}"
+                f"normal_pressure must be positive on average. Its mean is {mean:g}"
             )
         if pressure is not None and self.pressing_force is not None:
             problems.append(

@@ -313,7 +313,7 @@ class Problem:
     def blocks(self) -> Driven:
         """Stiffness and profiles of the specimen, which must be given."""
         if self.specimen is None:
-            raise InputError("problem.specimen: is not given. The solids are half-spaces")
+            raise InputError("problem.specimen: is not given, so the solids are half-spaces")
         interface = self.interface
         return self.specimen.driven(interface.measure, interface.size, self.solid, self.mode)
 
@@ -731,7 +731,8 @@ class Problem:
                     f"strength: {strength[number].flat[node]:g} Pa at"
                     f" {self.interface.describe_node(node)} of sample {number} is more than"
                     f" {MAX_STRENGTH_RATIO:g} times the median, {middle[number].item():g} Pa,"
-                    " which is lost beside it in round-off. Less is as good where nothing breaks"
+                    " which is lost beside it in round-off. Where nothing breaks, a smaller"
+                    " strength does as well"
                 )
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():

@@ -131,7 +131,10 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
         rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
-        raise ValueError("places must be known, and values finite, or NaN where not measured")
+        raise ValueError(
+            "every place must be known, and every value must be finite, or NaN where it was not"
+            " measured"
+        )
     points = points[:, ~np.isnan(points[-1])]
     if points.shape[1] == 0:
         raise ValueError("must hold at least one value")

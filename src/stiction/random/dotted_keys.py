@@ -39,7 +39,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
         owner = {"type": owner.type, **dict(owner.parameters)}
     table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
     if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
-        raise InputError(f"{path}: has no keys of its own, as it is {describe(owner)}")
+        raise InputError(f"{path}: has no keys, because it is {describe(owner)}")
     names = {} if table else keys_of(type(owner))
     unknown = [name for name in {**changes, **inside} if not table and name not in names]
     if unknown:

@@ -373,7 +373,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
         if not laws:
             raise InputError("must map keys to distributions, got an empty mapping")
         if wrong := [k for k in laws if k.startswith("problem.interface.")]:
-            raise InputError(f"{wrong[0]}: must be fixed, sweep over it instead")
+            raise InputError(f"{wrong[0]}: cannot be uncertain. Sweep over it instead")
     with prefixed("random"):
         _known(random)
     return Uncertain(random, laws)
@@ -388,7 +388,7 @@ def as_random(
     """
     if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
         raise InputError(
-            "mixture: give a list of two or more interfaces that are all there are, or leave it out"
+            "mixture: needs a complete list of two or more interfaces. Give one, or leave it out"
         )
     if isinstance(given, EquallyLikely):
         return given

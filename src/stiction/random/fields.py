@@ -165,7 +165,7 @@ class RandomField:
         True
         """
         if self.conditions is not None:
-            raise InputError("profile: the field already has a profile, join both into one")
+            raise InputError("profile: the field already has a profile. Join both into one")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.of is not None):
             raise InputError(

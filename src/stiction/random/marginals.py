@@ -280,7 +280,8 @@ class ScipyMarginal(Marginal):
         """Return the table of this marginal in a study file."""
         if self.frozen is not None:
             raise ValueError(
-                f"marginal is the Python distribution {self.type!r}, which has no name in scipy"
+                f"marginal is the Python distribution {self.type!r}, which scipy does not know by"
+                " name"
             )
         return {"type": self.type, **dict(self.parameters)}
 

@@ -163,7 +163,7 @@ class ScaledSpectrum(SpectralDensity):
     @model_validator(mode="after")
     def _consistent(self) -> Any:
         if self.truncation is not None and self.power_kept is not None:
-            raise InputError("give truncation or power_kept, not both")
+            raise InputError("give either truncation or power_kept. Got both")
         return self
 
     @abstractmethod

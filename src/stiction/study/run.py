@@ -148,7 +148,7 @@ class StoredRun:
     def _checked(self, rows: Any) -> xr.Dataset:
         for name, text in self._store.damage.items():
             self._store.warn(
-                f"{name}: {text}; its {self.counted} are missing; run the study again"
+                f"{name}: {text}; its {self.counted} are missing. Run the study again"
             )
         attributes = self.study.attributes
         if not self.settings:
@@ -196,7 +196,7 @@ class StoredRun:
         rows, place = self._read(None), check("path", path, FilePath)
         if not (partial or rows.done.all()):
             raise RunError(
-                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} are there."
+                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} exist."
                 " Run the study again to compute the others, or pass partial=True"
             )
         export(self._checked(rows), place, events)

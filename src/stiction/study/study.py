@@ -350,7 +350,7 @@ class Study(_Parts):
             key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
         ]
         if swept:
-            raise InputError(f"uncertain: {swept[0]} is swept too. Take it out of either table")
+            raise InputError(f"uncertain: {swept[0]} is swept too. Remove it from either table")
         if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
             return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
         return random.uncertain(parameters, count, self.ensemble.seed)
@@ -622,7 +622,7 @@ def _read(
     saved = given.get("save")
     if folder is not None and isinstance(saved, dict) and "to" in saved:
         raise InputError(
-            "save.to: is no option of a study file. Give --out to stiction rupture"
+            "save.to: does not belong in a study file. Pass --out to stiction rupture"
         )
     if folder is not None:
         place = check("folder", folder, FilePath)

@@ -81,7 +81,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
         )
         if rise > _MAX_RISE:
             raise InputError(text)
-        warn_accuracy(f"{text} (the onset is sampled coarsely)")
+        warn_accuracy(f"{text} (the onset would be resolved poorly)")
     return run.start(time)
 
 

@@ -224,9 +224,9 @@ class Rupture:
     def _consistent(self) -> Rupture:
         problems = []
         if self.loading_rate is not None and self.load is not None:
-            problems.append("loading_rate: give either loading_rate or load, not both")
+            problems.append("loading_rate: give either loading_rate or load. Got both")
         if self.stop == "time" and self.end_time is None:
-            problems.append("end_time: needed with stop='time', got None")
+            problems.append("end_time: is needed with stop='time', in s. Got None")
         if not self.implicit:
             problems += [
                 f"{name}: has no effect with implicit=False, leave it out"
@@ -256,7 +256,7 @@ class Rupture:
             return specimens.refusals(self, problem)
         reasons = []
         if self.loading_rate is None and self.load is None:
-            reasons.append("loading_rate: give either loading_rate or load")
+            reasons.append("loading_rate: give either loading_rate or load. Got neither")
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:

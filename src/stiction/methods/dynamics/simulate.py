@@ -126,7 +126,7 @@ def simulate_rupture(
         result = simulate_event(problem, rows, method, save, event, progress)
         return with_gaps(problem, result, measured)
     if event is not None:
-        raise InputError("event: leave it out, only specimens have numbered events")
+        raise InputError("event: only specimens have numbered events. Leave it out")
     stations = save.nodes(problem.interface)
     checks.warn_if_coarse(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)

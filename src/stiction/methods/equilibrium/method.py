@@ -141,7 +141,9 @@ class Equilibrium:
         if self.sensitivity and ends and problem.interface.is_plane:
             reasons.append("sensitivity: is not known on planes that end; leave it out")
         if not problem.interface.is_plane and self.gap != type(self)().gap:
-            reasons.append("gap: leave it out on lines, which are solved to round-off")
+            reasons.append(
+                "gap: applies to planes only. Lines are solved to round-off. Leave it out"
+            )
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:

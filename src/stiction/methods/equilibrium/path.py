@@ -141,7 +141,7 @@ def equilibrium_path(
     given = _check_loads(loads)
     check("problem", problem, Problem)
     if method is not None and (problem.specimen is None or not hasattr(method, "program")):
-        raise InputError("method: leave it out, or give st.Rupture() for a specimen")
+        raise InputError("method: only specimens take a method, st.Rupture(). Leave it out")
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be one sample, got {rows.samples}")

@@ -234,8 +234,8 @@ class OnsetSolver:
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
-            " the load in {samples}: they hold, but are up to {worst:.2g} of it apart. Take more"
-            " nodes",
+            " the load in {samples}. They hold, but are up to {worst:.2g} of the load apart. Take"
+            " more nodes",
             ~unproved & ~(share <= self.program.widest_gap),
             share,
         )

@@ -310,7 +310,7 @@ def _spaced(data: Any, spacing: Any) -> Any:
     """Return an array with coordinates at equal distances, m."""
     dims = [dim for dim in ("x", "y") if dim in data.dims]
     if not dims or any(dim in data.coords for dim in dims):
-        raise InputError("spacing: the source has coordinates of its own. Leave it out")
+        raise InputError("spacing: the source has its own coordinates. Leave spacing out")
     steps = zip(dims, np.broadcast_to(spacing, len(dims)), strict=True)
     return data.assign_coords({dim: (dim, h * np.arange(data.sizes[dim])) for dim, h in steps})
 
@@ -497,7 +497,8 @@ def check_positive(values: Array, quantity: str, lines: Any = (), raw: Any = Non
         number = f"{given[entry]:.9g}"
         raise InputError(
             f"{quantity} must be positive, is {number} in {_place(entry, lines, given.size)}"
-            f" ({wrong.size} such values). If it stands for no value, pass missing={number} to"
+            f" ({wrong.size} such values). If it means that a value is missing, pass"
+            f" missing={number} to"
             " st.read_profile, or make it NaN"
         )
 
@@ -523,7 +524,8 @@ def _doubt_metres(heights: Array) -> None:
     """Warn of heights without a unit that are probably in um or nm."""
     if heights.size and np.ptp(heights) > TALL:
         warn_user(
-            f"height: has no unit, is taken in m, and ranges over {np.ptp(heights):.3g} m. Give"
+            f"height: has no unit, so it is taken in m, and ranges over {np.ptp(heights):.3g} m."
+            " Give"
             " unit='um' or another, or unit='m' if that is right",
             UnitWarning,
         )

@@ -305,8 +305,8 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
         )
         warn_accuracy(
             f"the critical patch at {first} reaches into a gap of the profile"
-            f" ({in_gap.sum()} of {in_gap.size} samples): the strength there was filled in, not"
-            " measured"
+            f" ({in_gap.sum()} of {in_gap.size} samples): the strength there was"
+            " interpolated, not measured"
         )
     about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
     dims = position.dims[: len(position.dims) - (len(interface.dims) > 1)]

@@ -177,9 +177,9 @@ def read_profile(
     if interface is None and (interpolate or gaps == "fill"):
         raise InputError("interface: needed to interpolate, or to fill gaps")
     if interpolate and interface is not None and interface.is_plane:
-        raise InputError("interpolate: is an option of profiles of a line")
+        raise InputError("interpolate: applies to profiles of a line only. Leave it out")
     if strength is not None and quantity != "strength":
-        raise InputError("strength: is a map to a strength. Leave quantity='strength'")
+        raise InputError("strength: maps heights to strengths. Leave quantity='strength'")
     if offset == "centre" and interface is None:
         raise InputError("offset: 'centre' needs an interface")
     options = Options(skip, sheet, missing, decimal, record)
@@ -233,7 +233,9 @@ def _moved(array: Any, offset: Any, interface: Interface | None) -> Any:
     """Return a profile whose coordinates are moved by an offset, m, or to the centre (step 3)."""
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if not dims:
-        raise InputError("offset: the source has no coordinates. Its points are the nodes")
+        raise InputError(
+            "offset: the source has no coordinates, so its points are the nodes. Leave offset out"
+        )
     if offset == "centre":
         assert interface is not None
         axes = zip(interface.shape, interface.spacings, strict=True)
