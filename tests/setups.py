@@ -27,13 +27,15 @@ def make_problem(
     friction: Any = None,
     load: st.Load | None = None,
     mode: Any = "II",
+    width: float | None = None,
     **weakening: Any,
 ) -> st.Problem:
     """The paper's system in plane strain but for what is given; pairs make it a plane."""
     if not {"weakening_rate", "critical_slip"} & set(weakening):
         weakening["weakening_rate"] = RATE  # None leaves it to profiles
     law = st.LinearWeakening(**weakening) if friction is None else friction
-    return st.Problem(solid, st.Interface(length, nodes), law, load or st.Load(), mode)
+    interface = st.Interface(length, nodes, width=width)
+    return st.Problem(solid, interface, law, load or st.Load(), mode)
 
 
 def without(problem: st.Problem, *keys: str) -> st.Problem:

@@ -57,19 +57,6 @@ def test_a_clamped_strip_in_mode_three():
     np.testing.assert_allclose(held[500, 500 + steps] / dx, kernel, rtol=1e-3)
 
 
-def test_figures_of_a_platen_and_of_glued_pressing():
-    """Of a block twice as long as high, nu = .35, plane stress; by finite elements, to 1e-3."""
-    length, height, nodes = 0.1, 0.05, 512
-    _, shear, drive, _ = block_response(length, nodes, height, MODULUS, KAPPA, None)
-    eighth = 0.5 * (shear[63] + shear[64])
-    assert eighth == pytest.approx(0.6756, rel=1e-3)
-    assert shear[256] == pytest.approx(1.4655, rel=1e-3)
-    assert drive * height / (MODULUS * length) == pytest.approx(0.6666, rel=1e-3)
-    pressure = glued_pressure(length, nodes, height, KAPPA)
-    assert pressure[0] == pytest.approx(0.88, abs=0.005)
-    assert pressure[256] == pytest.approx(1.05, abs=0.005)
-
-
 def test_a_push_in_mode_three_carries_its_force_and_decays():
     """Laplace's equation in the block by a sum of sines; far away the least one is left."""
     height = 0.04

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
-from checks import standard_error
 from scipy.stats import kstest
-from setups import beta_strength, ensemble, make_problem
+from setups import beta_strength
 
 import stiction as st
 from stiction.random.fields import _conditioned
@@ -17,8 +16,6 @@ from stiction.random.transport import make_transport
 
 LINE = st.Interface(length=0.05, nodes=64)
 PLANE = st.Interface(length=(0.02, 0.01), nodes=(16, 8))
-COARSE = make_problem(64, solid=st.paper.problem().solid, weakening_rate=0.1e12)
-"""64 nodes resolve its h_n of 15 mm of 100 mm."""
 FIELD = beta_strength(6e-3)
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 
@@ -217,22 +214,6 @@ def test_what_remains_of_skewed_likelihoods_is_measured_and_warned_of():
         given.sample(LINE)
 
 
-def test_conditional_probabilities_average_to_the_unconditional_one():
-    """Law of total probability: over scans of simulated specimens."""
-    line, noise, field = COARSE.interface, 30e3, beta_strength(20e-3)
-    onsets = ensemble(COARSE, field, 4000, seed=0).critical_stress
-    stress = float(onsets.quantile(0.2))
-    shares, rng = [], np.random.default_rng(5)
-    for specimen in field.sample(line, samples=40, seed=3):
-        measured = specimen[:24] + noise * rng.standard_normal(24)
-        given = given_on(line.x[:24], measured, noise, field)
-        found = ensemble(COARSE, given, 100, seed=1).critical_stress
-        shares.append(float((found < stress).mean()))
-    error = standard_error(shares) + 0.4 / 4000**0.5
-    assert np.mean(shares) == pytest.approx(0.2, abs=3.5 * error)
-    assert np.std(shares) > 0.1  # a scan does tell something
-
-
 def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
     marginal = st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6)
     residual = st.RandomField(marginal, FIELD.spectrum)
@@ -248,21 +229,6 @@ def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
     expected = residual.marginal.distribution.ppf(rank)
     np.testing.assert_allclose(profiles["residual_strength"], expected, rtol=1e-6)
     assert profiles["residual_strength"][:, 15].std() < 0.02 * 0.2e6
-
-
-@pytest.mark.parametrize(
-    ("cv", "length"), [(1e-4, 0.02), (0.15, 100.0)], ids=["narrow", "wide"]
-)
-def test_variance_of_the_peak_is_that_within_and_between(cv, length):
-    """Without scatter within, the peak is the factor; with one value along it, the product."""
-    spectrum = st.PowerLawSpectrum(length)
-    field = st.RandomField(st.Lognormal(mean=1e6, cv=cv), spectrum, mean_mode=True)
-    random = st.RandomInterface(strength=field, between={"strength": FACTOR})
-    found = ensemble(COARSE, random, 20_000, seed=0).critical_stress
-    within = cv if cv > 0.1 else 0.0
-    expected = ((1.0 + within**2) * 1.01 - 1.0) ** 0.5
-    # 20,000 samples: 0.5 % and the tail's 1 %.
-    assert float(found.std() / found.mean()) == pytest.approx(expected, rel=0.03)
 
 
 def test_a_factor_changes_no_other_draw_and_is_constant_along_each_specimen():

@@ -150,29 +150,12 @@ def test_weakening_rate_of_each_sample(make_strength):
     assert len(np.unique(together.critical_load)) == 5
 
 
-def test_critical_slip_is_a_weakening_rate():
-    """W = (tau_p - tau_r)/d_c, so a uniform strength has a uniform W."""
-    problem = make_problem(critical_slip=2e-6, residual_strength=2e5)
-    for tau_p in (np.full((2, 256), 1e6), 1e6 - 1e5 * np.cos(turns(256))[None]):
-        rates = problem.sample(tau_p).weakening_rate
-        np.testing.assert_allclose(rates, (tau_p - 2e5) / 2e-6, rtol=1e-15)
-
-
 def test_position_lies_on_the_interface(problem):
     """A minimum a hair left of node 0 is at 0, not at L."""
     tau_p = 1e6 - 2e5 * np.cos(np.outer([1, 3, 5], turns(256)))
     for signed in (tau_p, tau_p[:, ::-1].copy(), np.roll(tau_p, 1, axis=1)):
         places = local_onset(problem, signed)["critical_position"].values
         assert 0.0 <= places.min() <= places.max() < 0.1
-
-
-def test_uniform_strength_lets_go_at_its_value_in_units_that_are_named(problem):
-    result = local_onset(problem, np.full(256, 0.9e6))
-    assert result["critical_load"].item() == pytest.approx(0.9e6, rel=1e-14)
-    units = {name: variable.attrs["units"] for name, variable in result.variables.items()}
-    stresses = dict.fromkeys(("critical_load", "critical_stress", "first_instability"), "Pa")
-    assert units == stresses | {"critical_position": "m", "sample": "1"}
-    assert all(variable.attrs["long_name"] for variable in result.variables.values())
 
 
 def test_periodic_variance_is_that_of_the_grid(problem, make_strength):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 from scipy.stats import norm
+from setups import make_problem
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
@@ -70,11 +71,7 @@ def test_posterior_is_that_of_the_closed_form(levels):
     assert drawn[SCATTER_KEY].mean() == pytest.approx(scatter, rel=0.02)  # four errors
 
 
-LINE = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 64),
-    st.LinearWeakening(weakening_rate=0.25e12),
-)
+LINE = make_problem(64, 0.05, weakening_rate=0.25e12)
 LOCAL = {"method": st.LocalCriterion(), "progress": False}
 
 
@@ -129,6 +126,7 @@ def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
     wanted = np.array([1e-2, 1e-3])
     exact = posterior.likelihood.quantile(posterior.grid, wanted)
     for probability, own in zip(wanted, exact, strict=True):
-        design = st.design_stress(LINE, posterior, probability=probability, seed=1, **LOCAL)
+        given = LOCAL | {"probability": probability, "target_cv": 0.3}
+        design = st.design_stress(LINE, posterior, seed=1, **given)
         low, high = design.interval
         assert low < own < high

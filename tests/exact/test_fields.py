@@ -422,34 +422,11 @@ def test_bounds_themselves():
         lambda: st.TruncatedNormal(mean=1e6, cv=0.2, high=1e6),
         lambda: st.Lognormal(mean=1e6, cv=np.nextafter(10.0, 11.0)),
         lambda: st.Weibull(mean=1e6, cv=10.0),
-        lambda: st.PowerLawSpectrum(1e-3, power_kept=1.0),
-        lambda: st.PowerLawSpectrum(1e-3, exponent=np.nextafter(0.6, 0.0)),
     ):
         with pytest.raises(st.InputError):
             wrong()
     with pytest.warns(st.UnitWarning):
         assert st.Lognormal(mean=1e6, cv=10.0).cv == 10.0
-    for exponent in (0.6, 64.0):
-        assert st.PowerLawSpectrum(1e-3, exponent=exponent).exponent == exponent
-
-
-def test_against_the_textbook():
-    """Lognormal: sigma^2 = ln(1 + cv^2); Weibull of shape 2: cv = sqrt(4/pi - 1)."""
-    lognormal = st.Lognormal(mean=2.0, cv=0.3).distribution
-    sigma = np.sqrt(np.log(1.09))
-    assert lognormal.ppf(0.5) == pytest.approx(2.0 * np.exp(-0.5 * sigma**2), rel=1e-12)
-    rayleigh = st.Weibull(mean=1.0, cv=np.sqrt(4.0 / np.pi - 1.0)).distribution
-    assert rayleigh.args[0] == pytest.approx(2.0, rel=1e-9)
-    assert st.Gamma(mean=3.0, cv=1.0).distribution.sf(3.0) == pytest.approx(np.exp(-1.0))
-    symmetric = st.TruncatedNormal(mean=1.0, cv=0.2, low=0.5, high=1.5).distribution
-    assert symmetric.ppf(0.5) == pytest.approx(1.0, rel=1e-9)
-
-
-def test_names_of_scipy_still_mean_scipy():
-    scipys = st.RandomField({"type": "gamma", "a": 2.0, "scale": 1e6}, SPECTRUM)
-    assert scipys.mean == pytest.approx(2e6)
-    ours = st.RandomField({"type": "gamma", "mean": 2e6, "cv": 0.5}, SPECTRUM)
-    assert ours.standard_deviation == pytest.approx(1e6)
 
 
 @pytest.mark.parametrize(

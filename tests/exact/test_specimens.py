@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from brute_force import BruteForce, along
 from refusals import warning_texts
-from setups import EXACT, LOCAL, beta_strength, without
+from setups import EXACT, LOCAL, beta_strength, exact_onset, without
 from specimens import crooked, rough
 
 import stiction as st
@@ -32,12 +32,8 @@ DRIVES = {
 }
 
 
-def onset(problem, strength, **options):
-    return st.onset(problem, strength, method=st.Equilibrium(**options), progress=False)
-
-
 def first(problem, strength):
-    return onset(problem, strength).first_instability.values
+    return exact_onset(problem, strength).first_instability.values
 
 
 def follow(problem, strength):
@@ -46,7 +42,7 @@ def follow(problem, strength):
     Work at the grips is stored or dissipated, and lost only in jumps, to round-off.
     """
     brute = BruteForce(problem, strength).run()
-    found = onset(problem, strength, events=60).isel(sample=0)
+    found = exact_onset(problem, strength, events=60).isel(sample=0)
     assert float(found.critical_load) == pytest.approx(brute.load, rel=1e-9)
     assert float(found.critical_stress) == pytest.approx(brute.peak, rel=1e-9)
     if brute.first is not None:
@@ -67,7 +63,7 @@ def follow(problem, strength):
 def assert_gradient(problem, strength):
     """By difference quotients along random directions; the path is straight, round-off is 1e-6."""
     change = np.random.default_rng(3).normal(size=strength.shape) * 20.0
-    found = onset(problem, strength, sensitivity=True)
+    found = exact_onset(problem, strength, sensitivity=True)
     expected = 0.5 * (first(problem, strength + change) - first(problem, strength - change))
     along = (found.sensitivity.values * change).sum(axis=1)
     np.testing.assert_allclose(along, expected, rtol=1e-6, atol=1e-6 * 20.0)
@@ -85,7 +81,7 @@ def test_path_against_brute_force_and_its_gradient(name, mode):
 
 def test_uniform_strength_under_dead_load_slides_at_it():
     problem = crooked(mode="III", load=st.Load())
-    found = onset(problem, np.full(96, 1.1e6))
+    found = exact_onset(problem, np.full(96, 1.1e6))
     assert float(found.critical_stress[0]) == pytest.approx(1.1e6, rel=1e-12)
     assert float(found.arrested_events[0]) == 0
 
@@ -99,9 +95,9 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
         for k in (0.0, INF)
     )
     strength = rough(soft, 5, 1, 0.02)
-    free = onset(soft, strength)
+    free = exact_onset(soft, strength)
     with pytest.warns(st.AccuracyWarning, match="slides stably") as caught:
-        held = onset(stiff, strength, sensitivity=True)
+        held = exact_onset(stiff, strength, sensitivity=True)
     assert not any("derivative" in str(one.message) for one in caught)
     for name in ("sensitivity", "first_instability", "critical_position"):
         assert np.isnan(held[name]).all()
@@ -256,7 +252,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
         nodes=128, residual=0.61e6, rate=0.25e12, drive=st.Pusher(height=0.004, width=0.003)
     )
     strength, found = rough(problem, 3, 4), []
-    texts = warning_texts(lambda: found.append(onset(problem, strength)))
+    texts = warning_texts(lambda: found.append(exact_onset(problem, strength)))
     above = (found[0].critical_stress.values - 0.61e6) / np.median(strength - 0.61e6, axis=1)
     low = np.flatnonzero(above < 0.02)
     assert 0 < low.size < 4

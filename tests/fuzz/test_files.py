@@ -8,15 +8,15 @@ import io
 import json
 import random
 import shutil
-import time
-import traceback
 import zipfile
+from functools import partial
 
 import numpy as np
 import openpyxl
 import pytest
 import xarray as xr
 from small_study import small_study
+from trials import fault, mutated
 
 import stiction as st
 from stiction.base import files
@@ -24,11 +24,6 @@ from stiction.ensemble import store
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 X, Y = np.arange(32) * 1e-3, np.random.default_rng(0).random(32) + 1.0
-JUNK = (
-    b"\0", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"9" * 400, b"(", b'"', b";", b",,,", b"\n",
-    b"\x1b[2J", b"nan", b"1e999", b"-1", b"[[[[", b"<a>", b"&x;", b"\xef\xbb\xbf", b"\r", b"#",
-    b" " * 300,
-)  # fmt: skip
 
 
 def text(name, separator, **options):
@@ -64,23 +59,6 @@ def sources(tmp_path_factory):
     ]  # fmt: skip
     st.Study.from_dict(small_study(64)).run(out=folder / "run", workers=1, progress=False)
     return good, folder / "run"
-
-
-def mutated(data, chance):
-    """Bytes with some changed, lost, repeated or put between."""
-    data = bytearray(data)
-    for _ in range(chance.choice((1, 1, 2, 4, 16))):
-        at, kind = chance.randrange(len(data) + 1), chance.randrange(5)
-        if kind == 0:
-            data[at : at + 1] = bytes([chance.randrange(256)])
-        elif kind == 1:
-            del data[at : at + chance.choice((1, 4, 40, 4000))]
-        elif kind == 2:
-            data[at:at] = data[chance.randrange(len(data) + 1) :][: chance.choice((8, 200))]
-        else:
-            junk = chance.choice(JUNK)
-            data[at : at + len(junk) * (kind == 3)] = junk
-    return bytes(data)
 
 
 def mutated_workbook(data, chance):
@@ -139,20 +117,6 @@ def forge(folder, chance):
     return kind
 
 
-def fault(use):
-    """What is wrong with the end of a trial: a traceback, several lines, a wait."""
-    begin = time.perf_counter()
-    try:
-        use()
-    except (st.InputError, st.RunError) as error:
-        problems = getattr(error, "problems", [str(error)])
-        if not all(len(text.strip()) in range(1, 2000) for text in problems):
-            return f"refused with {problems!r:.300}"
-    except Exception:
-        return traceback.format_exc(-3)
-    return "" if time.perf_counter() - begin < 20.0 else "more than 20 s"
-
-
 def test_mutated_files_are_refused_or_read(tmp_path, fuzz, sources):
     chance, faults = random.Random(fuzz.seed), []
     for number in range(fuzz.count):
@@ -161,7 +125,7 @@ def test_mutated_files_are_refused_or_read(tmp_path, fuzz, sources):
         path = tmp_path / name
         path.write_bytes(change(data, chance))
         read = st.read_peaks if name == "p.csv" and chance.random() < 0.2 else st.read_profile
-        if wrong := fault(lambda read=read, path=path, options=options: read(path, **options)):
+        if wrong := fault(partial(read, path, **options), 20.0):
             faults.append(f"file {number} ({name}): {wrong}")
     assert not faults, "\n".join(faults)
 
@@ -180,7 +144,7 @@ def test_forged_runs_are_refused_damaged_or_read(tmp_path, fuzz, sources):
         folder = tmp_path / f"{number}"
         shutil.copytree(sources[1], folder)
         kind = forge(folder, chance)
-        if wrong := fault(lambda folder=folder: use(folder)):
+        if wrong := fault(partial(use, folder), 20.0):
             faults.append(f"run {number} ({kind}): {wrong}")
         shutil.rmtree(folder)
     assert not faults, "\n".join(faults)

@@ -10,16 +10,14 @@ import copy
 import functools
 import operator
 import random
-import time
-import traceback
 import warnings
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from small_study import lengths, small_study
+from trials import fault, mutated
 
-import stiction as st
 from stiction.cli.commands import description
 from stiction.study.study import Study
 
@@ -77,20 +75,7 @@ def _mutated_tree(tree: Any, chance: random.Random) -> str:
 def mutation(chance: random.Random) -> tuple[str, bytes]:
     """What was done, and the file that came of it."""
     if chance.random() < 0.25:
-        data = bytearray(tomli_w.dumps(PLAIN).encode())
-        for _ in range(chance.randint(1, 4)):
-            place, kind = chance.randrange(len(data)), chance.randrange(4)
-            if kind == 0:
-                data[place] = chance.randrange(256)
-            elif kind == 1:
-                del data[place : place + chance.randint(1, 40)]
-            elif kind == 2:
-                data[place:place] = bytes(data[: chance.randint(1, 80)])
-            else:
-                data[place:place] = chance.choice(
-                    (b"[" * 2000, b"\xff", b"9" * 400, b"\n", b'"""')
-                )
-        return "bytes", bytes(data)
+        return "bytes", mutated(tomli_w.dumps(PLAIN).encode(), chance)
     tree = copy.deepcopy(PLAIN)
     texts = [_mutated_tree(tree, chance) for _ in range(chance.choice((1, 1, 1, 2, 3)))]
     return "; ".join(texts), tomli_w.dumps(tree).encode("utf-8", "surrogatepass")
@@ -106,18 +91,6 @@ def use(path: Path) -> None:
         point.results(study.ensemble.first, 1)
 
 
-def fault(path: Path) -> str:
-    """What is wrong with the end of a trial: a traceback, a refusal without a word, a wait."""
-    begin = time.perf_counter()
-    try:
-        use(path)
-    except (st.InputError, st.RunError) as error:
-        return "" if str(error).strip() else "refused without a word"
-    except Exception:
-        return traceback.format_exc(-1)
-    return "" if time.perf_counter() - begin < 10.0 else "more than 10 s"
-
-
 def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):
     chance, faults = random.Random(fuzz.seed), []
     path = tmp_path / "study.toml"
@@ -128,6 +101,6 @@ def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):
         for number in range(fuzz.count):
             name, data = mutation(chance)
             path.write_bytes(data)
-            if wrong := fault(path):
+            if wrong := fault(functools.partial(use, path), 10.0):
                 faults.append(f"study {number} ({name}): {wrong}")
     assert not faults, "\n".join(faults)

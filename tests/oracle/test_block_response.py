@@ -98,10 +98,27 @@ def middles(length, nodes):
     return (np.arange(nodes) + 0.5) * length / nodes
 
 
-def assert_pushed(length, height, nu, plane, low, high, atol):
+PUSHES = {
+    "at the top": (0.5, 0.35, "stress", 0.8, 1.0, 1e-5),
+    "at the interface": (1.0, 0.2, "strain", 0.0, 0.25, 2e-4),
+    "all of a flat side": (0.15, 0.45, "strain", 0.0, 1.0, 2e-4),
+    "high on a tall block": (3.0, -0.3, "stress", 0.9, 0.97, 1e-5),
+}
+
+
+LENGTH, SLOW = 1.0, pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*list(PUSHES)[:2], *(pytest.param(name, marks=SLOW) for name in list(PUSHES)[2:])],
+)
+def test_a_pusher(name):
     """From the left and from both sides."""
+    height, nu, plane, low, high, atol = PUSHES[name]
+    low, high = low * height, high * height
     kappa, nodes, middle = kolosov(nu, plane), 96, 0.5 * (low + high)
-    elements = Elements(length, height, kappa, (low, high))
+    elements = Elements(LENGTH, height, kappa, (low, high))
     gauss, weights = legendre.leggauss(8)
     force = np.zeros(elements.matrix.shape[0])
     mirrored = force.copy()
@@ -111,7 +128,7 @@ def assert_pushed(length, height, nu, plane, low, high, atol):
             force[elements.left] += 0.5 * (b - a) / (high - low) * values
     mirrored[elements.right] = force[elements.left]
     u = elements.solve([(elements.interface[0], 0.0), (elements.top[1], 0.0)], force)
-    shear = elements.stress(u, 0, middles(length, nodes))
+    shear = elements.stress(u, 0, middles(LENGTH, nodes))
     sides = (
         (("left",), shear, force @ u),
         (
@@ -122,7 +139,7 @@ def assert_pushed(length, height, nu, plane, low, high, atol):
     )
     for names, profile, travel in sides:
         response = block_response(
-            length, nodes, height, 1.0, kappa, Pushes(names, middle, high - low)
+            LENGTH, nodes, height, 1.0, kappa, Pushes(names, middle, high - low)
         )
         assert response.drive_stiffness * travel == pytest.approx(1.0, rel=1e-6)
         np.testing.assert_allclose(response.shear, profile / profile.mean(), atol=atol)
@@ -130,60 +147,9 @@ def assert_pushed(length, height, nu, plane, low, high, atol):
         assert response.error < 1e-8
 
 
-PUSHES = {
-    "at the top": (0.5, 0.35, "stress", 0.8, 1.0, 1e-5),
-    "at the interface": (1.0, 0.2, "strain", 0.0, 0.25, 2e-4),
-    "all of a flat side": (0.15, 0.45, "strain", 0.0, 1.0, 2e-4),
-    "high on a tall block": (3.0, -0.3, "stress", 0.9, 0.97, 1e-5),
-}
-
-
-SLOW = pytest.mark.slow
-
-
-@pytest.mark.parametrize(
-    "name",
-    [*list(PUSHES)[:2], *(pytest.param(name, marks=SLOW) for name in list(PUSHES)[2:])],
-)
-def test_a_pusher(name):
-    height, nu, plane, low, high, atol = PUSHES[name]
-    assert_pushed(1.0, height, nu, plane, low * height, high * height, atol)
-
-
 def bent(x, length):
     """Slip that vanishes with its slope at both ends, so that sums over nodes are exact."""
     return np.sin(np.pi * x / length) ** 2 * np.exp(x / length)
-
-
-def assert_glued(length, height, nu, plane):
-    kappa, nodes = kolosov(nu, plane), 384
-    x = middles(length, nodes)
-    response = block_response(length, nodes, height, 1.0, kappa, None)
-    elements = Elements(length, height, kappa)
-    stuck, (u, v) = (elements.interface[0], 0.0), elements.top
-    moved = elements.solve([stuck, (u, 1.0), (v, 0.0)])
-    drive = moved @ elements.matrix @ moved
-    assert response.drive_stiffness == pytest.approx(drive, rel=1e-6)
-    shear = elements.stress(moved, 0, x)
-    np.testing.assert_allclose(response.shear, shear / shear.mean(), atol=2e-5)
-    pressed = elements.solve([(elements.interface[1], 0.0), (u, 0.0), (v, -1.0)])
-    pressure = elements.stress(pressed, 1, x)
-    exact = glued_pressure(length, nodes, height, kappa)
-    np.testing.assert_allclose(exact, pressure / pressure.mean(), atol=2e-5)
-    # The error of the lattice is the same on rollers: compare what glue adds to the energy.
-    energies, slip = [], bent(x, length)
-    for fixed in ([(u, 0.0)], []):
-        slid = [(elements.interface[0], 0.5 * bent(elements.across.x, length)), (v, 0.0)]
-        field = elements.solve([*slid, *fixed])
-        energies.append(field @ elements.matrix @ field)
-    rollers = block_response(
-        length, nodes, height, 1.0, kappa, Pushes(("left",), 0.5 * height, 0.1 * height)
-    )
-    added = slip @ (response.stiffness - rollers.stiffness) @ slip * 0.5 * length / nodes
-    # What holds the platen; the mean of q over the nodes is not its mean over the interface.
-    added += 0.25 * length * shear.mean() * (response.shear @ slip / nodes) ** 2
-    assert added == pytest.approx(energies[0] - energies[1], rel=2e-5)  # falls as 1/nodes²
-    assert response.error < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -195,4 +161,31 @@ def assert_glued(length, height, nu, plane):
     ],
 )
 def test_a_glued_top(height, nu, plane):
-    assert_glued(1.0, height, nu, plane)
+    kappa, nodes = kolosov(nu, plane), 384
+    x = middles(LENGTH, nodes)
+    response = block_response(LENGTH, nodes, height, 1.0, kappa, None)
+    elements = Elements(LENGTH, height, kappa)
+    stuck, (u, v) = (elements.interface[0], 0.0), elements.top
+    moved = elements.solve([stuck, (u, 1.0), (v, 0.0)])
+    drive = moved @ elements.matrix @ moved
+    assert response.drive_stiffness == pytest.approx(drive, rel=1e-6)
+    shear = elements.stress(moved, 0, x)
+    np.testing.assert_allclose(response.shear, shear / shear.mean(), atol=2e-5)
+    pressed = elements.solve([(elements.interface[1], 0.0), (u, 0.0), (v, -1.0)])
+    pressure = elements.stress(pressed, 1, x)
+    exact = glued_pressure(LENGTH, nodes, height, kappa)
+    np.testing.assert_allclose(exact, pressure / pressure.mean(), atol=2e-5)
+    # The error of the lattice is the same on rollers: compare what glue adds to the energy.
+    energies, slip = [], bent(x, LENGTH)
+    for fixed in ([(u, 0.0)], []):
+        slid = [(elements.interface[0], 0.5 * bent(elements.across.x, LENGTH)), (v, 0.0)]
+        field = elements.solve([*slid, *fixed])
+        energies.append(field @ elements.matrix @ field)
+    rollers = block_response(
+        LENGTH, nodes, height, 1.0, kappa, Pushes(("left",), 0.5 * height, 0.1 * height)
+    )
+    added = slip @ (response.stiffness - rollers.stiffness) @ slip * 0.5 * LENGTH / nodes
+    # What holds the platen; the mean of q over the nodes is not its mean over the interface.
+    added += 0.25 * LENGTH * shear.mean() * (response.shear @ slip / nodes) ** 2
+    assert added == pytest.approx(energies[0] - energies[1], rel=2e-5)  # falls as 1/nodes²
+    assert response.error < 1e-9

@@ -6,12 +6,10 @@ import warnings
 import numpy as np
 import pytest
 from checks import assert_mean
-from scipy.stats import kstest
 from setups import (
     LENGTH,
     RATE,
     ROUND_OFF,
-    ensemble,
     exact_onset,
     local_onset,
     make_problem,
@@ -80,11 +78,6 @@ def test_mean_and_variance_of_the_nucleation_stress(problem, make_strength, rati
         np.testing.assert_array_equal(st.theory.nucleation_stress(problem, one), tau_n[1])
     assert_mean(tau_n.mean(axis=1), strength.mean, errors=4.0)
     assert_mean(((tau_n - strength.mean) ** 2).mean(axis=1), theory.variance, errors=4.0)
-
-
-def test_critical_position_is_uniform(problem, make_strength):
-    places = ensemble(problem, make_strength(0.5), 20_000, seed=5).critical_position.values
-    assert kstest(places / 0.1, "uniform").pvalue > 1e-3
 
 
 def lognormal(xi, cv=0.3):

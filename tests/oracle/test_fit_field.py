@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import gstools
 import numpy as np
 import pytest
 import scipy.stats
@@ -101,28 +100,6 @@ def test_the_likelihood_is_that_of_values(noise):
     bounded = st.Beta(alpha=2.0, beta=3.0, low=0.0, high=4e6)
     worse = mean_log_likelihood(bounded, np.append(values, 9e6), noise)
     assert -10.0 < worse - mean_log_likelihood(bounded, values, noise) < -0.02
-
-
-def test_correlation_length_against_a_variogram():
-    """GSTools fits the same record by least squares on a variogram: two estimates, one truth."""
-    # Both take the spectrum as whole.
-    spectrum = st.ExponentialSpectrum(1e-3, power_kept=0.999)
-    truth = st.RandomField(st.Lognormal(mean=1e6, cv=0.1), spectrum, mean_mode=True)
-    values = truth.sample(st.Interface(length=1.2, nodes=6_000), seed=4)[0, :2000]
-    piece = st.Interface(length=0.4, nodes=2000)
-    fit = st.fit_field(
-        values, piece, marginal="lognormal", spectrum="exponential", bootstrap=20,
-        progress=False,
-    )  # fmt: skip
-    bins = np.arange(0.0, 3.0, 0.2)  # mm, MPa: its search begins at numbers about one
-    centres, gamma = gstools.vario_estimate(1e3 * piece.x, 1e-6 * values, bins)
-    model = gstools.Exponential(dim=1)
-    model.fit_variogram(centres, gamma, nugget=False)
-    # 400 correlation lengths: either is within some 10 per cent of the truth.
-    ours = 1e3 * fit.parameters["spectrum.correlation_length"]
-    assert ours == pytest.approx(1.0, rel=0.2)
-    assert model.len_scale == pytest.approx(1.0, rel=0.25)
-    assert ours == pytest.approx(model.len_scale, rel=0.3)
 
 
 @pytest.mark.parametrize("records", [2, 7])

@@ -1,15 +1,11 @@
 """Ruptures with inertia on specimens, as a user asks for them."""
 
-import dataclasses
-
 import numpy as np
-import pydantic
 import pytest
 from setups import beta_strength
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.base.model import to_plain
 from stiction.methods.dynamics.specimens import RuptureProgram
 from stiction.methods.equilibrium.sample import present_pieces, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
@@ -67,18 +63,6 @@ def test_an_ensemble_a_path_and_a_probability_rest_on_it():
         max_evaluations=100, progress=False,
     )  # fmt: skip
     assert 0.0 <= failure.probability <= 1.0
-
-
-def test_attenuation_and_mass_are_written_down_with_the_problem():
-    problem = crooked(drive=st.Platen(mass=0.3))
-    endless = dataclasses.replace(problem.specimen, quality_factor=float("inf"))
-    problem = dataclasses.replace(problem, specimen=endless)
-    written = to_plain(problem)
-    assert written["specimen"]["quality_factor"] == "inf"
-    assert written["specimen"]["drive"]["mass"] == 0.3
-    assert (
-        pydantic.TypeAdapter(st.Problem).validate_python(written).specimen == problem.specimen
-    )
 
 
 def test_one_event_in_space_and_time(run):

@@ -323,7 +323,6 @@ table_of(calls, {
         lambda: fitted(detrend=7, noise=-1.0, bootstrap=3, confidence=90, seed=-1, progress="x"),
         lambda: fitted(marginal="lognormul", spectrum={"type": "power_law", "exponnt": 2.0}),
         lambda: fitted(anisotropy=True),
-        lambda: st.fit_field(FIELD.sample(LINE, seed=1)[0], LINE, between=True),
         lambda: fitted(VALUES[:64], PIECE.x[:64] / 4.0, GIVEN),
         lambda: fitted(VALUES + 2e6 * (np.median(VALUES) < VALUES), spectrum=GIVEN),
         lambda: fitted(1e7 + VALUES + 3e6 * REST, noise=3e6),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from joint import FIELD, GIVEN, PROBLEM
 from refusals import refuses
+from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
 
@@ -15,26 +16,20 @@ STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), of=N
 SLIP = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
 
 
-def onsets(problem, random, method, count=12):
-    return st.monte_carlo(
-        problem, random, method=method, samples=count, seed=3, progress=False, pilot=False
-    )
-
-
 @pytest.mark.parametrize(
     ("problem", "name", "strength", "method"),
     [
-        (PROBLEM, "normal_pressure", FIELD, st.LocalCriterion()),
-        (PRESSED, "pressing_force", FIELD, st.Equilibrium()),
-        (SLIP, "critical_slip", STRENGTH, st.Equilibrium()),
-        (PROBLEM, "residual_strength", STRENGTH, st.Equilibrium()),
+        (PROBLEM, "normal_pressure", FIELD, LOCAL),
+        (PRESSED, "pressing_force", FIELD, EXACT),
+        (SLIP, "critical_slip", STRENGTH, EXACT),
+        (PROBLEM, "residual_strength", STRENGTH, EXACT),
     ],
 )
 def test_a_factor_multiplies_a_constant_of_the_problem(problem, name, strength, method):
     """Sample by sample the onset is that of a problem with the constant times the factor."""
     random = st.RandomInterface(strength=strength, between={name: FACTOR})
     interface = problem.interface
-    found = onsets(problem, random, method)
+    found = ensemble(problem, random, 12, method=method, seed=3)
     factors = next(
         v for k, v in random.profiles(interface, samples=12, seed=3).items() if k[0] == "b"
     )
@@ -85,17 +80,16 @@ def test_members_may_have_different_factors():
         st.RandomInterface(strength=FIELD),
         st.RandomInterface(strength=FIELD, between={"normal_pressure": FACTOR}),
     ]
-    found = onsets(PROBLEM, likely, st.LocalCriterion(), 40)
-    alone = onsets(PROBLEM, FIELD, st.LocalCriterion(), 40)
+    found = ensemble(PROBLEM, likely, 40, seed=3)
+    alone = ensemble(PROBLEM, FIELD, 40, seed=3)
     ratios = (found.critical_stress / alone.critical_stress).values
     assert 5 < np.sum(ratios == 1.0) < 35
 
 
 def test_what_factors_refuse():
     def on(problem, **between):
-        return lambda: onsets(
-            problem, st.RandomInterface(strength=FIELD, between=between), st.LocalCriterion()
-        )
+        given = {"strength": FIELD, "between": between}
+        return lambda: ensemble(problem, st.RandomInterface(**given), 12)
 
     refuses(
         "between.initial_stress: is a factor on the initial_stress",

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from refusals import refuses
+from setups import beta_strength
 
 import stiction as st
 from stiction.inference.agreement import _p_values, _permuted
@@ -121,9 +122,7 @@ BLOCKS = st.Problem(
         height=0.05, thickness=0.006, drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7)
     ),
 )
-FIELD = st.RandomField(
-    st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6), st.PowerLawSpectrum(4e-3)
-)
+FIELD = beta_strength(4e-3)
 
 
 @pytest.fixture(scope="module")
@@ -175,9 +174,7 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     found = st.statistics.agreement(own, curves, replicates=400)
     assert set(found.precursors) == {"number", "size", "first_load"}
     assert min(found.p_values.values()) > 0.05
-    stronger = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.9e6, high=1.9e6), FIELD.spectrum
-    )
+    stronger = beta_strength(4e-3, low=0.9e6, high=1.9e6)
     wrong = st.statistics.agreement(predicted(stronger), curves, replicates=400)
     assert wrong.p_values["first_load"] < 0.01
     assert "precursors: p =" in str(wrong)

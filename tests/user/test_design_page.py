@@ -16,6 +16,13 @@ from stiction.cli.commands import app
 KEY = "problem.load.normal_pressure"
 
 
+def make(**tables):
+    return st.Study(
+        problem=PROBLEM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
+    )  # fmt: skip
+
+
 def test_a_page_of_a_design(tmp_path):
     """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
     design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
@@ -76,10 +83,7 @@ def test_a_page_of_a_design(tmp_path):
 
 
 def test_the_command_writes_the_page(tmp_path):
-    study = st.Study(
-        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
-        reliability={"probability": 1e-2, "target_cv": 0.3}, title="Joint A",
-    )  # fmt: skip
+    study = make(random=RANDOM, title="Joint A")
     study.to_toml(tmp_path / "study.toml")
     page = tmp_path / "out.html"
     app(
@@ -92,10 +96,7 @@ def test_the_command_writes_the_page(tmp_path):
 def test_the_command_makes_constants_uncertain(tmp_path, capsys):
     """As the table of a study does, to the digit."""
     table = {KEY: {"low": 4e6, "high": 6e6}, "count": 40}
-    study = st.Study(
-        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
-        reliability={"probability": 1e-2, "target_cv": 0.3},
-    )  # fmt: skip
+    study = make(random=RANDOM)
     path = tmp_path / "study.toml"
     study.to_toml(path)
 
@@ -142,10 +143,3 @@ def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeyp
     refuses(
         "random: ... is not valid JSON", lambda: st.Study.from_toml(tmp_path / "study.toml")
     )
-
-
-def make(**tables):
-    return st.Study(
-        problem=PROBLEM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
-        reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
-    )  # fmt: skip

@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 from refusals import refuses
+from setups import LOCAL, make_problem
 
 import stiction as st
 
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 64),
-    st.LinearWeakening(weakening_rate=0.25e12),
-)
+PROBLEM = make_problem(64, 0.05, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.15), st.PowerLawSpectrum(4e-3), mean_mode=True)
-GIVEN = {"method": st.LocalCriterion(), "progress": False}
+GIVEN = {"method": LOCAL, "progress": False}
 
 
 def test_intervals_become_narrower_as_the_root_of_the_tests():

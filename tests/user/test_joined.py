@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 import scipy.stats
 from refusals import refuses
+from setups import make_problem
 
 import stiction as st
 from stiction.inference import joined as joining
 from stiction.inference.specimens import PRIOR_SCALE
 
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 64, width=0.013),
-    st.LinearWeakening(weakening_rate=0.25e12),
-)
+PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 RNG = np.random.default_rng(8)
 PEAKS = 1.05e6 * np.exp(0.05 * RNG.standard_normal(9))
 LOCAL = {"method": st.LocalCriterion(), "progress": False, "samples": 100}

@@ -2,6 +2,7 @@
 
 import sys
 
+import astropy.units as u
 import numpy as np
 import openpyxl
 import pytest
@@ -88,17 +89,6 @@ def test_the_names_of_dimensions_decide_where_samples_equal_nodes():
     np.testing.assert_array_equal(SYSTEM.sample(given).residual_strength, rows)
 
 
-class Quantity:
-    """As of pint: a magnitude and a way to convert it."""
-
-    def __init__(self, magnitude, factor):
-        self.magnitude, self.factor = magnitude, factor
-
-    def to(self, unit):
-        assert unit in ("Pa", "Pa*m**-1")
-        return Quantity(self.magnitude * self.factor, 1.0)
-
-
 def test_everything_beside_the_strength_is_read_alike():
     residual = 1e5 + 1e6 * X
     tau_r = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")
@@ -107,8 +97,8 @@ def test_everything_beside_the_strength_is_read_alike():
     rows = SYSTEM.sample(given)
     np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
     np.testing.assert_allclose(rows.initial_stress, 1e4)
-    load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=Quantity(0.1, 1e6))
-    rate = Quantity(np.full(NODES, 0.2), 1e12)
+    load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=0.1 * u.MPa)
+    rate = np.full(NODES, 0.2) * u.MPa / u.um
     problem = make_problem(NODES, weakening_rate=rate, residual_strength=tau_r, load=load)
     assert problem.friction.weakening_rate == pytest.approx(np.full(NODES, 0.2e12))
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)

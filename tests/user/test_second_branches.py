@@ -6,19 +6,15 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from setups import LOCAL, make_problem
 
 import stiction as st
 from stiction.base.progress import duration
 from stiction.inference import likelihood as likelihoods
 from stiction.inference.peaks import make_peaks
 
-PROBLEM = st.Problem(
-    st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-    st.Interface(0.05, 64, width=0.013),
-    st.LinearWeakening(weakening_rate=0.25e12),
-)
+PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), st.PowerLawSpectrum(4e-3), mean_mode=True)
-LOCAL = st.LocalCriterion()
 PEAKS = np.array([0.78e6, 0.83e6, 0.8e6, 0.86e6])
 
 

@@ -8,6 +8,7 @@ import pytest
 import scipy.stats
 import xarray as xr
 from refusals import refuses
+from setups import LOCAL, beta_strength, make_problem
 from small_study import altered, small_study
 
 import stiction as st
@@ -36,16 +37,9 @@ def in_python(**parts):
 def test_python_and_toml_and_result_are_the_same_study(tmp_path):
     study = st.Study(
         title="a study",
-        problem=st.Problem(
-            st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
-            st.Interface(length=0.1, nodes=128),
-            st.LinearWeakening(weakening_rate=0.25e12),
-        ),
-        random=st.RandomField(
-            st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-            st.PowerLawSpectrum(correlation_length=4e-3),
-        ),
-        method=st.LocalCriterion(),
+        problem=make_problem(128, weakening_rate=0.25e12),
+        random=beta_strength(4e-3),
+        method=LOCAL,
         ensemble=st.Ensemble(samples=30, seed=3),
     )
     assert study == loaded(title="a study")

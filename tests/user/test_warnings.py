@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 import tomli_w
+from refusals import warning_texts
 from setups import beta_strength
 from small_study import altered, small_study
 from specimens import crooked
@@ -131,14 +132,10 @@ def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
     )
     found = []
     for way in (by_function, by_study):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            try:
-                way()
-            except st.InputError as error:
-                found.append({*error.problems})
-            else:
-                found.append({str(one.message) for one in caught})
+        try:
+            found.append({*warning_texts(way)})
+        except st.InputError as error:
+            found.append({*error.problems})
     refused = doubt in ("uniform", "refused")
     with warnings.catch_warnings():
         warnings.simplefilter("always")

@@ -1,0 +1,49 @@
+"""Trials with mutated files: bytes that are changed at random, and what is wrong with an end."""
+
+from __future__ import annotations
+
+import random
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+import stiction as st
+
+JUNK = (
+    b"\0", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"9" * 400, b"(", b'"', b";", b",,,", b"\n",
+    b"\x1b[2J", b"nan", b"1e999", b"-1", b"[[[[", b"<a>", b"&x;", b"\xef\xbb\xbf", b"\r", b"#",
+    b" " * 300, b'"""', b"[" * 2000,
+)  # fmt: skip
+
+
+def mutated(given: bytes, chance: random.Random) -> bytes:
+    """Bytes with some changed, lost, repeated or put between."""
+    data = bytearray(given)
+    for _ in range(chance.choice((1, 1, 2, 4, 16))):
+        at, kind = chance.randrange(len(data) + 1), chance.randrange(5)
+        if kind == 0:
+            data[at : at + 1] = bytes([chance.randrange(256)])
+        elif kind == 1:
+            del data[at : at + chance.choice((1, 4, 40, 4000))]
+        elif kind == 2:
+            data[at:at] = data[chance.randrange(len(data) + 1) :][: chance.choice((8, 200))]
+        else:
+            junk = chance.choice(JUNK)
+            data[at : at + len(junk) * (kind == 3)] = junk
+    return bytes(data)
+
+
+def fault(use: Callable[[], Any], seconds: float) -> str:
+    """What is wrong with the end of a trial: a traceback, several lines, a wait."""
+    begin = time.perf_counter()
+    try:
+        use()
+    except (st.InputError, st.RunError) as error:
+        problems = getattr(error, "problems", [str(error)])
+        if not all(len(text.strip()) in range(1, 2000) for text in problems):
+            return f"refused with {problems!r:.300}"
+    except Exception:
+        return traceback.format_exc(-3)
+    wait = time.perf_counter() - begin
+    return "" if wait < seconds else f"{wait:.0f} s"
