@@ -423,7 +423,7 @@ def test_forged_settings_of_a_curve_are_no_traceback(tmp_path, run, settings):
     shutil.copytree(run, tmp_path / "run")
     study = store.read_study(run) | {"failure_curve": settings}
     store._write_json(tmp_path / "run" / "study.json", study)
-    refuses("cannot be read", lambda: st.open_run(tmp_path / "run"), st.RunError)
+    refuses("cannot read its study", lambda: st.open_run(tmp_path / "run"), st.RunError)
 
 
 def test_many_mistakes_and_long_keys_are_told_in_few_words(tmp_path):
@@ -473,6 +473,6 @@ def test_many_names_of_one_long_text_of_a_netcdf_file_are_no_memory():
             return b"a" * 10**6
 
     texts = Texts()
-    with pytest.raises(st.InputError, match="larger than the file"):
+    with pytest.raises(st.InputError, match="more memory than the whole file"):
         netcdf._texts(texts, [2 * 10**6])
     assert texts.read == 3
