@@ -97,7 +97,7 @@ def is_whole(value: Any, least: int) -> bool:
 
 
 def is_finite(value: Any) -> bool:
-    """Return whether a value is a finite number, not a text or a truth value."""
+    """Return whether a value is a finite number, and neither a string nor a Boolean."""
     try:
         return math.isfinite(as_number(value))
     except ValueError:

@@ -234,7 +234,7 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
 
 
 def _estimates(samples: Any) -> list[Any]:
-    """Return number, mean, standard deviation and quantiles of samples as texts."""
+    """Return the number, mean, standard deviation and quantiles of samples as text."""
     values = samples[np.isfinite(samples)]
     if values.size < 4:
         return [values.size, *[None] * (2 + len(QUANTILE_LEVELS))]

@@ -38,7 +38,7 @@ MAX_BATCH = 5_000
 
 @dataclass(frozen=True, eq=False)
 class PosteriorGrid:
-    """Cells of equal prior mass in a box, and their share of the posterior."""
+    """Posterior probabilities of cells with equal prior mass in a box."""
 
     box: Array  # corners, as u, (2, parameters)
     mass: Array  # of the cells, (n_1, ..., n_parameters); sums to 1

@@ -176,7 +176,7 @@ class Onsets:
         return out.T
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
-        """Return the range of x with these peaks, and the least standard deviation of x."""
+        """Return the range of x to tabulate for these peaks, and the least deviation of x."""
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -335,7 +335,7 @@ class Tables:
         return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in chosen))
 
     def ranges(self) -> list[tuple[float, float, float]]:
-        """Return the ranges of x for all kinds of peaks."""
+        """Return the range of x to tabulate for each kind of peaks."""
         pairs = zip(self.onsets, self.peaks, strict=True)
         return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
 

@@ -220,7 +220,7 @@ def _fade(k: Array, end: Edge) -> Array:
 def _folded_line(
     spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
 ) -> Array:
-    """Return the sum of the density over all wavenumbers that look alike on the grid."""
+    """Return the sum of the density over all wavenumbers with the same alias on the grid."""
 
     def added(at: Array, multiples: Array) -> Array:
         k = np.abs(at + multiples[:, None] * sampling[0])

@@ -28,7 +28,7 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
 class LoadShape(ABC):
-    """A load profile by a formula. Its mean is scaled to 1, so that tau_0 is the mean stress.
+    """A load profile given by a formula, scaled to a mean of 1, so that tau_0 is the mean stress.
 
     To add a shape, derive a class. Decorate it with `stiction.extensions.model`, which
     checks its parameters, and with `stiction.extensions.register`, after which study

@@ -114,7 +114,7 @@ class Sample(Result, _Profiles):
         return bool(np.all(flat == flat[:, :1]))
 
     def mean(self, profiles: Array) -> Array:
-        """Return the means of profiles (..., *shape) over the nodes that can break, (...)."""
+        """Return the mean of each profile over the nodes that can break: (..., *shape) to (...)."""
         if self.problem is None:
             return np.asarray(profiles.mean(axis=self.axes))
         return np.asarray(self.problem.interface.mean(profiles))

@@ -157,9 +157,9 @@ def make_modes(
 def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     """Step 1: return candidate wave vectors in units of 2 pi/length, in the order of draws.
 
-    `largest` is the cutoff in these units, along each axis. On a plane the order follows growing
-    rectangles with the proportions of the interface, so that the draws of a mode do not depend on
-    the spectrum and the grid.
+    `largest` is the cutoff along each axis, in the same units. On a plane the order follows growing
+    rectangles with the proportions of the interface, so that the draws of a mode depend on neither
+    the spectrum nor the grid.
     """
     if largest.size == 1:
         _refuse_too_many(largest[0])

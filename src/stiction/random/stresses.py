@@ -79,10 +79,10 @@ def profiles_in_stress(
 def support_in_stress(
     problem: Problem, random: RandomInterface, name: str, chance: float = 0.0
 ) -> tuple[float, float]:
-    """Return the bounds of a property, Pa, with its factor between specimens.
+    """Return the lower and upper bound of a property, Pa, including its factor between specimens.
 
-    With a `chance`, each of its random parts exceeds its bounds with this probability on either
-    side.
+    If `chance` is positive, the bounds are quantiles: each random part lies beyond them with this
+    probability on either side.
     """
     field, between = random.properties.get(name), random.between or {}
 

@@ -115,7 +115,10 @@ class ErrorEstimate(NamedTuple):
 def make_transport(
     log_ratio: LogRatio, mean: Array, slopes: Array
 ) -> tuple[Transport, ErrorEstimate]:
-    """Prepare the map for z = mean + slopes @ w, (places,) and (places, dimension)."""
+    """Prepare the map from Gaussian draws w to the posterior of z = mean + slopes @ w.
+
+    `mean` has shape (places,), and `slopes` has shape (places, dimension).
+    """
     # 1. The distance of the posterior from the Gaussian at each place.
     deviation = np.sqrt((slopes**2).sum(axis=1))
     coefficients = _hermite(log_ratio, mean, deviation)

@@ -308,7 +308,7 @@ class Answer(Result):
         return "\n".join([result, *self._moved()])
 
     def _moved(self) -> list[str]:
-        """Return the effects on a design as lines."""
+        """Return lines of text that tell how each assumption changes the design."""
         effects = self.sensitivities
         if not effects.sizes.get("source"):
             return []

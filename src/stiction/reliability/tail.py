@@ -326,7 +326,11 @@ def _repetitions(
     poor: float = 0.0,
     kind: tuple[int, int, int] = SUBSET,
 ) -> list[Descent]:
-    """Return repetitions, by two levels with a guide, or a single one of a poor guide."""
+    """Repeat subset simulation until the tail is precise enough.
+
+    With a `guide`, each repetition uses two levels. If less than the share `poor` of the samples
+    that the guide selects fails, stop after the first repetition.
+    """
     key, first, largest = BRIDGE if guide else kind
 
     def judge(repetitions: Sequence[Descent]) -> float:

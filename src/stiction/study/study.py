@@ -384,7 +384,7 @@ class Study(_Parts):
         part: AnyPart | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
-        """Run the study, or its missing part.
+        """Run the study, or the samples that are still missing.
 
         Parameters
         ----------

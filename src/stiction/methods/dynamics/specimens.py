@@ -148,7 +148,7 @@ def begin(
 ) -> DynamicEvent:
     """Step 1: return an event that is about to run.
 
-    `arrival` is the slip with which a front arrives at a node, in units of d_c.
+    `arrival` is the slip, in units of d_c, at which a front counts as arrived.
     """
     fall = (sample.excess - sample.residual)[np.isfinite(sample.excess)]
     load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())

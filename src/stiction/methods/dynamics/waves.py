@@ -11,19 +11,19 @@ change.
 Algorithm (`wave_steps`)
 ------------------------
 Leapfrog with steps of size h: velocities are known in the middle of a step, displacements at its
-end, and attenuation is half implicit. With a = alpha h/2 and w = u + theta u', each step goes
+end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step goes
 through the rows:
 
 1. Compute the forces F on the row from its elements (`_force`). They depend on w alone, so that
    only w is stored.
 2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
    (`_move`).
-3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate that its
-   strength leaves, and rests if this rate is negative. `Mesh.correction`, K of
-   the closed form less K of the mesh, acts on the slip of the interface.
+3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate at which
+   its stress equals its strength, and rests if this rate would be negative. `Mesh.correction`, the
+   closed form of K less the K of the mesh, acts on the slip of the interface.
 4. Move the top with its platen (`_move_platen`), or let the pusher act on the ends
-   (`_move_pusher`). The spring of the machine is half implicit. An infinitely
-   stiff machine holds the drive.
+   (`_move_pusher`). The spring of the machine is semi-implicit. An infinitely
+   stiff machine does not move.
 
 The force on row j + 1 needs row j before it moves, so the force on a row is computed before the
 row below it moves.

@@ -80,9 +80,9 @@ def follow_to_sliding(
 ) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
-    Without inertia a patch stops at the least equilibrium of the same load. A program with inertia
-    may carry it through. An interface that ends slides in the event after which all slips that can
-    break; `to_rest` follows this event to its end.
+    Without inertia, a patch stops at the least equilibrium at the same load. Inertia may carry it
+    further. An interface that ends slides as soon as every node that can break slips. Pass
+    `to_rest` to follow this last event until it stops.
     """
     can_break = np.isfinite(sample.excess)
     ends, sliding = not can_break.all(), None

@@ -331,9 +331,9 @@ def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
 
 
 def _rates(sample: StaticSample) -> tuple[float, float]:
-    """Return the lowest and highest weakening rate that is not zero, 0 if all are.
+    """Return the lowest and the highest weakening rate above zero, or zeros if there is no such rate.
 
-    They are the same if they differ by round-off.
+    Rates that differ by round-off only are returned as equal.
     """
     rates = sample.rate[sample.rate > 0.0]
     if rates.size == 0:

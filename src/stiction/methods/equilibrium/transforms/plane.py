@@ -149,13 +149,14 @@ def plane_onset(
     slip: Array | None = None,
     corner: Array | None = None,
 ) -> PlaneOnset:
-    """Return the largest load with an equilibrium while no node has reached a corner of its law.
+    """Return the largest load that has an equilibrium before a node reaches a corner of its law.
 
-    All fields are (nx, ny), or on a line (nodes,): peak strength less initial stress (Pa), load
-    profile p > 0, weakening rate (Pa/m, zero at residual nodes), and the slip (m) of an equilibrium
-    at a lower load, from which the search starts instead of coarse grids. The bounds are closed to
-    a relative gap. If a node of a coarse grid slips beyond its corner (m, 0 without a corner), the
-    onset of this grid is returned.
+    All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength less the
+    initial stress (Pa). `profile` is the load profile p > 0. `rate` is the weakening rate (Pa/m,
+    zero at residual nodes). `slip` (m) belongs to an equilibrium at a lower load, from which the
+    search starts instead of coarse grids. `corner` is the slip at the next corner (m, 0 without a
+    corner). The search stops when the bounds agree to a relative `gap`. If a node of a coarse grid
+    slips beyond its corner, the onset of this grid is returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
