@@ -115,7 +115,7 @@ def _demand(design: Answer) -> tuple[str, Callable[[float], str]]:
 
 
 def _numbers(design: Answer) -> list[list[str]]:
-    """Return the rows of the table of results. Optional quantities that are unknown are left out."""
+    """Return the rows of the table of results. Unknown optional quantities are left out."""
 
     name, shown = _demand(design)
     low, high = map(shown, design.interval)

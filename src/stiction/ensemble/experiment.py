@@ -184,7 +184,7 @@ class Experiment:
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
-        """Return profiles and results of draws. Each draw uses the constants of its own interface."""
+        """Return profiles and results of draws, each draw with the constants of its interface."""
         constants = getattr(self.random, "constants", ())
         if not constants:
             profiles = self.profiles(draws)

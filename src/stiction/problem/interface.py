@@ -105,7 +105,7 @@ class Ellipse:
 
 
 def _extent(value: Any, info: ValidationInfo) -> Any:
-    """Read an extent: two ends on a line, two pairs of ends or an `Ellipse` on a plane, or a mask."""
+    """Read an extent: two ends of a line, two pairs or an `Ellipse` on a plane, or a mask."""
     read = (info.context or {}).get("read")
     if isinstance(value, str) and read is not None:
         value = np.asarray(read(value, "slip").to_xarray()) != 0.0  # a mask in a file

@@ -331,7 +331,7 @@ def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
 
 
 def _rates(sample: StaticSample) -> tuple[float, float]:
-    """Return the lowest and the highest weakening rate above zero, or zeros if there is no such rate.
+    """Return the lowest and the highest weakening rate above zero, or zeros if there is none.
 
     Rates that differ by round-off only are returned as equal.
     """
