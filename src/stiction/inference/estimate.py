@@ -145,7 +145,7 @@ class Estimate:
         deviation = self.parameters["standard_deviation"]
         return deviation**2 * np.array([shares[window] for window in windows])
 
-    @property
+    @cached_property
     def within(self) -> Array:
         """Variance of the logarithm of the mean of each record by the field alone."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
@@ -219,11 +219,11 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         marginal = of_values = setting.marginal.fit(values, noise, marginal)
         # 2.
         likelihood = Whittle(family, hermite_shares(marginal), observed)
-        vector = likelihood.fit(likelihood.coarse() if vector is None else vector)
-        model = family.model(vector, likelihood.shares)
+        vector, state = likelihood.fit(likelihood.coarse() if vector is None else vector)
+        model = state[0]
         if model.noise_share < 0.0:  # the best possible noise is zero
             without = likelihood._replace(family=replace(family, noise=0.0))
-            model = without.family.model(without.fit(vector[:-1]), likelihood.shares)
+            _, (model, _) = without.fit(vector[:-1])
         if abs(model.noise**2 - noise**2) < NEGLIGIBLE_CHANGE * model.variance:
             break
         noise = model.noise
@@ -240,7 +240,7 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         model=model,
         distance=distance(of_values, setting.marginal.quiet(values, model.noise)),
         roughness=float(np.mean(np.square(ratios))),
-        noise=likelihood.noise_variance(vector) if family.noise is None else (0.0, 0.0),
+        noise=likelihood.noise_variance(vector, state) if family.noise is None else (0.0, 0.0),
     )
 
 

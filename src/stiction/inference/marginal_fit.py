@@ -147,7 +147,7 @@ class Family:
             slopes = np.stack([(terms(v + s) - logs) / s.sum() for s in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
 
-        best = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
+        best, _ = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
         parameters = search.parameters(best)
         if self.name == "beta":
             a, b, low, width = parameters
@@ -346,7 +346,9 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
 
 def distance(marginal: Any, values: Array) -> float:
     """Return Kolmogorov's distance: the largest difference of the distribution functions."""
-    return float(scipy.stats.ks_1samp(values, marginal.distribution.cdf, method="asymp")[0])
+    below = marginal.distribution.cdf(np.sort(values))
+    steps = np.arange(values.size + 1) / values.size
+    return float(max((steps[1:] - below).max(), (below - steps[:-1]).max()))
 
 
 def climb(
@@ -357,11 +359,11 @@ def climb(
     *,
     longest: float,
     settled: float,
-) -> Array:
-    """Return the parameters of the greatest likelihood by steps of at most `longest` (step 3).
+) -> tuple[Array, Any]:
+    """Return the parameters of the greatest likelihood, and the state there (step 3).
 
-    `value_of` returns the log likelihood, and a state from which `derivatives` returns
-    score and information. A gain below `settled` ends the search.
+    Steps are at most `longest`. `value_of` returns the log likelihood, and a state from which
+    `derivatives` returns score and information. A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)
@@ -389,4 +391,4 @@ def climb(
         damping = max(0.1 * damping, 1e-9)
         if gain < settled:
             break
-    return at
+    return at, state

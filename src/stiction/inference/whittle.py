@@ -271,8 +271,8 @@ class Whittle(NamedTuple):
                 best[0] = math.log(scale)
         return best
 
-    def fit(self, start: Array) -> Array:
-        """Return the vector of the greatest likelihood from a start (step 5)."""
+    def fit(self, start: Array) -> tuple[Array, tuple[Model, list[Array]]]:
+        """Return the vector of the greatest likelihood from a start, and `value`'s state there."""
         limits = self.family.limits
         return climb(start, limits, self.value, self.score, longest=LONGEST, settled=SETTLED)
 
@@ -312,13 +312,14 @@ class Whittle(NamedTuple):
             information += (d * weight) @ d.T
         return result, information
 
-    def noise_variance(self, at: Array) -> tuple[float, float]:
+    def noise_variance(
+        self, at: Array, state: tuple[Model, list[Array]]
+    ) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
         The error assumes independent ordinates. It is too small, but in proportion to the
         true error.
         """
-        state = self.value(at)[1]
         model, (_, information) = state[0], self.score(at, state)
         slope = np.zeros(at.size)
         slope[self.family.free.index("variance")] = model.noise_share * model.variance

@@ -54,6 +54,8 @@ FOLDS = 6
 NEAR, FEW = 1, {1: 65, 2: 33}
 """Multiples that need all wavenumbers, and number of wavenumbers per direction for the others."""
 
+SHARES_OF_LINE = np.linspace(0.0, 1.0, FEW[1])
+
 
 class Edge(NamedTuple):
     """Wavenumber at the end of a spectrum, and width of the range over which it fades out,
@@ -79,6 +81,9 @@ class RecordWindow:
         self._lags = np.ix_(
             *[np.r_[:n, m - n : m] for n, m in zip(self.shape, self._period, strict=True)]
         )
+        # 4. wavenumbers of the period over the sampling wavenumber
+        self._of_period = [fft.fftfreq(n) for n in self._period[:-1]]
+        self._of_period.append(fft.rfftfreq(self._period[-1]))
         # 1. orthonormal polynomials of the trend, (points, terms)
         self.basis = _polynomials(measured, degree)
         ones = np.ones(int(measured.sum()))
@@ -165,8 +170,7 @@ class RecordWindow:
             cutoff = max(spectrum.quantile(1.0 - LEFT_OUT, dimensions), *sampling)
         folds = [min(FOLDS, math.ceil(cutoff / s + 0.5)) for s in sampling]
         end = min(cutoff, *(s * (f + 0.5) for s, f in zip(sampling, folds, strict=True)))
-        axes = [s * fft.fftfreq(n) for s, n in zip(sampling, self._period, strict=True)]
-        axes[-1] = sampling[-1] * fft.rfftfreq(self._period[-1])
+        axes = [s * of_period for s, of_period in zip(sampling, self._of_period, strict=True)]
         width = EDGE * max(s / n for s, n in zip(sampling, self._period, strict=True))
         folded = _folded_line if dimensions == 1 else _folded_plane
         total = folded(spectrum, axes, folds, sampling, Edge(end, width))
@@ -214,7 +218,7 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
 
 
 def _fade(k: Array, end: Edge) -> Array:
-    return np.clip((end.at - k) / end.width + 0.5, 0.0, 1.0)
+    return np.minimum(np.maximum((end.at - k) / end.width + 0.5, 0.0), 1.0)
 
 
 def _folded_line(
@@ -224,13 +228,14 @@ def _folded_line(
 
     def added(at: Array, multiples: Array) -> Array:
         k = np.abs(at + multiples[:, None] * sampling[0])
-        return np.sum(spectrum.density(k) * _fade(k, end), axis=0)
+        total: Array = (spectrum.density(k) * _fade(k, end)).sum(axis=0)
+        return total
 
     near = min(folds[0], NEAR)
     line = added(axes[0], np.arange(-near, near + 1))
     if folds[0] > near:  # smooth from there on
         far = np.arange(near + 1, folds[0] + 1)
-        few = np.linspace(0.0, axes[0][-1], FEW[1])
+        few = axes[0][-1] * SHARES_OF_LINE
         line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
     return line
 

@@ -43,6 +43,7 @@ from scipy.special import ndtr
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.jit import jit
+from stiction.random.marginals import frozen
 
 TABLE_END, SMALL_TABLE_END = 8.0, 4.0
 """Largest |z| of a whole table, and of the small table that serves most samples."""
@@ -158,7 +159,7 @@ class Standard(NamedTuple):
     @property
     def distribution(self) -> Any:
         """Frozen distribution of scipy."""
-        return self.family(*self.shapes)
+        return frozen(self.family, *self.shapes)
 
 
 def _standard(marginal: Any) -> tuple[Any, float, float]:
