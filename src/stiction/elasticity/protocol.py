@@ -75,9 +75,7 @@ class Windows(NamedTuple):
     rates: Array  # (count,): smallest unstable weakening rate of each, Pa/m, never rising
     starts: NDArray[np.int64]  # (count,): first node, or `ANYWHERE`
     widths: NDArray[np.int64]  # (count,): number of nodes
-    modes: (
-        Array  # (count or 1, largest width): eigenvectors of unit sum, zero beyond their width
-    )
+    modes: Array  # (count or 1, largest width): eigenvectors of unit sum, zero beyond it
 
 
 _NO_NODES = np.empty(0, dtype=np.int64)

@@ -199,9 +199,8 @@ def intervals(
             float(np.quantile(scale.less(fitted, repetitions), share, method="weibull"))
             for repetitions, share in ((shorter, tail), (longer, 1.0 - tail))
         )
-        if (
-            name == "noise" and high <= 0.0
-        ):  # negative by chance: as wide as for an estimate of 0
+        # A noise that is negative by chance is as wide as an estimate of 0.
+        if name == "noise" and high <= 0.0:
             high -= fitted.noise[0]
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
         result[name] = first, last

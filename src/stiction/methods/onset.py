@@ -1,8 +1,9 @@
 """The onset of given profiles by any method, and the check of a method that approximates another.
 
-`onset`, `monte_carlo`, `infer` and failure probabilities check an approximate method, such as the
-local criterion: they solve some samples by the exact method, too. `exact_counterpart` returns the
-exact method, `may_differ` whether the check is worth its time, and `doubt` a warning.
+`onset`, `monte_carlo`, `infer` and failure probabilities check an approximate
+method, such as the local criterion: they solve some samples by the exact method,
+too. `exact_counterpart` returns the exact method, `may_differ` whether the check
+is worth its time, and `doubt` a warning.
 """
 
 from __future__ import annotations

@@ -2,10 +2,10 @@
 
 Problem
 -------
-A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard normal a.
-The property is v(x) = F^-1(Phi(z(x))) with the marginal F. Values v_k were measured at places
-x_k, with normal errors of standard deviation `noise`. With phi_k = phi(x_k), the posterior of
-the draws has a density proportional to
+A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard
+normal a. The property is v(x) = F^-1(Phi(z(x))) with the marginal F. Values v_k
+were measured at places x_k, with normal errors of standard deviation `noise`.
+With phi_k = phi(x_k), the posterior of the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
@@ -21,29 +21,30 @@ Huijbregts, Mining Geostatistics, 1978). For a caller only the draws change.
 
 Algorithm (`conditioned`)
 -------------------------
-Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17, 2001), then a
-map for the skewness that Gaussians miss:
+Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17,
+2001), then a map for the skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place, as if no other value had been measured.
-2. Replace each l_k by a Gaussian. Choose it so that the product with the normal distribution of
-   z_k given all other values keeps its mean and variance (`Measured.gaussian`, by
-   quadrature).
-3. Find the regression (2) from a singular value decomposition (`_regression`). With the rows
-   |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
-   conditioned even if a smooth field was measured densely. If some p_k are negative, V is turned
-   so that P is diagonal in it, and s^2 stands for the eigenvalues of P^-1 - 1, which may be
-   negative.
-4. Remove the Gaussian of each place from the posterior, which gives z_k given all other values
-   (`_from_others`).
+2. Replace each l_k by a Gaussian. Choose it so that the product with the normal
+   distribution of z_k given all other values keeps its mean and variance
+   (`Measured.gaussian`, by quadrature).
+3. Find the regression (2) from a singular value decomposition (`_regression`).
+   With the rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1
+   + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
+   densely. If some p_k are negative, V is turned so that P is diagonal in it, and
+   s^2 stands for the eigenvalues of P^-1 - 1, which may be negative.
+4. Remove the Gaussian of each place from the posterior, which gives z_k given all
+   other values (`_from_others`).
 5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
-6. Map draws before the regression, so that they have the density (1) instead of its Gaussian
-   approximation (`stiction.random.transport`, which also estimates the remaining
-   error).
-7. Compare the misfit of values and draws at the mean with chi-square, for a warning.
+6. Map draws before the regression, so that they have the density (1) instead of
+   its Gaussian approximation (`stiction.random.transport`, which also estimates
+   the remaining error).
+7. Compare the misfit of values and draws at the mean with chi-square, for a
+   warning.
 
-Departures from Minka: all places are updated at once. If the Gaussians have no posterior (P is not
-positive definite), b and p are reduced by a common factor. In step 4 a place keeps at least half of
-its precision before any measurement.
+Departures from Minka: all places are updated at once. If the Gaussians have no
+posterior (P is not positive definite), b and p are reduced by a common factor. In
+step 4 a place keeps at least half of its precision before any measurement.
 """
 
 from collections.abc import Sequence
@@ -75,18 +76,14 @@ from stiction.random.transport import (
 )
 
 # Limits of errors and warnings
-MAX_CHI_SQUARE = (
-    5.0  # largest chi-square of suitable values, in standard deviations above its mean
-)
+MAX_CHI_SQUARE = 5.0  # of suitable values, in standard deviations above its mean
 MAX_POSTERIOR_ERROR = 0.1  # standard deviations of z by which a posterior may be off
 MAX_ERRORS_OUTSIDE = 4.0  # errors by which a measured value may lie beyond a bound
 
 # Quadrature of step 2
 MAX_Z = 37.0  # largest z whose tail of the normal distribution is a float
-HALF_WIDTH, RANGE_NODES = (
-    8.0,
-    49,
-)  # half a range in standard deviations, and nodes across the range
+HALF_WIDTH = 8.0  # half a range, in standard deviations
+RANGE_NODES = 49  # across a range
 MIN_END_FALL = 18.0  # fall of a log density from its peak to the ends of a complete range
 MAX_NARROWINGS = 6  # of a range around a peak, each to two of its intervals at least
 MIN_HALF_RANGE = 1e-12

@@ -3,10 +3,12 @@
 A mixture behaves as a single random interface, so that one search for failures
 covers all members.
 
-1. Collect the draws of all members. Members share a draw for the same property and mode
-   (`_columns`).
-2. A first draw, mapped to a uniform number, selects the member (`EquallyLikely.member`).
-3. The member maps its share of the other draws to profiles (`EquallyLikely.from_draws`).
+1. Collect the draws of all members. Members share a draw for the same property
+   and mode (`_columns`).
+2. A first draw, mapped to a uniform number, selects the member
+   (`EquallyLikely.member`).
+3. The member maps its share of the other draws to profiles
+   (`EquallyLikely.from_draws`).
 """
 
 from collections.abc import Mapping, Sequence

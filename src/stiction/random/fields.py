@@ -8,9 +8,10 @@ Algorithm (`RandomInterface.from_draws`)
 ----------------------------------------
 1. Condition the draws on measured values, group by group of correlated properties
    (`conditioning`).
-2. Combine a property's own draws with the draws of earlier properties by the Cholesky factor of
-   the correlation matrix (`lower_factor`).
-3. Synthesise the Gaussian field z from its modes (`modes`), and map it to the marginal (`mapping`).
+2. Combine a property's own draws with the draws of earlier properties by the
+   Cholesky factor of the correlation matrix (`lower_factor`).
+3. Synthesise the Gaussian field z from its modes (`modes`), and map it to the
+   marginal (`mapping`).
 4. Multiply by the factors between specimens, which are a draw each.
 """
 

@@ -2,8 +2,8 @@
 
 Problem
 -------
-A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995) is v(x) = g(z(x))
-with
+A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995) is v(x) =
+g(z(x)) with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
@@ -16,22 +16,27 @@ with the orthonormal Hermite polynomials h_m of a standard normal Z.
 
 Algorithm of the mapping (`from_normal`): our own
 -------------------------------------------------
-1. Reduce the marginal to its family at scale 1, so that all multiples share a table
-   (`_standard`).
-2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes by central
-   differences of fourth order. Check every piece at three points, and mark pieces
-   that miss `TABLE_RTOL`, for example at a kink of the density
+1. Reduce the marginal to its family at scale 1, so that all multiples share a
+   table (`_standard`).
+2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes
+   by central differences of fourth order. Check every piece at three points, and
+   mark pieces that miss `TABLE_RTOL`, for example at a kink of the density
    (`quantile_table`).
-3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece, go to a second
-   table of [-8, 8]. Values that it does not serve go to scipy.
+3. Interpolate (`interpolate`). Values of z outside the table, or on a marked
+   piece, go to a second table of [-8, 8]. Values that it does not serve go to
+   scipy.
 
-The relative error is at most 1e-9, or the absolute error 1e-15 standard deviations.
+The relative error is at most 1e-9, or the absolute error 1e-15 standard
+deviations.
 
 Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------
-4. Compute c_m of (2) by the trapezoidal rule on [-8, 8], and the polynomials by their recursion.
-5. Stop after at least `MIN_TERMS`, once the rest of the variance is a small share.
-6. Let a last coefficient stand for the rest, so that the correlation is 1 at zero lag.
+4. Compute c_m of (2) by the trapezoidal rule on [-8, 8], and the polynomials by
+   their recursion.
+5. Stop after at least `MIN_TERMS`, once the rest of the variance is a small
+   share.
+6. Let a last coefficient stand for the rest, so that the correlation is 1 at zero
+   lag.
 """
 
 from functools import lru_cache

@@ -1,7 +1,8 @@
 """Marginals: distributions of a property at a point.
 
-To add a family, derive from `Marginal`, define `distribution`, and `register` the class. Study
-files also take every continuous distribution of `scipy.stats` by its name.
+To add a family, derive from `Marginal`, define `distribution`, and `register` the
+class. Study files also take every continuous distribution of `scipy.stats` by its
+name.
 """
 
 import math

@@ -2,19 +2,19 @@
 
 Problem
 -------
-On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the spectral
-density g(k) and its truncation K, their amplitudes have the variances
+On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the
+spectral density g(k) and its truncation K, their amplitudes have the variances
 
     sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (1)
 
 Algorithm (`make_modes`)
 ------------------------
-1. List candidate wave vectors, either k or -k, in an order that depends on the proportions of the
-   interface only. The place of a mode in this order is the number of its draws
-   (`_numbers`).
+1. List candidate wave vectors, either k or -k, in an order that depends on the
+   proportions of the interface only. The place of a mode in this order is the
+   number of its draws (`_numbers`).
 2. Keep the wave vectors up to the truncation.
-3. Compute (1). The mean mode k = 0 stands for a single wave vector, every other mode for k and -k.
-   The mean mode therefore has half of g(0).
+3. Compute (1). The mean mode k = 0 stands for a single wave vector, every other
+   mode for k and -k. The mean mode therefore has half of g(0).
 """
 
 import math

@@ -7,9 +7,9 @@ With a density g(k), the correlation of z on a line at the lag x is
 K being the truncation. Samples have the truncated spectrum, so correlations and
 lengths refer to the truncated spectrum, too.
 
-1. Integrate (1) octave by octave, because densities span decades, by QUADPACK's rule for a cosine
-   (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D. Kahaner, QUADPACK, 1983)
-   (`_integrate`).
+1. Integrate (1) octave by octave, because densities span decades, by QUADPACK's
+   rule for a cosine (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D.
+   Kahaner, QUADPACK, 1983) (`_integrate`).
 2. Find the length at which the correlation falls to 1/e by marching and a search
    (`lag_of_correlation`).
 

@@ -4,10 +4,11 @@
 the residual strength, by our own algorithm:
 
 1. Replace the residual strength by equally likely values.
-2. Multiply or divide them by equally likely values of each factor on only one of the two strengths:
-   factors between specimens, and the pressure on coefficients.
-3. Average the distribution function of the strength over these values. If the two strengths are
-   correlated, take the distribution of the strength given the residual strength.
+2. Multiply or divide them by equally likely values of each factor on only one of
+   the two strengths: factors between specimens, and the pressure on coefficients.
+3. Average the distribution function of the strength over these values. If the two
+   strengths are correlated, take the distribution of the strength given the
+   residual strength.
 """
 
 import math

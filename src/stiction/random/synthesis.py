@@ -2,8 +2,8 @@
 
 Problem
 -------
-Compute the spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44,
-1991)
+Compute the spectral representation (M. Shinozuka and G. Deodatis, Applied
+Mechanics Reviews 44, 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
@@ -13,19 +13,21 @@ batch, the number of workers, the spectrum or the grid.
 
 Draws (`Stream.draw`)
 ---------------------
-1. Samples of a line come in blocks of 256 that share a generator, because a generator for each
-   sample would cost more than the sample. A sample of a plane has so many modes
-   that it is a block of its own. The generator depends on the seed, the property
-   and the number of the block.
-2. Inside a block the draws run mode after mode, A_j before B_j, so that a spectrum with more modes
-   extends the same field. Draws of modes outside the spectrum are dropped.
+1. Samples of a line come in blocks of 256 that share a generator, because a
+   generator for each sample would cost more than the sample. A sample of a plane
+   has so many modes that it is a block of its own. The generator depends on the
+   seed, the property and the number of the block.
+2. Inside a block the draws run mode after mode, A_j before B_j, so that a
+   spectrum with more modes extends the same field. Draws of modes outside the
+   spectrum are dropped.
 
 Field (`synthesise`)
 --------------------
-3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k, into the half of the
-   wave vectors that a real transform holds. Fold unresolved modes onto resolved
-   modes, so that values at the nodes are exact on any grid.
-4. Transform back, sample by sample, so that the numbers do not depend on the batch.
+3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k,
+   into the half of the wave vectors that a real transform holds. Fold unresolved
+   modes onto resolved modes, so that values at the nodes are exact on any grid.
+4. Transform back, sample by sample, so that the numbers do not depend on the
+   batch.
 """
 
 from typing import Any, NamedTuple

@@ -2,9 +2,9 @@
 
 Problem
 -------
-A regression has replaced the likelihood of each measured value by a Gaussian. In the
-Gaussian posterior that follows, the field at place k is z_k = m_k + a_k'w with standard
-normal w. The exact posterior of w has a density proportional to
+A regression has replaced the likelihood of each measured value by a Gaussian. In
+the Gaussian posterior that follows, the field at place k is z_k = m_k + a_k'w
+with standard normal w. The exact posterior of w has a density proportional to
 
     N(w) prod_k r_k(z_k),                                                                     (1)
 
@@ -12,10 +12,10 @@ where r_k is the likelihood of value k divided by the Gaussian that replaced it.
 
 Algorithm
 ---------
-A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals of
-Mathematical Statistics 23, 1952). The coordinate u_j'w is moved, quantile by quantile, from
-the standard normal distribution to that of a coordinate e_j with the density, up to a
-constant,
+A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals
+of Mathematical Statistics 23, 1952). The coordinate u_j'w is moved, quantile by
+quantile, from the standard normal distribution to that of a coordinate e_j with
+the density, up to a constant,
 
     p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
 
@@ -31,22 +31,23 @@ Preparation (`make_transport`):
    coefficients shows how far the posterior at a place is from the Gaussian.
    Ignore the places with the smallest norms, which together stay below
    `IGNORED_TOTAL`.
-2. Choose the directions greedily. The candidates are the a_k of the places that differ most
-   from the Gaussian, made orthogonal to the directions chosen before. Choose the
-   candidate on which the expansions of all places together have the largest
-   projection.
-3. Tabulate the factors of (2) along each direction. A place that depends noticeably on
-   earlier coordinates has a table of its own, over its mean given e_1 to e_j. The
-   other places share a table over e_j, with earlier coordinates at zero.
-4. Estimate the remaining error: map samples, weight them by (1) divided by their density,
-   and compare weighted and plain moments of z.
+2. Choose the directions greedily. The candidates are the a_k of the places that
+   differ most from the Gaussian, made orthogonal to the directions chosen before.
+   Choose the candidate on which the expansions of all places together have the
+   largest projection.
+3. Tabulate the factors of (2) along each direction. A place that depends
+   noticeably on earlier coordinates has a table of its own, over its mean given
+   e_1 to e_j. The other places share a table over e_j, with earlier coordinates
+   at zero.
+4. Estimate the remaining error: map samples, weight them by (1) divided by their
+   density, and compare weighted and plain moments of z.
 
 Map of a draw (`transport`), for each direction in turn:
 
 5. Add up the tables on a grid of e_j, which gives the logarithm of (2).
 6. Integrate the density over each cell, taking its logarithm as linear there.
-7. Find the quantile, starting from the nearer end so that tails keep their digits, and move
-   w along u_j by the difference.
+7. Find the quantile, starting from the nearer end so that tails keep their
+   digits, and move w along u_j by the difference.
 """
 
 import math

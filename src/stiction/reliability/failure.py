@@ -670,9 +670,8 @@ def curve_of(
         )
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
     table["members"] = np.array(members)
-    survive = np.isinf(
-        table["stress"]
-    )  # so many samples survive that no stress has this chance
+    # So many samples survive that no stress has this chance.
+    survive = np.isinf(table["stress"])
     for values in table.values():
         values[survive] = np.nan
     known = {

@@ -80,9 +80,8 @@ def sensitivities(
     """Return the stress of a probability at both ends of each source, the largest effect first."""
     experiment = state.experiment
     problem, random = experiment.problem, experiment.random
-    if getattr(
-        random, "constants", ()
-    ):  # all at their values, because their ranges are sources
+    # Constants are all at their values, because their ranges are sources.
+    if getattr(random, "constants", ()):
         random = replace(random, constants=())
     rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
     with collect_warnings():

@@ -2,23 +2,27 @@
 
 Problem
 -------
-s is the strength less initial stress (Pa), p the load profile, and y the weights of a window
-(`windows`). The window centred at x becomes unstable by itself at the load <s, y>_x/<p, y>_x. Find
-the least load over all x and all windows. On a line, x may lie between the nodes. On a plane the
-load is taken at the nodes, which is exact for the discrete problem, and only its place is
-interpolated.
+s is the strength less initial stress (Pa), p the load profile, and y the weights
+of a window (`windows`). The window centred at x becomes unstable by itself at the
+load <s, y>_x/<p, y>_x. Find the least load over all x and all windows. On a line,
+x may lie between the nodes. On a plane the load is taken at the nodes, which is
+exact for the discrete problem, and only its place is interpolated.
 
 Algorithm
 ---------
 1. Averages at all nodes by Fourier transform (`averages`).
-2. On a plane, take the lowest node. A parabola through its neighbours gives the place.
-3. On a line, estimate by a parabola through each local minimum of the nodes how low the function
-   falls there, and by how much the parabola may be wrong (`_estimates`).
-4. In the lowest of them, and in any other that may be lower, take the minimum of the polynomials
-   through `STENCIL` nodes in the cells on both sides of the node (`_minimum_near`).
+2. On a plane, take the lowest node. A parabola through its neighbours gives the
+   place.
+3. On a line, estimate by a parabola through each local minimum of the nodes how
+   low the function falls there, and by how much the parabola may be wrong
+   (`_estimates`).
+4. In the lowest of them, and in any other that may be lower, take the minimum of
+   the polynomials through `STENCIL` nodes in the cells on both sides of the node
+   (`_minimum_near`).
 
-Round-off may exceed bounds that hold for the exact average, and so may the polynomials, which ring
-at jumps of the strength. Values are therefore cut at these bounds.
+Round-off may exceed bounds that hold for the exact average, and so may the
+polynomials, which ring at jumps of the strength. Values are therefore cut at
+these bounds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -55,9 +59,8 @@ def averages(
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
     if interface.breakable is not None:
-        excess = np.where(
-            interface.breakable, excess, 0.0
-        )  # whatever is finite: it has no effect
+        # Any finite value will do: the local criterion leaves these nodes out.
+        excess = np.where(interface.breakable, excess, 0.0)
         places = (places_of(interface, y) for y in windows)
         p_y = [np.where(at, scale, 0.0) for at, scale in zip(places, p_y, strict=True)]
     for strength in excess:

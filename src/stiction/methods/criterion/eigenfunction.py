@@ -2,9 +2,10 @@
 
 Problem
 -------
-K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003, equation 14): a patch of half-length a is
-just unstable if the slip rate v solves an eigenproblem on [-1, 1], with W a/G* = lambda_0. The
-weight g of the local criterion is v with unit integral,
+K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003, equation 14): a patch of
+half-length a is just unstable if the slip rate v solves an eigenproblem on [-1,
+1], with W a/G* = lambda_0. The weight g of the local criterion is v with unit
+integral,
 
     g(cos t) = sum over odd m of b_m sin(m t),  b_m = 2 a_m/pi,  a_1 = 1.
 
@@ -15,8 +16,9 @@ Algorithm
 ---------
 1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
 2. The midpoint rule gives the transform of g (`multiplier`).
-3. The weights of nodes inside the patch are samples of g. The weights at its ends are fitted to the
-   transform, by least squares among weights that are not negative (`grid_weights`).
+3. The weights of nodes inside the patch are samples of g. The weights at its ends
+   are fitted to the transform, by least squares among weights that are not
+   negative (`grid_weights`).
 """
 
 from functools import lru_cache

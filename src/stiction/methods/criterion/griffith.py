@@ -2,10 +2,11 @@
 
 Problem
 -------
-A crack of half-length a lies on a periodic line (period L, modulus G*) between two identical
-half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L) and tan(pi (x - centre)/L) =
-U cos t its stress intensity factors at both tips (H. Bueckner, Zeitschrift fuer Angewandte
-Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959) are
+A crack of half-length a lies on a periodic line (period L, modulus G*) between
+two identical half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L)
+and tan(pi (x - centre)/L) = U cos t its stress intensity factors at both tips (H.
+Bueckner, Zeitschrift fuer Angewandte Mathematik und Mechanik 50, 1970; W. Koiter,
+Ingenieur-Archiv 28, 1959) are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
@@ -14,10 +15,11 @@ fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
-1. Gauss and Chebyshev's rule for (1), with D linear between the nodes (`_intensity_factors`). K is
-   linear in D, so that one evaluation serves all loads.
-2. Bracket the crossings of G with the fracture energy at lengths one node apart, and at shorter
-   ones near zero. Bisect them (`griffith_length`).
+1. Gauss and Chebyshev's rule for (1), with D linear between the nodes
+   (`_intensity_factors`). K is linear in D, so that one evaluation serves all
+   loads.
+2. Bracket the crossings of G with the fracture energy at lengths one node apart,
+   and at shorter ones near zero. Bisect them (`griffith_length`).
 """
 
 from typing import Any

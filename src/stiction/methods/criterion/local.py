@@ -1,10 +1,11 @@
 """The local criterion: the onset at the weakest patch, with each patch taken by itself.
 
 1. Find the critical windows of the weakening rate (`windows`).
-2. Take the least average of strength over load, over windows and places (`average`). On a specimen
-   every place has a window of its own (`elasticity.weakest`).
-3. Behind a machine, subtract an estimate of the stress that slip takes off before the onset
-   (`_relief_of_patch`).
+2. Take the least average of strength over load, over windows and places
+   (`average`). On a specimen every place has a window of its own
+   (`elasticity.weakest`).
+3. Behind a machine, subtract an estimate of the stress that slip takes off before
+   the onset (`_relief_of_patch`).
 """
 
 from collections.abc import Callable, Iterator

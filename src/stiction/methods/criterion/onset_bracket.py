@@ -12,22 +12,25 @@ how much it is off.
 
 Algorithm
 ---------
-The entries of K off the diagonal are not positive, and strength falls with slip. So the slip of the
-least equilibrium can be built up from zero and never has to be taken back (R. Chandrasekaran,
-Opsearch 7, 1970, for linear problems). `slides` starts from d = 0:
+The entries of K off the diagonal are not positive, and strength falls with slip.
+So the slip of the least equilibrium can be built up from zero and never has to be
+taken back (R. Chandrasekaran, Opsearch 7, 1970, for linear problems). `slides`
+starts from d = 0:
 
 1. Compute the overstress f = tau_i + tau_0 p - K d - strength, Pa.
-2. The interface slides if the load exceeds the mean strength, or if a run of residual nodes is so
-   long that no fracture energy can stop a crack of this length (Griffith, 1921).
-3. Let S be the nodes that slip or are overstressed. If no node is overstressed, d is an
-   equilibrium.
-4. Newton's method: d_S grows by x with (K - W)_SS x = f, up to the first node that reaches its
-   residual strength.
-5. If K - W is not positive definite on S, a patch is unstable. A few steps with frozen strengths,
-   K_SS x = f, follow. They never pass the least equilibrium.
+2. The interface slides if the load exceeds the mean strength, or if a run of
+   residual nodes is so long that no fracture energy can stop a crack of this
+   length (Griffith, 1921).
+3. Let S be the nodes that slip or are overstressed. If no node is overstressed, d
+   is an equilibrium.
+4. Newton's method: d_S grows by x with (K - W)_SS x = f, up to the first node
+   that reaches its residual strength.
+5. If K - W is not positive definite on S, a patch is unstable. A few steps with
+   frozen strengths, K_SS x = f, follow. They never pass the least equilibrium.
 
-Departures from the source: strength has a corner, and steps end at a tolerance. If thousands of
-nodes slip the question stays undecided, as each step solves a dense system.
+Departures from the source: strength has a corner, and steps end at a tolerance.
+If thousands of nodes slip the question stays undecided, as each step solves a
+dense system.
 """
 
 import numpy as np

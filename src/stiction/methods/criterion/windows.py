@@ -2,27 +2,28 @@
 
 Problem
 -------
-K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of nodes on which the
-lowest eigenvalue of K is at most W, and y > 0 the eigenvector, with unit sum. With all other nodes
-held, slip on it is unstable from the load <s, y>/<p, y> on, where s is the strength less initial
-stress (Pa) and p the load profile. If K has no positive entry off its diagonal, y is a multiplier
-of the whole interface, so that this load bounds the onset from above as long as no node reaches its
-residual strength.
+K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of
+nodes on which the lowest eigenvalue of K is at most W, and y > 0 the eigenvector,
+with unit sum. With all other nodes held, slip on it is unstable from the load <s,
+y>/<p, y> on, where s is the strength less initial stress (Pa) and p the load
+profile. If K has no positive entry off its diagonal, y is a multiplier of the
+whole interface, so that this load bounds the onset from above as long as no node
+reaches its residual strength.
 
 Algorithm
 ---------
-On a line the window is the nucleation length h_n, and y the eigenfunction of K. Uenishi and J. R.
-Rice (J. Geophys. Res. 108, 2003) as weights of the nodes (`eigenfunction`). On a plane it is an
-ellipse, for each of five aspects:
+On a line the window is the nucleation length h_n, and y the eigenfunction of K.
+Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights of the nodes
+(`eigenfunction`). On a plane it is an ellipse, for each of five aspects:
 
-1. Start with a small box of nodes of the plane, made periodic with the stiffness between its own
-   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the
-   problem on an ellipse of at most half the length of the box stays the same. The
-   cost follows the size of the ellipse, not of the plane.
-2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at most W
-   (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
-3. If every ellipse in the box is stable, double the box and go to 2. If the box is the plane
-   already, the window does not fit.
+1. Start with a small box of nodes of the plane, made periodic with the stiffness
+   between its own nodes. A block of a Toeplitz matrix is a block of a circulant
+   matrix, so the problem on an ellipse of at most half the length of the box
+   stays the same. The cost follows the size of the ellipse, not of the plane.
+2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at
+   most W (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
+3. If every ellipse in the box is stable, double the box and go to 2. If the box
+   is the plane already, the window does not fit.
 
 For nu = 0 the critical disc has radius 2.0061 G/(2W).
 """

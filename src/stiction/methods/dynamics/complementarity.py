@@ -14,22 +14,23 @@ with u it may pass to another line. w is the rate at which the node weakens
 
 Algorithm (`solve_increment`)
 -----------------------------
-A semismooth Newton iteration, in the form of a primal-dual active set (M. Hintermueller, K.
-Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
+A semismooth Newton iteration, in the form of a primal-dual active set (M.
+Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
 
-1. Begin with the set S of nodes that slip already or whose trial stress is above their strength,
-   on the straight lines of the first guess.
-2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`). This uses the
-   conjugate gradients by M. Hestenes and E. Stiefel (Journal of Research of the
-   National Bureau of Standards 49, 1952), preconditioned with M^-1, cut to S.
-   Letters are theirs: residual r, direction p, z = M^-1 r.
-3. Nodes outside S whose stress is above their strength join S, and nodes with u < 0 leave it.
-   Every node takes the straight line that belongs to its u.
+1. Begin with the set S of nodes that slip already or whose trial stress is above
+   their strength, on the straight lines of the first guess.
+2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`).
+   This uses the conjugate gradients by M. Hestenes and E. Stiefel (Journal of
+   Research of the National Bureau of Standards 49, 1952), preconditioned with
+   M^-1, cut to S. Letters are theirs: residual r, direction p, z = M^-1 r.
+3. Nodes outside S whose stress is above their strength join S, and nodes with u <
+   0 leave it. Every node takes the straight line that belongs to its u.
 4. Repeat from 2 until no node changes.
 
-Departures: a direction of negative curvature (a patch that is unstable at this size of the step)
-ends the search without a result, and so do too many iterations. For a curved law a node counts as
-changed only if its strength moves by more than a bound.
+Departures: a direction of negative curvature (a patch that is unstable at this
+size of the step) ends the search without a result, and so do too many iterations.
+For a curved law a node counts as changed only if its strength moves by more than
+a bound.
 """
 
 from typing import Any

@@ -2,7 +2,8 @@
 
 Problem
 -------
-Waves carry the stress that is out of balance, so the mean stress of the interface is
+Waves carry the stress that is out of balance, so the mean stress of the interface
+is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
@@ -20,22 +21,25 @@ an instability. So the fall that counts is
 Algorithm, after each step of a run (`observe`)
 -----------------------------------------------
 1. Compute the fall (2).
-2. While <tau> is practically at its maximum, the fastest node is the place of the maximum.
-   At slow loading all creeping patches are about equally slow at the maximum.
-   Only just after it is the unstable patch faster.
-3. An instability ends when <tau> rises above the maximum at which it began. It was arrested if
-   a node slipped faster than `Thresholds.unstable_rate`, which the waves of an
-   earlier instability do not reach. The present <tau> is the next maximum.
-   (Explicit steps also end an instability when all is calm, see `explicit`.)
-4. Between instabilities a higher <tau> is the next maximum, and a fall by `EVENT_DROP` begins an
-   instability. The onset is the instability with the highest maximum so far.
-5. Note <tau> once all nodes that can break are at their residual strength. From then on no
-   instability can begin. Reaching this state is no instability by itself, as the
-   last nodes beside the end of an extent may creep to it.
+2. While <tau> is practically at its maximum, the fastest node is the place of the
+   maximum. At slow loading all creeping patches are about equally slow at the
+   maximum. Only just after it is the unstable patch faster.
+3. An instability ends when <tau> rises above the maximum at which it began. It
+   was arrested if a node slipped faster than `Thresholds.unstable_rate`, which
+   the waves of an earlier instability do not reach. The present <tau> is the next
+   maximum. (Explicit steps also end an instability when all is calm, see
+   `explicit`.)
+4. Between instabilities a higher <tau> is the next maximum, and a fall by
+   `EVENT_DROP` begins an instability. The onset is the instability with the
+   highest maximum so far.
+5. Note <tau> once all nodes that can break are at their residual strength. From
+   then on no instability can begin. Reaching this state is no instability by
+   itself, as the last nodes beside the end of an extent may creep to it.
 
-Two consequences. A maximum without such a fall after it, such as the largest load or the stress
-that returns when slip dies, is no instability. If the stress is above the strength at the start,
-the maximum is the mean stress before the first slip, with which a run begins (`Run.start`).
+Two consequences. A maximum without such a fall after it, such as the largest load
+or the stress that returns when slip dies, is no instability. If the stress is
+above the strength at the start, the maximum is the mean stress before the first
+slip, with which a run begins (`Run.start`).
 """
 
 from typing import Any, NamedTuple

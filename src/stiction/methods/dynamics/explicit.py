@@ -2,10 +2,10 @@
 
 Problem
 -------
-Advance equations (1) and (2) of `state` by a step h: slip d, slip rate V and stress tau at the
-nodes, and the memory variables y of `memory` at the modes. Let f_hat(d_hat, V_hat) be the stress
-transferred at the end of the step if a slip rate V_hat acts for the whole step and leads to the
-slip d_hat:
+Advance equations (1) and (2) of `state` by a step h: slip d, slip rate V and
+stress tau at the nodes, and the memory variables y of `memory` at the modes. Let
+f_hat(d_hat, V_hat) be the stress transferred at the end of the step if a slip
+rate V_hat acts for the whole step and leads to the slip d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 
@@ -16,15 +16,18 @@ strength s(d):
 
 Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
 ----------------------------------------------------------------------------------
-1. Predict: the present rate V_0 acts for the step (`_transfer`), and (2) gives V* at its end
-   (`_predict`).
-2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows by h times
-   this mean, and (2) gives the rate and the stress at the end (`_correct`).
-3. Advance slip and memory of the modes by the same mean (`memory.advance_memory`).
-4. Update the diagnostics (`diagnostics`). Return if the run ends here, or if all is so calm that
-   implicit steps can take over (`_calm`).
+1. Predict: the present rate V_0 acts for the step (`_transfer`), and (2) gives V*
+   at its end (`_predict`).
+2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows
+   by h times this mean, and (2) gives the rate and the stress at the end
+   (`_correct`).
+3. Advance slip and memory of the modes by the same mean
+   (`memory.advance_memory`).
+4. Update the diagnostics (`diagnostics`). Return if the run ends here, or if all
+   is so calm that implicit steps can take over (`_calm`).
 
-The step is stable below the limit of `medium.largest_step`. By (2) a node cannot slip backwards.
+The step is stable below the limit of `medium.largest_step`. By (2) a node cannot
+slip backwards.
 """
 
 from typing import Any

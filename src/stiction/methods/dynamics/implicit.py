@@ -2,9 +2,10 @@
 
 Problem
 -------
-Advance equations (1) and (2) of `state` by a step h. The unknowns are the slip increments u >= 0.
-Let u/h be the mean slip rate of this step, V' the mean rate of the step before it, h' the size of
-that step, and r = h/(h + h'). To second order the slip rate at the end of the step is
+Advance equations (1) and (2) of `state` by a step h. The unknowns are the slip
+increments u >= 0. Let u/h be the mean slip rate of this step, V' the mean rate of
+the step before it, h' the size of that step, and r = h/(h + h'). To second order
+the slip rate at the end of the step is
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
@@ -21,17 +22,17 @@ problem of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
-1. Choose a size: as proposed, smaller if the load would rise too much, or cut short at a turning
-   point of the load or at the end time (`_choose_size`).
+1. Choose a size: as proposed, smaller if the load would rise too much, or cut
+   short at a turning point of the load or at the end time (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
-4. Go to 1 with half the size if no u is found (a patch is unstable at this size), if a node
-   weakens too much (`_effect`), or if the interface accelerates too much
-   (`_accelerates`). If half the size is below the smallest size, explicit steps
-   take over.
+4. Go to 1 with half the size if no u is found (a patch is unstable at this size),
+   if a node weakens too much (`_effect`), or if the interface accelerates too
+   much (`_accelerates`). If half the size is below the smallest size, explicit
+   steps take over.
 5. Take the step (`_accept`), and update the diagnostics (`diagnostics`).
-6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes change by powers of
-   sqrt 2, so that tables can be used again.
+6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes
+   change by powers of sqrt 2, so that tables can be used again.
 """
 
 from typing import Any, NamedTuple

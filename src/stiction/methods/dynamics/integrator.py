@@ -2,12 +2,14 @@
 
 A run goes through phases (`Run.take_steps`):
 
-1. It begins at rest at the first slip, or at an equilibrium (`Run.start`). Implicit steps
-   come first, unless the stress is above the strength by more than round-off.
-2. Implicit steps follow creep until their size falls below `Thresholds.smallest_step`. Then
-   the memory is rescaled and explicit steps go on (`_to_explicit`).
-3. Explicit steps follow waves until all has been calm for a while. Then implicit steps go on,
-   the first of them of first order (`_to_implicit`).
+1. It begins at rest at the first slip, or at an equilibrium (`Run.start`).
+   Implicit steps come first, unless the stress is above the strength by more than
+   round-off.
+2. Implicit steps follow creep until their size falls below
+   `Thresholds.smallest_step`. Then the memory is rescaled and explicit steps go
+   on (`_to_explicit`).
+3. Explicit steps follow waves until all has been calm for a while. Then implicit
+   steps go on, the first of them of first order (`_to_implicit`).
 4. The run ends for one of the reasons of `Run.ending`.
 """
 

@@ -2,21 +2,22 @@
 
 Problem of the time step (`largest_step`)
 -----------------------------------------
-An interface that slides freely carries undamped Rayleigh waves, and the shortest of them limit
-the explicit step h. Let the state of a mode be |k| slip, V/c_s and the memory variables. Then a
-step of `explicit` is a matrix that depends on kappa = |k| c_s h only (`amplification`). Find the
-largest kappa up to which no eigenvalue of the matrix is larger than 1.
+An interface that slides freely carries undamped Rayleigh waves, and the shortest
+of them limit the explicit step h. Let the state of a mode be |k| slip, V/c_s and
+the memory variables. Then a step of `explicit` is a matrix that depends on kappa
+= |k| c_s h only (`amplification`). Find the largest kappa up to which no
+eigenvalue of the matrix is larger than 1.
 
 Algorithm: our own
 ------------------
-1. Raise kappa in steps of 0.1 until an eigenvalue is larger than 1 (`_largest_kappa`). If it is
-   larger after the first step, the error of the memory kernel makes long waves
-   grow, and no step is stable.
+1. Raise kappa in steps of 0.1 until an eigenvalue is larger than 1
+   (`_largest_kappa`). If it is larger after the first step, the error of the
+   memory kernel makes long waves grow, and no step is stable.
 2. Bisect between the last two values of kappa.
-3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the rim of the
-   rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in their share
-   of mode II. The waves on the axes and in the corner are the first to grow, so
-   take the smallest of their steps.
+3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the
+   rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in
+   their share of mode II. The waves on the axes and in the corner are the first
+   to grow, so take the smallest of their steps.
 """
 
 import dataclasses
@@ -177,9 +178,7 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
     low, high = 0.0, _KAPPA_STEP
     while high < _MAX_KAPPA and _stable(high, kernel, stiffness):
         low, high = high, high + _KAPPA_STEP
-    if (
-        low == 0.0
-    ):  # long waves grow by an error of the kernel, which a smaller step cannot mend
+    if low == 0.0:  # a smaller step cannot mend an error of the kernel
         return 0.0
     # 2. Bisect.
     for _ in range(_BISECTIONS):

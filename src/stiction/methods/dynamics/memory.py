@@ -6,7 +6,8 @@ Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the convoluti
 
     S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
 
-It is therefore enough to know a memory variable for each pair (s_p, w_p) and mode,
+It is therefore enough to know a memory variable for each pair (s_p, w_p) and
+mode,
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
@@ -16,12 +17,13 @@ w_p. The pairs of mode III follow, with the weight (1 - (kx/k)²) w_p.
 
 Algorithm
 ---------
-Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of Computational
-Physics 176, 2002): psi' = z/h psi + V is integrated exactly for a slip rate that is a
-polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
+Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of
+Computational Physics 176, 2002): psi' = z/h psi + V is integrated exactly for a
+slip rate that is a polynomial in a step h. With z = s_p |k| c_s h, E = exp(z),
+and phi(z) = (exp(z) - 1)/z:
 
-1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h phi(z). The variables are
-   stored as y = psi/B, which saves a multiplication in each pass:
+1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h phi(z). The
+   variables are stored as y = psi/B, which saves a multiplication in each pass:
 
        y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
 
@@ -40,14 +42,15 @@ polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z)
 
 Layout
 ------
-Variables lie in blocks of 64 modes, so that the sums of a pass stay in registers. Tables have an
-entry for each wave vector with different waves: on a line k > 0, on a plane kx >= 0 and ky >= 0,
-because (kx, ky) and (-kx, ky) have the same |k| and share of mode II. On a plane an entry therefore
-has multiplicity 2. Entries are padded to whole blocks. Tables are packed as [block][pair][row][64],
-Fourier arrays as [block][copy][real, imaginary][64] and memory variables as
-[block][copy][pair][4][64]. The four rows are the memory that belongs to the real signal (real and
-imaginary part), then to the imaginary signal. The constant row length lets the compiler vectorise
-without run-time checks for overlap.
+Variables lie in blocks of 64 modes, so that the sums of a pass stay in registers.
+Tables have an entry for each wave vector with different waves: on a line k > 0,
+on a plane kx >= 0 and ky >= 0, because (kx, ky) and (-kx, ky) have the same |k|
+and share of mode II. On a plane an entry therefore has multiplicity 2. Entries
+are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier
+arrays as [block][copy][real, imaginary][64] and memory variables as
+[block][copy][pair][4][64]. The four rows are the memory that belongs to the real
+signal (real and imaginary part), then to the imaginary signal. The constant row
+length lets the compiler vectorise without run-time checks for overlap.
 """
 
 from typing import Any

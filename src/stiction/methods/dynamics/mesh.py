@@ -2,28 +2,32 @@
 
 Problem
 -------
-Discretise the elasticity of a block for waves (`waves`), on rows of nodes above the interface. The
-static response must agree with the closed form of `elasticity.blocks`.
+Discretise the elasticity of a block for waves (`waves`), on rows of nodes above
+the interface. The static response must agree with the closed form of
+`elasticity.blocks`.
 
 Grid
 ----
-Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the interface. Beyond
-the outer columns half a cell remains, in which s_xx and s_xy vanish: a strip that only resists
-stretching along y. Rows are dx apart at the interface and up to five times as much above.
+Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the
+interface. Beyond the outer columns half a cell remains, in which s_xx and s_xy
+vanish: a strip that only resists stretching along y. Rows are dx apart at the
+interface and up to five times as much above.
 
 Elements (`_elements`)
 ----------------------
-Elements are bilinear. An element with the sides a and b has mean strains and two hourglass modes.
-Exact integration gives the energy of the means as a b (s . e)/2, and the energy of an hourglass as
-(c_11 b/a + G a/b)/24 times the square of u_00 - u_10 - u_01 + u_11, likewise for v. In mode III
-there is only u: c_11 is G, and the other coefficients are zero.
+Elements are bilinear. An element with the sides a and b has mean strains and two
+hourglass modes. Exact integration gives the energy of the means as a b (s . e)/2,
+and the energy of an hourglass as (c_11 b/a + G a/b)/24 times the square of u_00 -
+u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11 is G, and
+the other coefficients are zero.
 
 Algorithm (`make_mesh`)
 -----------------------
 1. Place the rows, and find elements, masses and the stencils that move nodes.
-2. Condense the static response: eliminate the rows from the top downwards (`condensed`).
-3. Correct it: the difference of K between the closed form and the mesh acts on the slip of the
-   interface.
+2. Condense the static response: eliminate the rows from the top downwards
+   (`condensed`).
+3. Correct it: the difference of K between the closed form and the mesh acts on
+   the slip of the interface.
 4. Find the stable step of mesh, viscosity and correction (`_limit`).
 """
 

@@ -1,6 +1,7 @@
 """Stored results of a rupture: frames, a record of every step, and a folder on disk.
 
-A folder holds files of frames, a checkpoint from which the run resumes, and at the end a summary.
+A folder holds files of frames, a checkpoint from which the run resumes, and at
+the end a summary.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 """`simulate_rupture` on specimens: an event in space and time, and the velocity of the block.
 
 1. Follow the path of the sample to sliding, and choose the event.
-2. Run the event once as a trial, which shows how long it takes and how much slips.
-3. Run it again and keep frames, with pictures of the block spread evenly over the slip.
+2. Run the event once as a trial, which shows how long it takes and how much
+   slips.
+3. Run it again and keep frames, with pictures of the block spread evenly over the
+   slip.
 """
 
 from __future__ import annotations

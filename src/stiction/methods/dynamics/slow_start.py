@@ -2,29 +2,32 @@
 
 Problem
 -------
-While the load tau_0 rises slowly at the rate R, slip follows the equilibria d(tau_0). Find the
-state of the run (slip, slip rate and memory variables) at a load tau_c - D, a distance D below the
-onset tau_c, without the steps that lead there. A run from this state must have the same onset.
+While the load tau_0 rises slowly at the rate R, slip follows the equilibria
+d(tau_0). Find the state of the run (slip, slip rate and memory variables) at a
+load tau_c - D, a distance D below the onset tau_c, without the steps that lead
+there. A run from this state must have the same onset.
 
 Algorithm: our own
 ------------------
-Asymptotics of a fold: near the onset, the distance of slip from its limit falls as
-(tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0 grows as exp(a t) with a = R/(2 D).
+Asymptotics of a fold: near the onset, the distance of slip from its limit falls
+as (tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0 grows as exp(a t) with
+a = R/(2 D).
 
-1. Find the onset tau_c by equilibrium. Begin with a distance D in which shear waves cross the
-   nucleation length `_CROSSINGS` times.
-2. Find the equilibria at tau_c - D and a little before. Their difference gives the mean slip rate,
-   and its growth the slip rate V at tau_c - D (`_state_at`).
-3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z) in each memory variable,
-   psi' = z psi + V with z = s_p |k| c_s (`memory.grown_memory`).
-4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>. Then stress that follows V
-   without delay needs no further force, and the remaining stress is inertia (the
-   kernel is even in a, except for the radiation of the mean).
-5. At the slipping nodes, the difference of stress and strength estimates the error of the state,
-   and as a stress the amount by which the onset may be misplaced. If it is more
-   than `_MAX_ERROR` of the stress scale, go to 2 with a larger D: V falls as
-   D^(-1/2), its second derivative as D^(-5/2).
-6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then begins at rest.
+1. Find the onset tau_c by equilibrium. Begin with a distance D in which shear
+   waves cross the nucleation length `_CROSSINGS` times.
+2. Find the equilibria at tau_c - D and a little before. Their difference gives
+   the mean slip rate, and its growth the slip rate V at tau_c - D (`_state_at`).
+3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z) in each
+   memory variable, psi' = z psi + V with z = s_p |k| c_s (`memory.grown_memory`).
+4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>. Then stress
+   that follows V without delay needs no further force, and the remaining stress
+   is inertia (the kernel is even in a, except for the radiation of the mean).
+5. At the slipping nodes, the difference of stress and strength estimates the
+   error of the state, and as a stress the amount by which the onset may be
+   misplaced. If it is more than `_MAX_ERROR` of the stress scale, go to 2 with a
+   larger D: V falls as D^(-1/2), its second derivative as D^(-5/2).
+6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then
+   begins at rest.
 """
 
 import numpy as np

@@ -2,18 +2,21 @@
 
 Problem
 -------
-A specimen is loaded slowly. Its slip follows the equilibria of `methods.equilibrium` up to an
-instability. From there waves run through the blocks (`waves`), until all is at rest or the whole
-interface slides. Then the path continues from the final state of the waves.
+A specimen is loaded slowly. Its slip follows the equilibria of
+`methods.equilibrium` up to an instability. From there waves run through the
+blocks (`waves`), until all is at rest or the whole interface slides. Then the
+path continues from the final state of the waves.
 
 Algorithm of an event
 ---------------------
-1. Begin at the static state that becomes unstable. Raise the drive a little, as it goes on to rise,
-   and let slip grow a little along the unstable direction (`begin`).
-2. Follow the waves. The block is at rest when no node slips while shear waves cross the block and
-   return (`DynamicEvent.run`).
-3. Let slip that is still under way come to rest in a static state (`RuptureProgram.jump`). Nodes
-   that were carried beyond this equilibrium count as stopped.
+1. Begin at the static state that becomes unstable. Raise the drive a little, as
+   it goes on to rise, and let slip grow a little along the unstable direction
+   (`begin`).
+2. Follow the waves. The block is at rest when no node slips while shear waves
+   cross the block and return (`DynamicEvent.run`).
+3. Let slip that is still under way come to rest in a static state
+   (`RuptureProgram.jump`). Nodes that were carried beyond this equilibrium count
+   as stopped.
 """
 
 from __future__ import annotations

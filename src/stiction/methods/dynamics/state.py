@@ -13,8 +13,9 @@ the stress that slip elsewhere transfers, mode by mode with the memory kernel C 
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
 
-Fields of the interface and their transforms are flat, also on planes. `Grid.transform` knows the
-shape. Modes q = 0, 1, ... are in the order of the real transform, and q = 0 is the mean.
+Fields of the interface and their transforms are flat, also on planes.
+`Grid.transform` knows the shape. Modes q = 0, 1, ... are in the order of the real
+transform, and q = 0 is the mean.
 """
 
 from enum import IntEnum

@@ -2,24 +2,28 @@
 
 Problem
 -------
-An event takes an interface at rest from the slip d_0 to the slip d_1. With delta = d_1 - d_0, it
-releases the stress K delta at the load at which it begins. The table has these measures:
+An event takes an interface at rest from the slip d_0 to the slip d_1. With delta
+= d_1 - d_0, it releases the stress K delta at the load at which it begins. The
+table has these measures:
 
-1. The patch of an event is where delta is above `MIN_ADDED_SLIP` of its largest value, around that
-   value. It has extents, an area and a mean slip. Slip elsewhere also grows a little.
-2. The moment is G times the integral of delta. The magnitude of a plane follows from it:
-   Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori, 1979, in SI units).
-3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is the mean of
-   K delta over the patch, the second its mean weighted by delta. The third is
-   twice the energy that the slip releases beyond friction at the residual
-   strength, over the integral of delta. Waves and weakening share this energy. If
-   the stress comes to rest at the residual strength, the third equals the second.
+1. The patch of an event is where delta is above `MIN_ADDED_SLIP` of its largest
+   value, around that value. It has extents, an area and a mean slip. Slip
+   elsewhere also grows a little.
+2. The moment is G times the integral of delta. The magnitude of a plane follows
+   from it: Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori, 1979,
+   in SI units).
+3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is
+   the mean of K delta over the patch, the second its mean weighted by delta. The
+   third is twice the energy that the slip releases beyond friction at the
+   residual strength, over the integral of delta. Waves and weakening share this
+   energy. If the stress comes to rest at the residual strength, the third equals
+   the second.
 4. The fracture energy is dissipated above the residual strength.
-5. Methods with inertia know how long an event takes and, between half-spaces, when it begins and
-   what it radiates.
+5. Methods with inertia know how long an event takes and, between half-spaces,
+   when it begins and what it radiates.
 
-Behind a machine the load is the drive: the mean stress that it would cause without slip. Slip
-relieves it.
+Behind a machine the load is the drive: the mean stress that it would cause
+without slip. Slip relieves it.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,8 @@
 """Patches of slipping nodes on a line or plane: number, position and extent.
 
-Nodes of a plane are connected if their cells share an edge (four neighbours), also across the
-borders. The `interface` of these functions is an `Interface`. Kernels do not depend on its file.
+Nodes of a plane are connected if their cells share an edge (four neighbours),
+also across the borders. The `interface` of these functions is an `Interface`.
+Kernels do not depend on its file.
 """
 
 from typing import Any, NamedTuple

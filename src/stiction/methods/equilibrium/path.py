@@ -2,11 +2,13 @@
 
 Algorithm
 ---------
-1. Follow the sample to global sliding, which gives its arrested events and the last load.
-2. For each load before sliding, start from the nearest known state: the equilibrium after the last
-   event, or the equilibrium at the load before.
-3. Follow the stable path from there to the load. If it fails beside an event, take the state that
-   is about to jump. If it fails elsewhere, the load is within round-off of sliding.
+1. Follow the sample to global sliding, which gives its arrested events and the
+   last load.
+2. For each load before sliding, start from the nearest known state: the
+   equilibrium after the last event, or the equilibrium at the load before.
+3. Follow the stable path from there to the load. If it fails beside an event,
+   take the state that is about to jump. If it fails elsewhere, the load is within
+   round-off of sliding.
 """
 
 from typing import Any

@@ -1,8 +1,9 @@
 """Samples, equilibrium states, and the protocol of the search for equilibria.
 
-Strength falls with slip along straight pieces. A law of M pieces has M corners, and piece M is the
-residual strength. Between corners everything is linear, so solvers step from corner to corner. The
-linear law has a single piece, whose start is tau_p to the bit.
+Strength falls with slip along straight pieces. A law of M pieces has M corners,
+and piece M is the residual strength. Between corners everything is linear, so
+solvers step from corner to corner. The linear law has a single piece, whose start
+is tau_p to the bit.
 """
 
 from collections.abc import Mapping

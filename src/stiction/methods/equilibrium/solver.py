@@ -5,9 +5,10 @@ two searches:
 
 1. Start from rest and raise the load to the next instability (`Program.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
-3. Let the unstable patch jump at constant load (`Program.jump`). If no equilibrium stops it, the
-   interface slides: stop.
-4. The patch came to rest, which is an arrested event. Go to 1 from the new equilibrium.
+3. Let the unstable patch jump at constant load (`Program.jump`). If no
+   equilibrium stops it, the interface slides: stop.
+4. The patch came to rest, which is an arrested event. Go to 1 from the new
+   equilibrium.
 """
 
 from typing import Any, NamedTuple

@@ -2,8 +2,9 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), W >= 0 the weakening rate of each node (Pa/m), A = K - diag(W), and S
-the list of the slipping nodes, in the order of the rows of L. This folder solves systems
+K is the stiffness (Pa/m), W >= 0 the weakening rate of each node (Pa/m), A = K -
+diag(W), and S the list of the slipping nodes, in the order of the rows of L. This
+folder solves systems
 
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
 
@@ -13,30 +14,35 @@ equilibrium is unstable.
 
 Algorithm
 ---------
-L is updated instead of being computed anew (P. Gill, G. Golub, W. Murray and M. Saunders,
-Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix Computations, 2013,
-section 6.5).
+L is updated instead of being computed anew (P. Gill, G. Golub, W. Murray and M.
+Saunders, Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix
+Computations, 2013, section 6.5).
 
-1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj - l'l)^1/2. If
-   A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has z'Az = A_jj -
-   l'l <= 0, and A z = 0 on S (`singular_direction`).
-2. Remove a node (`remove`). The rows below it move up, which leaves one entry in each of them
-   above the diagonal. Plane rotations of neighbouring columns make it zero.
-3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is the unit vector of
-   the node. Plane rotations of the columns of L with a^1/2 e make the latter zero.
-4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose nodes still slip
-   and weaken no more than before, raise the entries of those that weaken less,
-   and append the other nodes.
+1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj -
+   l'l)^1/2. If A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has
+   z'Az = A_jj - l'l <= 0, and A z = 0 on S (`singular_direction`).
+2. Remove a node (`remove`). The rows below it move up, which leaves one entry in
+   each of them above the diagonal. Plane rotations of neighbouring columns make
+   it zero.
+3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is
+   the unit vector of the node. Plane rotations of the columns of L with a^1/2 e
+   make the latter zero.
+4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose
+   nodes still slip and weaken no more than before, raise the entries of those
+   that weaken less, and append the other nodes.
 
 Departures from the textbook, all for speed:
 
-- The rows of L lie one after the other in a flat array, each padded to a multiple of eight numbers.
-  This takes half the memory of a square, and no two rows compete for the same
-  cache sets.
-- Four rows are appended together, so that each row of L is read once for four new ones.
-- A pivot counts as not positive if its square is below `PIVOT_RTOL` of the diagonal entry.
+- The rows of L lie one after the other in a flat array, each padded to a multiple
+  of eight numbers. This takes half the memory of a square, and no two rows
+  compete for the same cache sets.
+- Four rows are appended together, so that each row of L is read once for four new
+  ones.
+- A pivot counts as not positive if its square is below `PIVOT_RTOL` of the
+  diagonal entry.
 
-Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t` and `position`.
+Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t` and
+`position`.
 """
 
 import math

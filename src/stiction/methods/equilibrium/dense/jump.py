@@ -2,9 +2,10 @@
 
 Problem
 -------
-At a load (Pa) at which an equilibrium became unstable, find the least equilibrium that is not below
-its slip, or show that there is none. K is the stiffness (Pa/m), d >= 0 the slip (m), s(d) the
-strength less initial stress (Pa), which falls along straight pieces, and p the load profile:
+At a load (Pa) at which an equilibrium became unstable, find the least equilibrium
+that is not below its slip, or show that there is none. K is the stiffness (Pa/m),
+d >= 0 the slip (m), s(d) the strength less initial stress (Pa), which falls along
+straight pieces, and p the load profile:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
@@ -17,29 +18,31 @@ Algorithm
 ---------
 Our own: two kinds of step that do not pass the least equilibrium.
 
-1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S = (load p - s)_S.
-   Slip moves to this solution, where it is larger. K_SS is factored once and only
-   grows.
-2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W of the present
-   pieces. If A_SS is positive definite, move towards the solution of the linear
-   problem of these pieces. If not, move along z >= 0 with A z <= 0 (step 1 in
-   `cholesky`). The move ends where the first node reaches the next corner of its
-   law.
+1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S =
+   (load p - s)_S. Slip moves to this solution, where it is larger. K_SS is
+   factored once and only grows.
+2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W
+   of the present pieces. If A_SS is positive definite, move towards the solution
+   of the linear problem of these pieces. If not, move along z >= 0 with A z <= 0
+   (step 1 in `cholesky`). The move ends where the first node reaches the next
+   corner of its law.
 3. After each step of either kind, the resting nodes that are overstressed join S.
-4. Step 1 is repeated as long as nodes join or pass corners, at most `MAX_ELASTIC_STEPS` times in a
-   row; then follows a step 2, and so on. Step 2 costs another factor. It is
-   needed because step 1 alone creeps towards an equilibrium without reaching it.
-5. The interface slides if all nodes slip, if its mean strength cannot carry the load, if a run of
-   nodes at their residual strength is longer than a given length (Griffith's,
-   which no fracture energy can stop), or if nothing bounds a step 2. It is
-   arrested if a step 2 ends at the solution of the linear problem and no node
-   joins.
+4. Step 1 is repeated as long as nodes join or pass corners, at most
+   `MAX_ELASTIC_STEPS` times in a row; then follows a step 2, and so on. Step 2
+   costs another factor. It is needed because step 1 alone creeps towards an
+   equilibrium without reaching it.
+5. The interface slides if all nodes slip, if its mean strength cannot carry the
+   load, if a run of nodes at their residual strength is longer than a given
+   length (Griffith's, which no fracture energy can stop), or if nothing bounds a
+   step 2. It is arrested if a step 2 ends at the solution of the linear problem
+   and no node joins.
 
-On a specimen K may have positive entries off its diagonal (`may_stop`), so that a step unloads a
-node that slips. Slip does not go back. In step 1 such a node leaves S and rests until it is
-overstressed again. In step 2 it is left out of the step only, and the interface is not arrested as
-long as this node is overstressed. Every step lowers the energy, so that the steps end, where no
-stress is above its strength.
+On a specimen K may have positive entries off its diagonal (`may_stop`), so that a
+step unloads a node that slips. Slip does not go back. In step 1 such a node
+leaves S and rests until it is overstressed again. In step 2 it is left out of the
+step only, and the interface is not arrested as long as this node is overstressed.
+Every step lowers the energy, so that the steps end, where no stress is above its
+strength.
 """
 
 from enum import IntEnum

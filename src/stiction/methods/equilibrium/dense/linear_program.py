@@ -2,8 +2,9 @@
 
 Problem
 -------
-As long as strength falls linearly with slip, s_i = excess_i - W_i d_i, the largest load (Pa) with
-an equilibrium is, with A = K - diag(W), slip d >= 0 (m) and load profile p > 0,
+As long as strength falls linearly with slip, s_i = excess_i - W_i d_i, the
+largest load (Pa) with an equilibrium is, with A = K - diag(W), slip d >= 0 (m)
+and load profile p > 0,
 
     max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
       = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
@@ -16,24 +17,27 @@ the set S of the slipping nodes.
 
 Algorithm
 ---------
-Our own: (1) by an active set that grows, (2) by cuts that lower the load. It starts from an upper
-bound of (2), for example the weakest window, and from a load below it.
+Our own: (1) by an active set that grows, (2) by cuts that lower the load. It
+starts from an upper bound of (2), for example the weakest window, and from a load
+below it.
 
-1. At the load, find the nodes at rest that are overstressed. If there are any, add them to S, the
-   most overstressed first, each as a row of the factor L of A_SS (`cholesky`).
+1. At the load, find the nodes at rest that are overstressed. If there are any,
+   add them to S, the most overstressed first, each as a row of the factor L of
+   A_SS (`cholesky`).
 2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S, and go to 1.
-3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is feasible in (2): a
-   cut. Lower the bound and the load to <excess, y>/<p, y>. Solve for the slip
-   there, take out the nodes that would slip backwards, and go to 1. If the cut
-   lowers the load by round-off only, the load is the solution: `_back_off` makes
-   its slip feasible, and the algorithm ends.
-4. If no node is overstressed, the load has an equilibrium. If it is the upper bound, it is the
-   solution. Otherwise raise it towards the bound by `SHARE_TOWARDS_BOUND` of the
-   way, or up to the bound once within `CLOSE_RTOL` of it, solve for the slip, and
-   go to 1.
+3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is
+   feasible in (2): a cut. Lower the bound and the load to <excess, y>/<p, y>.
+   Solve for the slip there, take out the nodes that would slip backwards, and go
+   to 1. If the cut lowers the load by round-off only, the load is the solution:
+   `_back_off` makes its slip feasible, and the algorithm ends.
+4. If no node is overstressed, the load has an equilibrium. If it is the upper
+   bound, it is the solution. Otherwise raise it towards the bound by
+   `SHARE_TOWARDS_BOUND` of the way, or up to the bound once within `CLOSE_RTOL`
+   of it, solve for the slip, and go to 1.
 
-The order of the nodes in step 1 and the share in step 4 are for speed. In another order the search
-stalls near the solution, and at too high a load far too many nodes join before a pivot fails.
+The order of the nodes in step 1 and the share in step 4 are for speed. In another
+order the search stalls near the solution, and at too high a load far too many
+nodes join before a pivot fails.
 """
 
 import numpy as np

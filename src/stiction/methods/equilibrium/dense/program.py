@@ -1,18 +1,21 @@
 """Equilibria of a line or a specimen, with dense factors: which algorithm is used when.
 
-1. The next instability is a linear programme of the present pieces of the friction law
-   (`linear_program`), if no node reaches a corner of its law before. A line on
-   which very many nodes slip is handed over to transforms (`plane_onset`), which
-   are faster there.
-2. Otherwise the path is followed event by event (`stable_path`). The programme is not tried again
-   on this path, except from rest.
-3. Behind a machine the path is always followed: slip lowers the force, whose largest value may lie
-   before the instability. If all nodes slip without one, the interface slides stably.
-4. If only part of a line or specimen can break, the other nodes have an infinite strength. They
-   hold the part, whose K is positive definite, so that each instability ends at
-   an equilibrium. It slides if all slips there that can break.
-5. Beyond an instability of a line, the quick test for sliding comes first (`runaway`). If it does
-   not decide, and on specimens always, the jump is followed to its end (`jump`).
+1. The next instability is a linear programme of the present pieces of the
+   friction law (`linear_program`), if no node reaches a corner of its law before.
+   A line on which very many nodes slip is handed over to transforms
+   (`plane_onset`), which are faster there.
+2. Otherwise the path is followed event by event (`stable_path`). The programme is
+   not tried again on this path, except from rest.
+3. Behind a machine the path is always followed: slip lowers the force, whose
+   largest value may lie before the instability. If all nodes slip without one,
+   the interface slides stably.
+4. If only part of a line or specimen can break, the other nodes have an infinite
+   strength. They hold the part, whose K is positive definite, so that each
+   instability ends at an equilibrium. It slides if all slips there that can
+   break.
+5. Beyond an instability of a line, the quick test for sliding comes first
+   (`runaway`). If it does not decide, and on specimens always, the jump is
+   followed to its end (`jump`).
 """
 
 import threading

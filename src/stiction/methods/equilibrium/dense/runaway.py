@@ -2,31 +2,35 @@
 
 Problem
 -------
-At a load (Pa) a patch of a line became unstable. K is the stiffness (Pa/m), d the slip (m), s(d)
-the strength less initial stress (Pa) and p the load profile. Does slip come to rest again? `jump`
-decides this for any sample. Most samples slide, and this test shows it faster: without it onsets
-take three to five times as long. It follows the patch alone, as one run of nodes, while all other
-nodes are held. This is a lower bound of the slip, as slip elsewhere only adds stress (K has no
+At a load (Pa) a patch of a line became unstable. K is the stiffness (Pa/m), d the
+slip (m), s(d) the strength less initial stress (Pa) and p the load profile. Does
+slip come to rest again? `jump` decides this for any sample. Most samples slide,
+and this test shows it faster: without it onsets take three to five times as long.
+It follows the patch alone, as one run of nodes, while all other nodes are held.
+This is a lower bound of the slip, as slip elsewhere only adds stress (K has no
 positive entry off its diagonal).
 
 Algorithm
 ---------
-Our own, on two known results: the factor of a Toeplitz matrix (`block_factor`) and Griffith's
-length (`unstoppable_length`).
+Our own, on two known results: the factor of a Toeplitz matrix (`block_factor`)
+and Griffith's length (`unstoppable_length`).
 
-1. Move along the direction of the instability until a node reaches a corner of its law. If none
-   does, the interface slides.
-2. Nodes beside the run that are overloaded join it, as far as the stress there is known.
-3. Elastic step: with the strengths of the moment, solve K_RR x = (load p - K d - s(d))_R on the run
-   R, cut the right side at zero, and add x to the slip. Blocks of K on runs with
-   the same length are equal, so that a single Cholesky factor serves all runs and
-   samples.
-4. The interface slides if nodes at their residual strength form a run of the unstoppable length,
-   or if the mean strength of the interface cannot carry the load.
-5. The test gives up (UNDECIDED) if slip hardly grows any more, after `MAX_RUN_STEPS` steps, or if
-   the run, or the unstoppable length, is longer than the factor.
-6. Compute the stress that all slip added so far causes, on the run and half its length to both
-   sides, and go to 2.
+1. Move along the direction of the instability until a node reaches a corner of
+   its law. If none does, the interface slides.
+2. Nodes beside the run that are overloaded join it, as far as the stress there is
+   known.
+3. Elastic step: with the strengths of the moment, solve K_RR x = (load p - K d -
+   s(d))_R on the run R, cut the right side at zero, and add x to the slip. Blocks
+   of K on runs with the same length are equal, so that a single Cholesky factor
+   serves all runs and samples.
+4. The interface slides if nodes at their residual strength form a run of the
+   unstoppable length, or if the mean strength of the interface cannot carry the
+   load.
+5. The test gives up (UNDECIDED) if slip hardly grows any more, after
+   `MAX_RUN_STEPS` steps, or if the run, or the unstoppable length, is longer than
+   the factor.
+6. Compute the stress that all slip added so far causes, on the run and half its
+   length to both sides, and go to 2.
 """
 
 from functools import lru_cache

@@ -2,9 +2,10 @@
 
 Problem
 -------
-p is the profile of the load, K the stiffness (Pa/m), and d >= 0 the slip (m). The strength of node
-i, less its initial stress, falls with slip along straight pieces: s_i = q_i - W_i d_i. Slip is an
-equilibrium at a load (Pa) if no stress is above its strength, and equal to it where nodes slip:
+p is the profile of the load, K the stiffness (Pa/m), and d >= 0 the slip (m). The
+strength of node i, less its initial stress, falls with slip along straight
+pieces: s_i = q_i - W_i d_i. Slip is an equilibrium at a load (Pa) if no stress is
+above its strength, and equal to it where nodes slip:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
@@ -26,33 +27,35 @@ the nodes that reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
 Algorithm
 ---------
-Parametric quadratic programming: the solution is piecewise linear in the load, and its kinks are
-found one after the other, as on the critical line of H. Markowitz (Naval Research Logistics
-Quarterly 3, 1956). Step 2 is an active-set method for (3) (J. Nocedal and S. Wright, Numerical
-Optimization, 2006, section 16.5).
+Parametric quadratic programming: the solution is piecewise linear in the load,
+and its kinks are found one after the other, as on the critical line of H.
+Markowitz (Naval Research Logistics Quarterly 3, 1956). Step 2 is an active-set
+method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
+16.5).
 
 1. Find S and factor A_SS = L L'. If a pivot fails, go to 5.
-2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from its former value
-   towards the solution. The first node whose rate reaches zero on the way stops:
-   take it out of S and solve again.
-3. Find the smallest rise of the load at which a resting node reaches its strength (a start) or a
-   slipping node a corner of its law, and go there. If a node at its strength
-   would be overstressed by any rise, it starts at once, which is how A v >= p
-   comes about.
-4. After a start, append a row to L. After a corner, A_SS changes in one diagonal entry: rotate the
-   rows of L from there on, or compute them again if the node now weakens more
-   steeply.
-5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the direction
-   z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds slip
-   along z: it jumps at constant load, and the path ends, unstable. Otherwise, for
-   (3) only, v moves along z until a rate reaches zero. If a start failed, that
-   node stops, and the start is tried again. If a corner or the first factor
-   failed, the nodes without a row in L leave S, and may start again. Those that
-   do not before the load rises have stopped.
-6. The path ends at the target, or when every node has slipped. It is given up if S outgrows L, or
-   if nodes stop and start without end.
+2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from
+   its former value towards the solution. The first node whose rate reaches zero
+   on the way stops: take it out of S and solve again.
+3. Find the smallest rise of the load at which a resting node reaches its strength
+   (a start) or a slipping node a corner of its law, and go there. If a node at
+   its strength would be overstressed by any rise, it starts at once, which is how
+   A v >= p comes about.
+4. After a start, append a row to L. After a corner, A_SS changes in one diagonal
+   entry: rotate the rows of L from there on, or compute them again if the node
+   now weakens more steeply.
+5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the
+   direction z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds
+   slip along z: it jumps at constant load, and the path ends, unstable.
+   Otherwise, for (3) only, v moves along z until a rate reaches zero. If a start
+   failed, that node stops, and the start is tried again. If a corner or the first
+   factor failed, the nodes without a row in L leave S, and may start again. Those
+   that do not before the load rises have stopped.
+6. The path ends at the target, or when every node has slipped. It is given up if
+   S outgrows L, or if nodes stop and start without end.
 
-Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or `position`.
+Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or
+`position`.
 """
 
 from enum import IntEnum

@@ -2,8 +2,8 @@
 
 Problem
 -------
-With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength less initial stress s (Pa) and load profile
-p > 0, the onset without corners is
+With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength less initial stress s (Pa)
+and load profile p > 0, the onset without corners is
 
     max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
@@ -14,16 +14,17 @@ the entries of K.
 
 Algorithm
 ---------
-`bisect` halves the interval between a stable and an unstable load. Each digit costs the same number
-of steps, so it only starts `turning_point`, which closes the bracket, and takes over if that fails.
+`bisect` halves the interval between a stable and an unstable load. Each digit
+costs the same number of steps, so it only starts `turning_point`, which closes
+the bracket, and takes over if that fails.
 
-1. Solve for the equilibrium at the middle of the interval, starting from the slip of the last
-   stable load (`held_equilibrium`).
+1. Solve for the equilibrium at the middle of the interval, starting from the slip
+   of the last stable load (`held_equilibrium`).
 2. If there is one, it gives a lower bound.
-3. If a direction of negative curvature was met, the load is too high. The direction is the guess
-   for the lowest eigenvector of A on the slipping nodes. If the eigenvalue is not
-   positive, the eigenvector gives an upper bound, and lowers the upper end of the
-   interval to it.
+3. If a direction of negative curvature was met, the load is too high. The
+   direction is the guess for the lowest eigenvector of A on the slipping nodes.
+   If the eigenvalue is not positive, the eigenvector gives an upper bound, and
+   lowers the upper end of the interval to it.
 """
 
 import numpy as np

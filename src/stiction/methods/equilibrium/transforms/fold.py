@@ -2,26 +2,31 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), W the present weakening rates (Pa/m), A = K - diag(W), S the slipping
-nodes, p the load profile. Between events slip d grows with the load at the rate v, A_SS v = p_S,
-and A_SS is positive definite. An event is a node that begins to slip, or that reaches a corner of
-its law. The path turns at the first event after which A_SS is no longer positive definite. Find
-its load, and the direction y in which slip jumps.
+K is the stiffness (Pa/m), W the present weakening rates (Pa/m), A = K - diag(W),
+S the slipping nodes, p the load profile. Between events slip d grows with the
+load at the rate v, A_SS v = p_S, and A_SS is positive definite. An event is a
+node that begins to slip, or that reaches a corner of its law. The path turns at
+the first event after which A_SS is no longer positive definite. Find its load,
+and the direction y in which slip jumps.
 
 Algorithm
 ---------
-As `dense.stable_path`, with solutions by conjugate gradients (`solve_inside`) instead of a factor.
+As `dense.stable_path`, with solutions by conjugate gradients (`solve_inside`)
+instead of a factor.
 
-1. Solve for the slip at the first load, revising the pieces of the nodes, and for the rates v.
-2. Find the smallest rise of the load to an event, and go there. If the target comes first, end.
-3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. The change c of W_j by its next
-   piece, W before less W after, adds c to one diagonal entry, so that A_SS stays
-   positive definite if 1 + c y_j > 0, and v becomes v - c v_j/(1 + c y_j) y (the
-   formula of Sherman and Morrison).
-4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other slipping nodes. A stays
-   positive definite if y'Ay = (A y)_j > 0. With c_j = p_j - (K v)_j, v becomes v
-   + c_j/(y'Ay) y.
-5. If it does not stay positive definite, the path turns in the direction y. Otherwise go to 2.
+1. Solve for the slip at the first load, revising the pieces of the nodes, and for
+   the rates v.
+2. Find the smallest rise of the load to an event, and go there. If the target
+   comes first, end.
+3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. The change c
+   of W_j by its next piece, W before less W after, adds c to one diagonal entry,
+   so that A_SS stays positive definite if 1 + c y_j > 0, and v becomes v - c
+   v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
+4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other
+   slipping nodes. A stays positive definite if y'Ay = (A y)_j > 0. With c_j = p_j
+   - (K v)_j, v becomes v + c_j/(y'Ay) y.
+5. If it does not stay positive definite, the path turns in the direction y.
+   Otherwise go to 2.
 """
 
 from typing import NamedTuple

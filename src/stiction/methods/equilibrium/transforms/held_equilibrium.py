@@ -2,8 +2,9 @@
 
 Problem
 -------
-A = K - diag(W) (`elasticity.operator`), d >= 0 is the slip (m), s the strength less initial stress
-at zero slip (Pa), p the load profile, phi (|phi| = 1) the shape of a patch. Find
+A = K - diag(W) (`elasticity.operator`), d >= 0 is the slip (m), s the strength
+less initial stress at zero slip (Pa), p the load profile, phi (|phi| = 1) the
+shape of a patch. Find
 
     d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
     mu = spring (alpha - <phi, d>),
@@ -15,16 +16,20 @@ turning point. They are equilibria of the interface itself where mu = 0.
 
 Algorithm
 ---------
-Active set with conjugate gradients inside, as in a projected method (J. Nocedal and S. Wright,
-Numerical Optimization, 2006, section 16.7), but with whole sets instead of a line search.
+Active set with conjugate gradients inside, as in a projected method (J. Nocedal
+and S. Wright, Numerical Optimization, 2006, section 16.7), but with whole sets
+instead of a line search.
 
-1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join, and nodes with d < 0 leave.
-2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the tolerance (`solve_inside`). If the
-   curvature along a direction is negative, there is no stable solution: stop.
-3. Compute r at all nodes and go to 1, until no node joins or leaves and r is small on the set.
+1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join, and nodes
+   with d < 0 leave.
+2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the tolerance
+   (`solve_inside`). If the curvature along a direction is negative, there is no
+   stable solution: stop.
+3. Compute r at all nodes and go to 1, until no node joins or leaves and r is
+   small on the set.
 
-Without a spring and positive entries off the diagonal nodes only join, so that this ends. Otherwise
-only the number of iterations ends it.
+Without a spring and positive entries off the diagonal nodes only join, so that
+this ends. Otherwise only the number of iterations ends it.
 """
 
 from stiction.base.arrays import Array

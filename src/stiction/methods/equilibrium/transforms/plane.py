@@ -2,20 +2,23 @@
 
 `plane_onset` finds the onset without corners, also of long lines:
 
-1. Make coarser grids, each with half the nodes, as long as they resolve the nucleation length.
-2. On the coarsest grid, bisect the trivial bounds until Newton's method on the turning point
-   succeeds (`_narrow`).
-3. On each finer grid start Newton's method (`turning_point.close`) from the slip and the multiplier
-   of the grid before. If it fails, go on as in step 2.
+1. Make coarser grids, each with half the nodes, as long as they resolve the
+   nucleation length.
+2. On the coarsest grid, bisect the trivial bounds until Newton's method on the
+   turning point succeeds (`_narrow`).
+3. On each finer grid start Newton's method (`turning_point.close`) from the slip
+   and the multiplier of the grid before. If it fails, go on as in step 2.
 
 `PlaneProgram` follows a sample from instability to instability:
 
-4. From rest, the next instability is the onset without corners, if no node reaches a corner of its
-   law before. A coarse grid shows most often whether a node does.
-5. Otherwise, and after a jump, the path is followed in steps of the load, each of which is proved
-   to be stable (`relaxation.stable_equilibrium`). A step that is not is
-   shortened, until it is as short as the gap that was asked for.
-6. The end of the path is then followed event by event (`fold`), to see whether it turns, and how.
+4. From rest, the next instability is the onset without corners, if no node
+   reaches a corner of its law before. A coarse grid shows most often whether a
+   node does.
+5. Otherwise, and after a jump, the path is followed in steps of the load, each of
+   which is proved to be stable (`relaxation.stable_equilibrium`). A step that is
+   not is shortened, until it is as short as the gap that was asked for.
+6. The end of the path is then followed event by event (`fold`), to see whether it
+   turns, and how.
 7. A jump goes to the least equilibrium a little above the load of the turn
    (`relaxation.least_equilibrium`).
 """

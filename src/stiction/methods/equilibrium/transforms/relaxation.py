@@ -2,9 +2,10 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), d >= 0 the slip (m), p the load profile. On its present piece the
-strength of node i, less its initial stress, is q_i - W_i d_i. A node is overloaded if load p - K d
-is above its strength. An equilibrium at a load (Pa) satisfies
+K is the stiffness (Pa/m), d >= 0 the slip (m), p the load profile. On its present
+piece the strength of node i, less its initial stress, is q_i - W_i d_i. A node is
+overloaded if load p - K d is above its strength. An equilibrium at a load (Pa)
+satisfies
 
     load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
 
@@ -14,37 +15,40 @@ if A is not positive definite. The pieces depend on the slip. Two questions are
 answered:
 
 (a) Does a stable path lead from an equilibrium at a lower load to an equilibrium
-at this load
-    (`stable_equilibrium`)?
+    at this load (`stable_equilibrium`)?
 (b) At which least equilibrium, not below a given slip, does an overdamped
-interface come to rest,
-    or does it slide (`least_equilibrium`)? `dense.jump` answers this for lines.
+    interface come to rest, or does it slide (`least_equilibrium`)? `dense.jump`
+    answers this for lines.
 
 Algorithm for (a): Newton's method
 ----------------------------------
-1. Solve (1) for the pieces of the present slip. Repeat with the pieces of the solution until they
-   do not change. Until then solve to a rough residual only.
-2. Look for negative curvature of K less the steepest weakening of each node on the way, on the
-   nodes that slip at the end. If there is none, A is positive definite in every
-   state on the way. So the path is stable, and there is no other equilibrium.
+1. Solve (1) for the pieces of the present slip. Repeat with the pieces of the
+   solution until they do not change. Until then solve to a rough residual only.
+2. Look for negative curvature of K less the steepest weakening of each node on
+   the way, on the nodes that slip at the end. If there is none, A is positive
+   definite in every state on the way. So the path is stable, and there is no
+   other equilibrium.
 
 Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
-1. If the load exceeds the mean strength, the interface slides, since the mean of K d is zero.
-2. Step with bounds (`_bound`). Let nodes weaken by a share of their present rate only, and no
-   further than to their next corner. As this strength is nowhere below the true
-   strength, the solution of (1) with it is below the least equilibrium. The share
-   is 1 - `omitted`. The larger it is, the longer is the step.
-3. If the share is 1 and all nodes are on the pieces that were assumed, the solution is the least
-   equilibrium, and the interface is arrested.
-4. If the step has a solution, slip moves to it. If hardly any node moves, the next step has the
-   share 1, as only this share can end at the equilibrium.
-5. If a step has negative curvature with the share 1, or if the slip is at an instability, move with
-   the true pieces to the first corner (`_step_to_corner`). Otherwise omit twice
-   as much of the weakening. A step that omits all of it has a solution unless the
-   interface slides.
+1. If the load exceeds the mean strength, the interface slides, since the mean of
+   K d is zero.
+2. Step with bounds (`_bound`). Let nodes weaken by a share of their present rate
+   only, and no further than to their next corner. As this strength is nowhere
+   below the true strength, the solution of (1) with it is below the least
+   equilibrium. The share is 1 - `omitted`. The larger it is, the longer is the
+   step.
+3. If the share is 1 and all nodes are on the pieces that were assumed, the
+   solution is the least equilibrium, and the interface is arrested.
+4. If the step has a solution, slip moves to it. If hardly any node moves, the
+   next step has the share 1, as only this share can end at the equilibrium.
+5. If a step has negative curvature with the share 1, or if the slip is at an
+   instability, move with the true pieces to the first corner (`_step_to_corner`).
+   Otherwise omit twice as much of the weakening. A step that omits all of it has
+   a solution unless the interface slides.
 
-K of a plane has small positive entries off its diagonal. The bounds in (b) are strict without them.
+K of a plane has small positive entries off its diagonal. The bounds in (b) are
+strict without them.
 """
 
 from typing import NamedTuple

@@ -2,9 +2,10 @@
 
 Problem
 -------
-Close the bracket (1) of `bracket`. With A = K - diag(W), slip d, strength less initial stress s and
-load profile p, a spring holds a patch phi (|phi| = 1) at the amplitude a = <phi, d>, with a force
-mu (`held_equilibrium`). On the slipping nodes
+Close the bracket (1) of `bracket`. With A = K - diag(W), slip d, strength less
+initial stress s and load profile p, a spring holds a patch phi (|phi| = 1) at the
+amplitude a = <phi, d>, with a force mu (`held_equilibrium`). On the slipping
+nodes
 
     A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
 
@@ -22,18 +23,21 @@ Algorithm
 ---------
 Our own: Newton's method for two equations. As nodes join, mu' falls in steps.
 
-1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and take both bounds.
-2. If conjugate gradients meet negative curvature although the patch is held, another patch became
-   unstable. Hold this one instead, at a lower load.
-3. As long as mu' had only one sign, step in a by Newton's method with the slope of mu' by secant, a
-   little beyond the zero, to change its sign (`_step_across`).
-4. With states of both signs, guess a between them, alternately as if mu' were linear in a and as if
-   it had one step (`_amplitude_between`).
-5. The next load is the load at which the spring would have no force at the next a (`_load_at`),
-   kept below the upper bound.
+1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and
+   take both bounds.
+2. If conjugate gradients meet negative curvature although the patch is held,
+   another patch became unstable. Hold this one instead, at a lower load.
+3. As long as mu' had only one sign, step in a by Newton's method with the slope
+   of mu' by secant, a little beyond the zero, to change its sign
+   (`_step_across`).
+4. With states of both signs, guess a between them, alternately as if mu' were
+   linear in a and as if it had one step (`_amplitude_between`).
+5. The next load is the load at which the spring would have no force at the next a
+   (`_load_at`), kept below the upper bound.
 6. End once the bounds are close enough, or if states in a row hardly narrow them.
 
-If it fails, `bracket.bisect` takes over, so that no result rests on the constants below.
+If it fails, `bracket.bisect` takes over, so that no result rests on the constants
+below.
 """
 
 from typing import NamedTuple
