@@ -44,10 +44,6 @@ UNLIMITED_EVALUATIONS = 10**18
 """More evaluations than any repetition needs."""
 SIZE_MARGIN = 1.1
 """Factor on the sample size, because the variance so far is itself an estimate."""
-SUBSET, BRIDGE, OF_CURVES = (1, 1_000, 5_000), (3, 200, 1_000), (4, 2_000, 2_000)
-"""First key of the generators, and samples per level, or exact samples of two levels, of
-the first and of the largest repetition. Repetitions of curves are stored and have one
-size."""
 DEEPER = 0.3
 """Share of a probability to which repetitions go on for the lower end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
@@ -60,8 +56,24 @@ POOR = 0.02
 """Least share of failures among the samples of a guide."""
 
 
+class Sizes(NamedTuple):
+    """Sizes of repetitions: samples per level, or exact samples of two levels."""
+
+    key: int  # first key of the generators, so that each kind has draws of its own
+    first: int
+    largest: int
+
+
+SUBSET, TWO_LEVELS = Sizes(1, 1_000, 5_000), Sizes(3, 200, 1_000)
+OF_CURVES = Sizes(4, 2_000, 2_000)
+"""Repetitions of curves are stored, and have one size."""
+
+
 class Goal(NamedTuple):
-    """Goal of sampling a tail: the probability of a stress, or the stress of a probability."""
+    """Goal of sampling a tail: the probability of a stress, or the stress of a probability.
+
+    The default of the other number is out of reach: no level stops the sampling there.
+    """
 
     cv: float  # coefficient of variation to reach
     stress: float = -math.inf
@@ -99,23 +111,23 @@ class Tail(NamedTuple):
     @property
     def extent(self) -> tuple[float, float]:
         """Lowest and highest stress of the samples, Pa."""
-        lowest, highest = zip(*(one.extent for one in self.repetitions), strict=True)
+        lowest, highest = zip(*(descent.extent for descent in self.repetitions), strict=True)
         return min(lowest), max(highest)
 
     @property
     def survived(self) -> float:
         """Share of plain samples in which the event does not happen."""
-        return float(self._shares @ [one.survived for one in self.repetitions])
+        return float(self._shares @ [descent.survived for descent in self.repetitions])
 
     @property
     def _shares(self) -> Array:
         """Share of each repetition by its size, which does not depend on its outcome."""
-        sizes = np.array([one.samples for one in self.repetitions])
+        sizes = np.array([descent.samples for descent in self.repetitions])
         return sizes / sizes.sum()
 
     def _parts(self, stress: float) -> Array:
         """Part of each repetition in the probability."""
-        return self._shares * [one.probability(stress) for one in self.repetitions]
+        return self._shares * [descent.probability(stress) for descent in self.repetitions]
 
     def probability(self, stress: float) -> float:
         """Return the estimate of P(onset below `stress`) (step 3)."""
@@ -127,7 +139,9 @@ class Tail(NamedTuple):
         if not parts.any():
             return math.inf
         pairs = zip(parts, self.repetitions, strict=True)
-        variances = [part * part * one.relative_variance(stress) for part, one in pairs if part]
+        variances = [
+            part * part * descent.relative_variance(stress) for part, descent in pairs if part
+        ]
         return float(math.sqrt(sum(variances)) / sum(parts))
 
     def of_members(self, stress: float, count: int) -> Array:
@@ -233,27 +247,27 @@ def repeat_until_precise(
     variation, or zero to stop. Many repetitions of moderate size, `first` to `largest`,
     bound the memory.
     """
-    done: list[Any] = []
+    repetitions: list[Any] = []
     spent, size = 0, first
     while size >= first:
-        latest = make(size, len(done), max_evaluations - spent)
+        latest = make(size, len(repetitions), max_evaluations - spent)
         spent += latest.evaluations
         if not latest.complete:
-            return done or [latest]
+            return repetitions or [latest]
         # 3.
-        done = [*(earlier.light() for earlier in done), latest]
-        cv = judge(done)
+        repetitions = [*(earlier.light() for earlier in repetitions), latest]
+        cv = judge(repetitions)
         if cv <= target_cv:
             break
         # 4.
-        meter.note = f"repetition {len(done)}, c.o.v. {cv:.2g} (target {target_cv:g})"
-        total = wanted = sum(each.samples for each in done)
-        price = sum(each.evaluations for each in done) / total
+        meter.note = f"repetition {len(repetitions)}, c.o.v. {cv:.2g} (target {target_cv:g})"
+        total = wanted = sum(repetition.samples for repetition in repetitions)
+        price = sum(repetition.evaluations for repetition in repetitions) / total
         if math.isfinite(cv):
             wanted = SIZE_MARGIN * total * (cv / target_cv) ** 2 - total
         affordable = (max_evaluations - spent) / price
         size = int(min(max(wanted, first), largest, affordable))
-    return done
+    return repetitions
 
 
 def two_levels_refused(state: LimitState) -> str | None:
@@ -302,20 +316,20 @@ def sample_tail(
         guide = guide if share >= LEAST_SHARE_PICKED else None
     # 2. to 4.
     repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
-    spent += sum(one.evaluations for one in repetitions)
+    spent += sum(descent.evaluations for descent in repetitions)
     # 5.
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
         guide, repetitions = None, _repetitions(state, goal, budget - spent)
-        spent += sum(one.evaluations for one in repetitions)
+        spent += sum(descent.evaluations for descent in repetitions)
     return Tail(repetitions, "subset" if guide is None else "two_level", reason, spent)
 
 
 def sample_curve(state: LimitState, goal: Goal, budget: int) -> Tail:
     """Sample the lower tail by the repetitions of curves."""
-    repetitions = _repetitions(state, goal, budget, kind=OF_CURVES)
-    return Tail(repetitions, spent=sum(one.evaluations for one in repetitions))
+    repetitions = _repetitions(state, goal, budget, sizes=OF_CURVES)
+    return Tail(repetitions, spent=sum(descent.evaluations for descent in repetitions))
 
 
 def _repetitions(
@@ -324,14 +338,14 @@ def _repetitions(
     budget: int,
     guide: LimitState | None = None,
     poor: float = 0.0,
-    kind: tuple[int, int, int] = SUBSET,
+    sizes: Sizes = SUBSET,
 ) -> list[Descent]:
     """Repeat subset simulation until the tail is precise enough.
 
     With a `guide`, each repetition uses two levels. If less than the share `poor` of the samples
     that the guide selects fails, stop after the first repetition.
     """
-    key, first, largest = BRIDGE if guide else kind
+    sizes = TWO_LEVELS if guide else sizes
 
     def judge(repetitions: Sequence[Descent]) -> float:
         if guide and _share_failing(repetitions[0]) < poor:
@@ -341,8 +355,8 @@ def _repetitions(
 
     # Take fewer samples if the budget would not allow four levels.
     return repeat_until_precise(
-        lambda *size: repetition(state, goal, guide, key, *size), judge,
-        target_cv=goal.cv, first=min(first, max(budget // 4, 20)), largest=largest,
+        lambda *size: repetition(state, goal, guide, sizes.key, *size), judge, target_cv=goal.cv,
+        first=min(sizes.first, max(budget // 4, 20)), largest=sizes.largest,
         max_evaluations=budget, meter=state.meter,
     )  # fmt: skip
 

@@ -63,8 +63,8 @@ OF_LEVEL, OF_SAMPLE = ("ceiling", "log_probability"), ("value", "ancestor", "mem
 
 def repetition_of(state: LimitState, smallest: float, number: int) -> Descent:
     """Return a repetition by number, down to the smallest probability of a curve."""
-    key, samples, _ = OF_CURVES
-    return repetition(state, Goal(0.0, probability=smallest), None, key, samples, number)
+    goal = Goal(0.0, probability=smallest)
+    return repetition(state, goal, None, OF_CURVES.key, OF_CURVES.first, number)
 
 
 def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
