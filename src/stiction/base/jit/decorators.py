@@ -174,5 +174,5 @@ def jit_allocating(function: Kernel) -> Kernel:
 
 
 def jit_inside(function: Kernel) -> Kernel:
-    """Compile a function for other kernels only, in half the time. Python cannot call it."""
+    """Compile a function for other kernels only, in less time. Python cannot call it."""
     return _compile(function, "INSIDE")

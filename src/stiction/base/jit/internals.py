@@ -1,8 +1,15 @@
-"""numba's private parts: kernels compiled in half the time, and kept by the text of their files.
+"""Compile kernels in two thirds of the time, with numba's private parts.
 
-This file may be deleted. Without it, or where it cannot be imported, as with a numba
-newer than the newest that was tried, `decorators.py` compiles the kernels with plain
-`numba.njit`, to the same bits.
+1. Compiled forms are kept on disk by the text of their file, not by its place and
+   time (`_Locator`).
+2. What only other kernels call is a draft (`_Draft`). It is stored, but becomes
+   machine code only as a part of the kernels that call it. They also take over its
+   environment (`Cache.save_overload`).
+3. Options are compared by those that were set (`_Flags`).
+4. Kernels that make no arrays count no references (`OPTIONS`).
+
+This file may be deleted. Without it, or with a numba newer than `NEWEST`, `decorators.py`
+compiles the same kernels to the same bits with plain `numba.njit`.
 """
 
 from __future__ import annotations
@@ -30,10 +37,9 @@ if numba.version_info.short > NEWEST:
 
 
 class _Locator(_CacheLocator):
-    """The folder of a function's compiled forms.
+    """The folder of a function's compiled forms, named by a digest of the text of its file.
 
-    What tells it from others is the text of its file, not where the file lies or when it
-    was written: another environment with the same package compiles nothing again.
+    Another environment with the same package therefore compiles nothing again.
     """
 
     def __init__(self, function: Any, file: str) -> None:
@@ -65,7 +71,7 @@ class _Format(CompileResultCacheImpl):
 
 
 class Cache(FunctionCache):
-    """Compiled forms of a function on disk, with the parts that drafts leave to their callers.
+    """Compiled forms of a function on disk, with the environments of the drafts it calls.
 
     Forms for a user's friction law have a folder for each state of that law.
     """
@@ -81,7 +87,7 @@ class Cache(FunctionCache):
             self._cache_file = IndexDataCacheFile(self._cache_path, base, stamp)
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        for env in data._find_referenced_environments():  # its own, and those of drafts
+        for env in data._find_referenced_environments():
             data.library.codegen.set_env(env.env_name, env)
         super().save_overload(signature, data)
 
@@ -144,4 +150,4 @@ INSIDE: dict[str, Any] = OPTIONS | {
     "no_cpython_wrapper": True,
     "pipeline_class": _InsideCompiler,
 }
-"""For what only other kernels call, in half the time."""
+"""For drafts."""

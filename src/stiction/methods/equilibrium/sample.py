@@ -29,12 +29,15 @@ and never ends."""
 
 
 class Pieces(NamedTuple):
-    """Falling, piecewise linear function f of u = slip/d_c, the same at every node."""
+    """Falling, piecewise linear function f of u = slip/d_c, the same at every node.
+
+    W of a node is the weakening rate of its first piece, whose relative slope is therefore 1.
+    """
 
     ends: Array  # (M,): u at the end of each piece; the last is 1
     starts: Array  # (M + 1,): f on each piece, continued to u = 0; from 1 to 0 (residual)
-    slopes: Array  # (M + 1,): -f' on each piece, relative to the first; from 1 to 0 (residual)
-    first: float  # -f' on the first piece
+    slopes: Array  # (M + 1,): -f' on each piece, over `first_slope`; from 1 to 0 (residual)
+    first_slope: float  # -f' on the first piece
     area: float  # integral of f
     at_corner: float = 1.0 - 1e-12  # a node with this share of a corner's slip is beyond it
 
@@ -108,7 +111,7 @@ def make_sample(
         residual = np.where(constant, excess, residual)
         fall, rate = np.where(constant, 0.0, (fall, rate))
     with np.errstate(invalid="ignore", divide="ignore"):
-        critical = np.where(rate > 0.0, pieces.first * fall / rate, 0.0)
+        critical = np.where(rate > 0.0, pieces.first_slope * fall / rate, 0.0)
     return StaticSample(excess, residual, profile, rate, critical, pieces)
 
 
@@ -311,7 +314,10 @@ def step_to_corner(
 
 @jit_inside
 def unsupported(sample: StaticSample, load: float, slip: Array) -> bool:
-    """Return whether the load exceeds the present strengths of the whole interface."""
+    """Return whether the load exceeds the present strengths of the whole interface.
+
+    Then it slides, as strength only falls with slip.
+    """
     balance = 0.0
     for i in range(slip.shape[0]):
         balance += load * sample.profile[i] - strength_at(sample, slip, i)

@@ -298,7 +298,8 @@ class PiecewiseWeakening(FrictionLaw):
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
             raise InputError(
                 "strength: must fall at every corner, from below 1 to exactly 0, got"
-                f" {self.strength}. Give a plateau a small fall, such as 0.5, 0.4999"
+                f" {self.strength}. Give a plateau a small fall, such as 0.5, 0.4999, and begin"
+                " at the top of a hump, with tau_p there"
             )
         return self
 

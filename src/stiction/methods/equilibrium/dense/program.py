@@ -328,7 +328,10 @@ class DenseProgram:
 
 
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
-    """Return the sample in which each node keeps the piece on which it is after a slip."""
+    """Return the linear sample of the pieces on which nodes are after a slip, for `solve`.
+
+    `excess` and `rate` belong to these pieces, continued to zero slip. The law no longer counts.
+    """
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, rate=present.rate)
 
