@@ -1,8 +1,7 @@
 """Importance sampling around the most likely weak spot, put at a random place on the interface.
 
 Where the problem looks the same everywhere there is one most likely failure for each place, so the
-sampling density is a mixture of normal densities shifted by the same dip at all nodes. On a plane
-the dip is that of the middle one of the critical ellipses.
+sampling density is a mixture of normal densities shifted by the same dip at all nodes.
 """
 
 from __future__ import annotations
@@ -39,27 +38,27 @@ def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:
     g times the slope of the map: a fixed point. Sampling is unbiased without it as well.
     """
     interface = problem.interface
-    windows = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
-    weight = windows[len(windows) // 2].weight
+    (window,) = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
+    weight = window.weight
     unit = np.eye(field.modes(interface).dimension)
-    waves = field.modes(interface).gaussian(unit).reshape(len(unit), -1)  # z of each draw alone
+    waves = field.modes(interface).gaussian(unit)  # z of each draw alone
     z, along = np.zeros(interface.shape), np.zeros(len(unit))
     for _ in range(100):
         slope = from_normal(field.marginal, z + 1e-4) - from_normal(field.marginal, z - 1e-4)
-        steepest = waves @ (weight * slope).ravel()
+        steepest = waves @ (weight * slope)
         # Whole steps go to and fro.
         along += 0.2 * (steepest / np.linalg.norm(steepest) - along)
         along /= np.linalg.norm(along)
-        profile = (along @ waves).reshape(interface.shape)
+        profile = along @ waves
 
         def excess(length: float, profile: Array = profile) -> float:
             return np.sum(weight * from_normal(field.marginal, -length * profile)) - stress
 
         index = brentq(excess, 0.0, 40.0, xtol=1e-10)
         z = -index * profile
-    nodes = np.indices(interface.shape).reshape(len(interface.shape), -1)
-    apart = nodes[:, None, :] - nodes[:, :, None]  # how far each node lies behind each dip
-    moved = (weight * slope)[tuple(apart % np.array(interface.shape)[:, None, None])] @ waves.T
+    nodes = np.arange(interface.size)
+    behind = (nodes - nodes[:, None]) % interface.size  # how far each node lies behind each dip
+    moved = (weight * slope)[behind] @ waves.T
     return -index * moved / np.linalg.norm(moved, axis=1, keepdims=True)
 
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from planes import moduli
+from planes import Lattice, moduli
 from setups import RATE, exact_onset, make_problem, repeated, turns
 
 import stiction as st
 from stiction.elasticity.protocol import HalfSpaces
+from stiction.methods.criterion.windows import ellipse_window
 from stiction.methods.equilibrium.patches import labelled_patches, patch_of
 from stiction.methods.equilibrium.transforms.plane import doubled, halved, plane_onset
 
@@ -89,6 +90,21 @@ def test_extents_and_centre_of_a_patch_across_the_borders():
     patch = patch_of(ring, ring.astype(float), (0.5, 2.0))
     assert patch.extents == (4.0, 2.0)
     assert patch.centre[1] == 8.0
+
+
+def test_critical_disc_at_zero_poisson_ratio():
+    # First eigenvalue of the square root of the Laplacian on the unit disc: 2.0061.
+    radius = 2.0061 * 1e9 / (2.0 * RATE)
+    length = 24.0 * radius  # images change the eigenvalue by some (radius/length)^3
+    errors = []
+    for nodes in (96, 192, 384):
+        symbol = Lattice((length, length), moduli(1e9, 0.0)).symbol((nodes, nodes))
+        window = ellipse_window(symbol, (nodes, nodes), (length, length), RATE, 1.0)
+        effective = np.sqrt(window.area / np.pi)
+        errors.append(1.0 - effective * window.eigenvalue / RATE / radius)
+    # Of first order, since where a disc ends on the grid is uncertain by a share of the spacing.
+    assert 0.0 < errors[2] < 0.015
+    assert errors[2] < 0.6 * errors[1] < 0.36 * errors[0]
 
 
 def test_grid_transfer_keeps_linear_and_uniform_fields():

@@ -362,6 +362,8 @@ def test_pressure():
 def test_a_swept_rigid_machine_is_stored(tmp_path):
     """Infinity has no number in JSON: it is written as text, and read again."""
     problem = crooked(drive=DRIVES["right pusher, rigid"], nodes=64, load=st.Load())
+    endless = dataclasses.replace(problem.specimen, quality_factor=INF)
+    problem = dataclasses.replace(problem, specimen=endless)
     study = st.Study(
         problem=problem,
         random=st.RandomField(st.Lognormal(mean=1.0e6, cv=0.2), st.PowerLawSpectrum(9e-3)),
@@ -369,6 +371,7 @@ def test_a_swept_rigid_machine_is_stored(tmp_path):
         ensemble=st.Ensemble(samples=2),
         sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
     )
+    assert study.to_dict()["problem"]["specimen"]["quality_factor"] == "inf"
     found = study.run(out=tmp_path / "run", pilot=False)
     again = st.open_run(tmp_path / "run")
     assert again.study.problem.specimen == problem.specimen
