@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oracles import dense, symbol_of
 from setups import QUARTER, make_problem
 
 import stiction as st
@@ -20,13 +21,9 @@ DROP = 2e5
 def table_of_crack(problem, inside):
     """The table of an event that lowers the stress by `DROP` in a crack, by dense algebra."""
     shape = problem.interface.shape
-    response = problem.interface.inverse_transform(problem.half_spaces.symbol(shape))
-    nodes = np.argwhere(inside)
-    apart = (nodes[:, None] - nodes[None]) % np.array(shape)
-    slip = np.zeros(shape)
-    slip[inside] = np.linalg.solve(
-        response[tuple(np.moveaxis(apart, -1, 0))], np.full(len(nodes), DROP)
-    )
+    nodes, slip = np.flatnonzero(inside), np.zeros(shape)
+    stiffness = dense(symbol_of(problem), shape)[np.ix_(nodes, nodes)]
+    slip[inside] = np.linalg.solve(stiffness, np.full(nodes.size, DROP))
     rows = problem.sample(np.full(shape, 1e6))
     still = np.zeros(slip.size)
     before = EquilibriumState(DROP, still, still)  # the residual strength is zero

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from checks import assert_same
+from oracles import dense, symbol_of
 from setups import LOCAL, beta_strength, exact_onset, make_problem, within
 from specimens import crooked, rough
 
@@ -51,8 +52,7 @@ def test_the_part_that_can_break_follows_its_rows_and_columns_of_the_stiffness(
     if problem.specimen is not None:
         stiffness, strength = problem.blocks.stiffness, rough(problem, seed)
     else:
-        column = np.fft.irfft(problem.half_spaces.symbol((96,)), 96)
-        stiffness = column[np.subtract.outer(np.arange(96), np.arange(96)) % 96]
+        stiffness = dense(symbol_of(problem), (96,))
     inside, sample = problem.interface.breakable, problem.sample(strength)
     found = exact_onset(problem, strength, sensitivity=True)
     loads = np.array([0.7, 0.95, 0.9999, 1.0001, 1.3]) * found.critical_load.item()
@@ -111,10 +111,9 @@ def test_a_plane_with_a_hole_follows_its_rows_and_columns_of_the_stiffness():
     x, y = np.meshgrid(*PLANE.interface.coordinates.values(), indexing="ij")
     hole = (np.abs(x - 0.01) < 0.001) & (np.abs(y - 0.01) < 0.001)
     inside = (np.abs(x - 0.015) < 0.0125) & (np.abs(y - 0.012) < 0.011) & ~hole
-    problem, nodes = within(PLANE, inside), np.indices(inside.shape).reshape(2, -1)
+    problem = within(PLANE, inside)
     strength = beta_strength(4e-3).sample(PLANE.interface, seed=2)[0]
-    column = np.fft.irfft2(problem.half_spaces.symbol(inside.shape), inside.shape)
-    stiffness = column[tuple(nodes[:, :, None] - nodes[:, None, :])]  # wraps like the plane
+    stiffness = dense(symbol_of(problem), inside.shape)
     sample = [rows.reshape(1, -1) for rows in problem.sample(strength)[:4]]
     flat = problem.sample(strength)._replace(load_profile=np.ones(inside.size))
     flat = flat._replace(**dict(zip(flat._fields[:4], sample, strict=True)))

@@ -79,36 +79,6 @@ def test_design_stress_has_the_probability_asked_for():
     assert 0.66e6 < low < answer.stress < high
 
 
-@pytest.mark.slow
-def test_against_openturns_subset_sampling():
-    """Its block size must not exceed p_0 N: larger blocks report too small an error."""
-    ot = pytest.importorskip("openturns")
-    system = PROBLEM, st.paper.strength(PROBLEM, 1.0)
-    state, stress = st.external.limit_state(*system, LOCAL), 0.6615e6
-
-    def sample(points):
-        return state(np.asarray(points))[:, None]
-
-    ot.RandomGenerator.SetSeed(1)
-    function = ot.PythonFunction(state.dimension, 1, func_sample=sample)
-    vector = ot.CompositeRandomVector(function, ot.RandomVector(ot.Normal(state.dimension)))
-    event = ot.ThresholdEvent(vector, ot.Less(), stress)
-    found = []
-    for _ in range(6):
-        algorithm = ot.SubsetSampling(event)
-        algorithm.setMaximumOuterSampling(20)
-        algorithm.setBlockSize(100)
-        algorithm.setConditionalProbability(0.1)
-        algorithm.run()
-        found.append(algorithm.getResult().getProbabilityEstimate())
-    ours = by(system, stress, "subset", 0.1)
-    assert ours.probability < 1e-3
-    # Four joint standard errors; theirs from the spread of its own six runs.
-    spread = np.std(found, ddof=1) / math.sqrt(len(found))
-    error = math.hypot(spread, ours.probability * ours.cv)
-    assert abs(np.mean(found) - ours.probability) < 4.0 * error
-
-
 def test_two_very_different_interfaces_against_counting_and_each_alone():
     """On a crooked line: short and weak, or long and strong with a random residual strength."""
     problem = without(LINE, "friction.residual_strength")
