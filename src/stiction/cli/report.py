@@ -185,7 +185,7 @@ def _where(part: xr.Dataset, dims: list[str]) -> str:
 
 
 def densities(result: xr.Dataset, along: str | None) -> Figure:
-    """Return a figure of the densities of the onset and of its position, along a sweep."""
+    """Return a figure with the densities of the onset and its position, along a sweep."""
     parts = [result[[shown_quantity(result)]]]
     if DIRECTION in result["critical_position"].dims:
         place = result[["critical_position"]]

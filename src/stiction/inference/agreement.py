@@ -64,7 +64,7 @@ PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the 
 
 
 class Predicted(NamedTuple):
-    """Distribution function of the predicted peaks of one kind of specimen."""
+    """Predicted distribution function of the peaks, for one kind of specimen."""
 
     values: Array  # rising, in the unit of the peaks
     share: Array  # share of peaks up to each value
@@ -86,7 +86,7 @@ class Agreement(Result):
         Probability of a distance at least as large if the prediction is right, by the
         names of the two distances.
     predicted : tuple of (values, share)
-        Predicted distribution function of each kind of specimen.
+        Predicted distribution function for each kind of specimen.
     band : float
         Largest deviation that 90 % of campaigns do not exceed.
     precursors : dict of str to (measured, predicted) arrays

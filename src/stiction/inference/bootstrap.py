@@ -218,7 +218,7 @@ def intervals(
 
 
 def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
-    """Return the limits of parameters. Bounds of the marginal lie outside of all values."""
+    """Return limits for parameters. Bounds of the marginal lie outside all values."""
     estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())

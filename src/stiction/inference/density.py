@@ -1,4 +1,4 @@
-"""Density of a measured peak: the density of the onset, with the error of the load cell.
+"""Density of a measured peak: the density of the onset, blurred by the load cell.
 
 Problem. Onsets T_1, ..., T_N were simulated, all of them above the bound b.
 Wanted is the density

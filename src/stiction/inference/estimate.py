@@ -139,7 +139,7 @@ class Estimate:
 
     @property
     def of_means(self) -> Array:
-        """Variance of the mean of each record by the field alone."""
+        """Variance that the field alone gives to the mean of each record."""
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         deviation = self.parameters["standard_deviation"]
@@ -147,7 +147,7 @@ class Estimate:
 
     @cached_property
     def within(self) -> Array:
-        """Variance of the logarithm of the mean of each record by the field alone."""
+        """Variance that the field alone gives to the log mean of each record."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     @property
@@ -271,7 +271,7 @@ def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
 
 
 class Goodness(NamedTuple):
-    """Quality of a family of marginals: its best member, and two measures of the fit.
+    """How well a family of marginals fits: its best member, and two measures.
 
     `distance` is Kolmogorov's distance. `score` is the score of step 4 less the score of
     the best family: 0 for the best family, negative for others. Differences below 2 do

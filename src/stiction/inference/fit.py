@@ -129,7 +129,7 @@ class FieldFit(Result):
         specimens.
     interval : dict of str to (float, float)
         Bootstrap interval of each parameter. The interval of the noise may begin
-        at zero. Intervals of the bounds of the marginal end outside of the
+        at zero. The bounds of the marginal have intervals that end outside the
         values. Intervals of exponent and anisotropy end at the searched ranges,
         0.65 to 16 and 0.05 to 20. With `between`, the intervals of ``mean`` and
         ``between`` come from the posterior by the levels of the records.
@@ -139,7 +139,7 @@ class FieldFit(Result):
         Fits to records simulated from `field`, as another measurement might have
         given them.
     families : dict of str to Goodness
-        Quality of each requested family of marginals, the best family first.
+        Quality of the fit by each requested family, the best family first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float

@@ -66,7 +66,7 @@ class SpecimenPosterior(Posterior):
     Attributes
     ----------
     families : dict of str to float
-        Posterior probability of each family of the factor between specimens.
+        Posterior probability of each family for the factor between specimens.
     agreement : Agreement or None
         Agreement of the peaks with the prediction by the profiles alone. None without
         profiles.
@@ -78,7 +78,7 @@ class SpecimenPosterior(Posterior):
 
     @property
     def families(self) -> dict[str, float]:
-        """Posterior probability of each family of the factor between specimens."""
+        """Posterior probability of each family for the factor between specimens."""
         return self.grid.families
 
     @cached_property

@@ -213,7 +213,7 @@ class Area(NamedTuple):
 
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
-    """Return the area of specimens of a length, m. None keeps the length of the problem."""
+    """Return the area of specimens with a length, m. None keeps the length in the problem."""
 
     def areas(points: Array) -> list[Any]:
         return [own.problem.area for own in experiments_at(prior, points, method, length)]

@@ -249,7 +249,7 @@ def table_of(given: Any) -> dict[str, Any]:
 
 
 def family_of(given: Any) -> Family:
-    """Return the family of a name, or of a table with some of its parameters."""
+    """Return the family that a name, or a table with some of its parameters, stands for."""
     fixed = table_of(given)
     name = str(fixed.pop("type", None))
     if name in KINDS:

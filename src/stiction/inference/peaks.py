@@ -44,7 +44,7 @@ class Peaks(Result, _Peaks):
     Attributes
     ----------
     lengths : tuple of float or None
-        Length of each kind of specimen, m. None stands for the length of the problem.
+        Specimen length for each kind, m. None stands for the length of the problem.
     values : tuple of arrays
         Peaks of each kind, in `unit`.
     unit : str
@@ -125,7 +125,7 @@ def si_of(unit: str) -> str:
 
 
 def factor_of(unit: str) -> float:
-    """Return the factor from a unit of stress, of force or of a friction coefficient to SI."""
+    """Return the factor to SI from a unit of stress, force or friction coefficient."""
     try:
         return factor_to(si_of(unit), unit)
     except InputError as error:

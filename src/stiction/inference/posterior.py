@@ -36,8 +36,8 @@ class Posterior(Result):
     draws : dict of (draws,) arrays
         Draws of each parameter, in its own unit.
     information : dict of float
-        Kullback-Leibler divergence of the marginal posterior of each parameter
-        from its prior, nats. Halving a uniform range gives ln 2 = 0.69.
+        Kullback-Leibler divergence between the marginal posterior of a parameter and
+        its prior, nats. Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
         Logarithm of the density of the peaks under the prior, to compare models.
     monte_carlo_error : float

@@ -185,7 +185,7 @@ class Onsets:
 
 
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
-    """Return points of x over all ranges, in steps of a quarter of the least deviation."""
+    """Return points x over all ranges, a quarter of the least deviation apart."""
     lows, highs, deviations = zip(*ranges, strict=True)
     low, high = min(lows), max(highs)
     count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))

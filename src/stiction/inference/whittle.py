@@ -133,7 +133,7 @@ class Model(NamedTuple):
         return math.sqrt(self.noise_share * self.variance)
 
     def power(self, window: RecordWindow) -> Array:
-        """Return the variance of z in each mode of the period of a window."""
+        """Return the variance of z in each mode on the periodic grid of a window."""
         return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
 
     def correlation(self, window: RecordWindow) -> Array:
@@ -231,7 +231,7 @@ class SpectrumFamily:
 
 
 class Whittle(NamedTuple):
-    """The likelihood of periodograms as a function of the vector of a family."""
+    """The likelihood of periodograms, given the parameter vector of a family."""
 
     family: SpectrumFamily
     shares: Array

@@ -66,7 +66,7 @@ class Edge(NamedTuple):
 
 
 class RecordWindow:
-    """Points of records of one geometry, `spacings` (m) apart: taper, gaps, and degree of trend.
+    """Points of records with the same geometry, `spacings` (m) apart: taper, gaps, degree of trend.
 
     Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. The shape of a real
     transform is (*half).
@@ -155,7 +155,7 @@ class RecordWindow:
         return result
 
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
-        """Return the variance of z in each mode of a period of the grid. The sum is 1 (step 4).
+        """Return the variance of z in each mode on a periodic grid. The sum is 1 (step 4).
 
         Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades out
         at its truncation. It has no truncation if `end_seen` is false, because the

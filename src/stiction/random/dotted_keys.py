@@ -20,7 +20,7 @@ MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 
 
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
-    """Return a copy of a model object, or of a list of them, with values at dotted keys.
+    """Return a copy of a model object or a list of them, with values at dotted keys.
 
     Messages begin with `path`, the dotted key of the object itself. Raises an `InputError` if a
     key does not exist (with the nearest valid key) or a value is invalid.

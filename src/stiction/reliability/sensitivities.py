@@ -1,4 +1,4 @@
-"""Effects of families of the factor and of assumed constants on a design.
+"""How a design changes with the family of the factor and with assumed constants.
 
 Problem. The interval of a design contains the error of the computation.
 Assumptions move the design more: constants of the problem that were not measured,

@@ -21,9 +21,9 @@ Steps:
    would reach the target, within the limits of size and evaluations.
 5. If fewer than a share `POOR` of the samples of a guide that 'auto' chose are failures,
    sample again by subset simulation.
-6. The stress of a probability follows from p(s) by bisection. The ends of its interval
-   are the stresses of the ends of the interval of p. The lower end is the least
-   possible stress if no sample is so low.
+6. The stress at a probability follows from p(s) by bisection. Its interval ends at the two
+   stresses that belong to the interval of p. The lower end is the least possible stress
+   if no sample is so low.
 """
 
 import math
@@ -70,7 +70,7 @@ OF_CURVES = Sizes(4, 2_000, 2_000)
 
 
 class Goal(NamedTuple):
-    """Goal of sampling a tail: the probability of a stress, or the stress of a probability.
+    """What to find in a tail: the probability below a stress, or the stress at a probability.
 
     The default of the other number is out of reach: no level stops the sampling there.
     """

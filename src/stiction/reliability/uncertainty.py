@@ -16,7 +16,7 @@ CONFIDENCE = 0.95
 
 
 def log_width(cv: float) -> float:
-    """Return half the width of the interval of the logarithm of an estimate.
+    """Return half the width of the interval for the logarithm of an estimate.
 
     It follows Student's distribution, because the coefficient of variation is itself
     estimated, from about 1/cv^2 independent families.
@@ -45,7 +45,7 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 
 
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
-    """Return the squared coefficient of variation of a subset estimate by ancestors of failures.
+    """Return the squared c.o.v. of a subset estimate, from the ancestors of failures.
 
     Families that descend from different first samples, N = `samples` in all, evolve
     independently. Their shares w_i among the failures then measure the error, v = sum

@@ -1,4 +1,4 @@
-"""State of a rupture: constants of a run, variables, and diagnostics of every step.
+"""State of a rupture: constants of the run, variables, and diagnostics at every step.
 
 A run takes two kinds of steps. Implicit steps of adaptive size follow a creeping
 interface (`implicit`), and explicit steps of fixed size follow its waves
