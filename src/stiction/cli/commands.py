@@ -30,7 +30,7 @@ from stiction.base.errors import (
 )
 from stiction.base.progress import Meter, duration, interrupted
 
-MAX_SHOWN_FAILURES = 12
+MAX_SHOWN_LINES = 12
 """Points, failures or damaged chunks in a list."""
 RUPTURE = (
     "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
@@ -87,10 +87,10 @@ def _method(match: re.Match[str]) -> str:
 
 
 def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
-    for text in texts[:MAX_SHOWN_FAILURES]:
+    for text in texts[:MAX_SHOWN_LINES]:
         echo(f"{prefix}{text}", err=err)
-    if len(texts) > MAX_SHOWN_FAILURES:
-        echo(f"{prefix}and {len(texts) - MAX_SHOWN_FAILURES} more", err=err)
+    if len(texts) > MAX_SHOWN_LINES:
+        echo(f"{prefix}and {len(texts) - MAX_SHOWN_LINES} more", err=err)
 
 
 def _ignore_local_style() -> None:

@@ -97,14 +97,13 @@ def _predict(
 def _correct(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Step 2: update slip, rate and stress. Return the work (without the cell) and the sum of V.
+    """Step 2: update slip, rate and stress, and write strength and increments of slip.
 
-    Afterwards `tables.transfer` holds the strength, and `tables.predicted` the slip by the mean of
-    the rates before and after the step, from which `finish_step` finds when a front arrived.
+    Return the work (without the cell) and the sum of V.
     """
     nodes, law, step = setting.nodes, setting.law, tables.step
     slip, rate, stress = state.slip, state.rate, state.stress
-    transfer, predicted = tables.transfer, tables.predicted
+    transfer, predicted, increments = tables.transfer, tables.predicted, tables.increments
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial = nodes.profile, nodes.initial
     work, total = 0.0, 0.0
@@ -116,8 +115,8 @@ def _correct(
         at_rest = transfer[i] + load * profile[i] + initial[i]
         v = max(at_rest - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])
-        predicted[i] = 0.5 * step * (rate[i] + v)
-        transfer[i], slip[i], rate[i], stress[i] = limit, next_slip, v, at_rest - impedance * v
+        increments[i], tables.strength[i] = 0.5 * step * (rate[i] + v), limit
+        slip[i], rate[i], stress[i] = next_slip, v, at_rest - impedance * v
         total += v
     return work, total
 
@@ -191,8 +190,9 @@ def explicit_steps(
         rise, radiated = abs(load - now.load), impedance * total / n
         now.explicit_steps += 1
         done = TakenStep(time, step, load, work * grid.cell, radiated)
-        slips, strength = tables.predicted, tables.transfer
-        fall = finish_step(state, grid, setting, done, slips, strength, record, taken)
+        fall = finish_step(
+            state, grid, setting, done, tables.increments, tables.strength, record, taken
+        )
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
         if now.weakened_nodes >= thresholds.slid_stop and (calm or not thresholds.held):

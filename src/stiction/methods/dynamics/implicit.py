@@ -206,22 +206,22 @@ def _accept(
     attempt: _Attempt,
     radiated: float,
 ) -> Any:
-    """Step 5: take the step in place and return it. Write the strength to `tables.driving`."""
+    """Step 5: take the step in place and return it. Write the strength after it."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
-    law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.trial_stress
-    rate_hat, past_hat, transfer_hat = tables.rate_hat, tables.past_hat, tables.work
+    law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.transfer
+    rate_hat, slope_hat, transfer_hat = tables.rate_hat, tables.slope_hat, tables.work
     stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
     forward(grid.transform, u, rate_hat)
     for q in range(rate_hat.size):
         slip_hat[q] += rate_hat[q]
-        mean, past = complex(rate_hat[q].real / size, rate_hat[q].imag / size), past_hat[q]
-        rate_hat[q] = mean
-        past_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
+        mean = complex(rate_hat[q].real / size, rate_hat[q].imag / size)
+        rate_hat[q], past = mean, tables.past_hat[q]
+        slope_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
     advance_with_ramp(grid, state.memory, tables)
     transfer_hat[0] = 0.0
     for q in range(1, transfer_hat.size):
         response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
-        memory, v, a, slip = tables.memory_sum[q], rate_hat[q], past_hat[q], slip_hat[q]
+        memory, v, a, slip = tables.memory_sum[q], rate_hat[q], slope_hat[q], slip_hat[q]
         g, c = stiffness[0, q], stiffness[1, q]
         real = c * (memory.real + response * v.real + ramp * a.real) - g * slip.real
         imaginary = c * (memory.imag + response * v.imag + ramp * a.imag) - g * slip.imag
@@ -229,7 +229,7 @@ def _accept(
     backward(grid.transform, transfer_hat, transfer)
     slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
-    profile, initial, limit = nodes.profile, nodes.initial, tables.driving
+    profile, initial = nodes.profile, nodes.initial
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     work = 0.0
     for i in range(u.size):
@@ -238,7 +238,7 @@ def _accept(
         rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
-        limit[i] = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+        tables.strength[i] = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
     return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
 
 
@@ -311,7 +311,7 @@ def implicit_steps(
         done = _accept(state, grid, setting, tables, attempt, radiated)
         now.implicit_steps += 1
         now.two_step, now.previous_size, now.previous_radiated = 1, size, radiated
-        fall = finish_step(state, grid, setting, done, u, tables.driving, record, taken)
+        fall = finish_step(state, grid, setting, done, u, tables.strength, record, taken)
         taken += 1
         # 6. The next size, or the end.
         if not clipped:

@@ -158,7 +158,7 @@ def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) ->
     """Return the tables of `step_table` with the work arrays of a run."""
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * ENTRIES)
-    spectra, fields = work_arrays(2, modes, complex), work_arrays(2, nodes, float)
+    spectra, fields = work_arrays(2, modes, complex), work_arrays(4, nodes, float)
     return ExplicitTables(step, table, response, packed, *spectra, *fields)
 
 
@@ -269,8 +269,8 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     table, ramp = (zeros(count * pairs * rows * ENTRIES) for rows in (4, 2))
     arrays: Any = (
         *(table, ramp, *work_arrays(2, entries, float), *work_arrays(2, modes, float)),
-        *work_arrays(4, modes, complex),
-        *work_arrays(8, nodes, float),
+        *work_arrays(5, modes, complex),
+        *work_arrays(10, nodes, float),
         np.zeros(nodes, dtype=np.int64),
         *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
         np.empty((2, TWO_ROWS)),
@@ -359,10 +359,10 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
 
 @jit_inside
 def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Step 2: set psi <- E psi + B V + R a with V = `rate_hat` (m/s) and a = `past_hat` (m/s²)."""
+    """Step 2: set psi <- E psi + B V + R a with V = `rate_hat` (m/s), a = `slope_hat` (m/s²)."""
     pairs, multiplicity = grid.poles.size, grid.multiplicity
     pack(grid.offset, tables.rate_hat, tables.packed)
-    pack(grid.offset, tables.past_hat, tables.second_packed)
+    pack(grid.offset, tables.slope_hat, tables.second_packed)
     for block in range(memory.size // (FOUR_ROWS * pairs)):
         v, a = (
             tables.packed[block * TWO_ROWS :][:TWO_ROWS],

@@ -266,8 +266,10 @@ class ExplicitTables(NamedTuple):
     packed: Array
     rate_hat: Spectrum
     shared: Spectrum
-    transfer: Array
-    predicted: Array
+    transfer: Array  # (nodes,), like the rest
+    predicted: Array  # slip rate at the end of the step, if the rate before acts all along
+    strength: Array  # after the step
+    increments: Array  # of slip, by the mean of the rates before and after the step
 
 
 class ImplicitTables(NamedTuple):
@@ -280,11 +282,14 @@ class ImplicitTables(NamedTuple):
     ramp_response: Array
     symbol: Array  # (modes,): eigenvalues of the matrix of a step, Pa/m
     inverse: Array
-    memory_sum: Spectrum  # (modes,), like the next three
+    memory_sum: Spectrum  # (modes,), like the next four
     past_hat: Spectrum
     rate_hat: Spectrum
+    slope_hat: Spectrum  # of the slip rate in the step
     work: Spectrum
     trial_stress: Array  # (nodes,), like the rest up to `slipping`
+    transfer: Array
+    strength: Array  # after the step
     increment: Array
     driving: Array
     falling: Array
