@@ -292,11 +292,17 @@ def mistakes(
 ) -> list[tuple[str, str]]:
     """Return the mistakes that pydantic found in a model or call, each with its path.
 
-    `valid` are the names of the keys or arguments. Mistakes inside another model were
-    explained there. Pydantic adds the members of a union to the path of a `call`, and
-    they are left out.
+    `valid` are the names of the keys or arguments. Each item of pydantic is put into words:
+
+    1. The path gets names in place of positions. In a call, and where another model explained
+       the mistake, pydantic adds members of unions to the path. They are left out.
+    2. An `InputError` has texts of its own, from another model with their paths.
+    3. Otherwise the kind of the item decides about the text.
+    4. A union has an item for each member. Their texts are joined by 'or'.
+    5. A key that is missing is left out if another key is its misspelling.
     """
-    texts: dict[tuple[str, str, str], list[str]] = {}  # a union has an item for each member
+    # Members of a union by path, text and given value.
+    texts: dict[tuple[str, str, str], list[str]] = {}
     shown = [name for name in valid if name != "self"]
     misspelt: set[str] = set()
     items = error.errors()
@@ -304,17 +310,20 @@ def mistakes(
         kind, given = item["type"], f", got {describe(item.get('input'))}"
         context, steps = item.get("ctx") or {}, list(item["loc"])
         cause = context.get("error")
+        # 1.
         if steps and isinstance(steps[0], int) and steps[0] < len(valid):
             steps[0] = valid[steps[0]]
         if call or isinstance(cause, Mistakes):
             named = steps[: bool(valid)]
             steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
         path = ".".join(map(str, steps))
+        # 2.
         if isinstance(cause, InputError):
             without_path = [("", text) for text in cause.problems]
             for inner, text in getattr(cause, "places", without_path):
                 texts[_joined(path, inner), text, ""] = [""]
             continue
+        # 3.
         text, member = str(cause), ""
         if kind == "unexpected_positional_argument":
             return [("", f"give the arguments by name (valid: {', '.join(shown)})")]
@@ -328,6 +337,7 @@ def mistakes(
             text, member = "must be ", item["msg"].removeprefix("Input should be ")
             member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else member
         texts.setdefault((path, text, given), []).append(member)
+    # 4. and 5.
     return [
         (path, text + " or ".join(dict.fromkeys(members)) + given)
         for (path, text, given), members in texts.items()

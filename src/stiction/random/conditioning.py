@@ -33,8 +33,8 @@ Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17,
    + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
    densely. If some p_k are negative, V is turned so that P is diagonal in it, and
    s^2 stands for the eigenvalues of P^-1 - 1, which may be negative.
-4. Remove the Gaussian of each place from the posterior, which gives z_k given all
-   other values (`_from_others`).
+4. Remove the Gaussian of each place from the posterior. The result is the cavity: mean
+   and variance of z_k given all other values (`_from_others`).
 5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
 6. Map draws before the regression, so that they have the density (1) instead of
    its Gaussian approximation (`stiction.random.transport`, which also estimates
