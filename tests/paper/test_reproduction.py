@@ -189,6 +189,10 @@ def pipeline(tmp_path_factory):
     pages.mkdir()
     save, write = Figure.savefig, page.write
 
+    def coarse(figure, file, **_):
+        figure.set_layout_engine("none")  # which draws everything twice
+        save(figure, file, dpi=30)
+
     def record(path, *arguments, **options):
         write(path, *arguments, **options)
         text = re.sub(r'data:image[^"]*', "", path.read_text(encoding="utf-8"))
@@ -197,7 +201,7 @@ def pipeline(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(said):
         patch.setattr(runner, "QUICK", FEWER)
         patch.setattr(page, "write", record)
-        patch.setattr(Figure, "savefig", lambda own, file, **_: save(own, file, dpi=30))
+        patch.setattr(Figure, "savefig", coarse)
         main(["--quick", "--full", "--out", str(out)])
     return out, said.getvalue()
 
@@ -349,7 +353,7 @@ def test_numbers_in_the_documentation_are_those_that_are_computed(pipeline):
         key = f"{float(row['xi_0/h_n']):g}" if row["xi_0/h_n"] else row["case"]
         computed[row["claim"], row["quantity"], key] = row
     mean, rms = {}, {}
-    table = cells("docs/paper.md", "| `")
+    table = [row for row in cells("docs/paper.md", "| `") if len(row) == 4]
     for name, quantity, at, value in table:
         number, error, unit = re.match(r"(\S+) ± (\S+) ?(.*)", value).groups()
         row = computed[name.strip("`"), quantity, at]
