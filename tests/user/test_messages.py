@@ -87,14 +87,6 @@ def test_names_are_found_in_any_case_and_among_all_valid_keys():
         refuses(f"did you mean {meant}", lambda plain=plain: st.Study.from_dict(plain))
 
 
-def test_an_infinite_strength_names_the_extent():
-    strength = [float("inf")] + 255 * [1e6]
-    refuses(
-        "strength: must be finite ... interface.extent",
-        lambda: st.onset(make_problem(), strength, method=EXACT),
-    )
-
-
 def test_what_stands_in_the_place_of_a_random_field_gets_one_line():
     """An array was refused number by number; a field that goes into the wrong call is led on."""
     problem, field = make_problem(), beta_strength(4e-3)
