@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from oracles import dense, symbol_of
-from setups import LOCAL, beta_strength, exact_onset, make_problem, within
+from setups import LENGTH, LOCAL, QUARTER, beta_strength, exact_onset, make_problem, within
 from specimens import crooked, rough
 
 import stiction as st
@@ -102,6 +102,29 @@ def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
     half = 0.5 * problem.nucleation_length
     assert np.all(local.critical_position > 0.006 + half - 1e-3)
     assert np.all(local.critical_position < 0.041 - half + 1e-3)
+
+
+def test_the_event_that_breaks_a_fault_is_not_arrested_and_slip_that_restarts_is_no_event():
+    """Locked nodes slip again as the load rises, and the last nodes beside the ends creep."""
+    law = st.LinearWeakening(critical_slip=8e-6, residual_strength=3e5)
+    fault = make_problem(solid=QUARTER, friction=law, mode="III")
+    fault = within(fault, (0.025, 0.075))
+    strength = beta_strength(7.5e-3, 3.2e5, 1.5e6, mean_mode=True)
+    strength = strength.sample(fault.interface, samples=8, seed=1)
+    exact = exact_onset(fault, strength)
+    # The load rises by 2e-5 and 2e-3 of the stress scale while waves cross the fault.
+    for rate, close in ((1e6, 3e-5), (1e8, 3e-3)):
+        found = st.onset(fault, strength, method=st.Rupture(loading_rate=rate), progress=False)
+        np.testing.assert_array_equal(found.arrested_events, 0)  # inertia carries one through
+        np.testing.assert_allclose(found.critical_load, exact.critical_load, rtol=close)
+
+
+def test_a_local_criterion_that_leaves_out_what_the_ends_take_over_is_doubted():
+    """Stresses on two nucleation lengths are 6 % too high on average."""
+    problem = within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH))
+    strength = beta_strength(LENGTH, mean_mode=True).sample(problem.interface, samples=20)
+    with pytest.warns(st.AccuracyWarning, match=r"by \+[2-9].* st.Equilibrium"):
+        st.onset(problem, strength, method=LOCAL, progress=False)
 
 
 PLANE = make_problem((48, 40), (0.03, 0.025), weakening_rate=4e11, residual_strength=2e5)

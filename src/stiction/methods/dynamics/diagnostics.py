@@ -18,6 +18,14 @@ an instability. So the fall that counts is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
+It counts only if the mean strength of all nodes has fallen as far as <tau> ever did since
+the maximum. Slipping nodes carry their strength, and static stress transfer only takes load
+off them (the sum of K d over them is not negative). So the sum of (1) over them says that Z <V>
+grows by no more than strength falls and the load on them rises. In a slow instability strength
+falls by ten times as much as <tau>. If locked nodes at their residual strength slip again because
+the load rises, waves may overshoot and lower <tau>, but strength does not fall. A stress above the
+strength at the start counts as strength, because its release is an instability, too.
+
 Algorithm, after each step of a run (`observe`)
 -----------------------------------------------
 1. Compute the fall (2).
@@ -34,7 +42,8 @@ Algorithm, after each step of a run (`observe`)
    highest maximum so far.
 5. Note <tau> once all nodes that can break are at their residual strength. From
    then on no instability can begin. Reaching this state is no instability by
-   itself, as the last nodes beside the end of an extent may creep to it.
+   itself, as the last nodes beside the end of an extent may creep to it. If they
+   do, the interface slid in the last instability before, which is not arrested.
 
 Two consequences. A maximum without such a fall after it, such as the largest load
 or the stress that returns when slip dies, is no instability. If the stress is
@@ -106,6 +115,7 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 def _set_maximum(now: Any, radiated: float) -> None:
     """Take the present mean stress as the last maximum."""
     now.maximum_stress, now.maximum_radiated = now.whole_stress, radiated
+    now.maximum_strength, now.largest_fall = now.strength_change, 0.0
     now.maximum_breakable = now.mean_stress
     now.maximum_time, now.maximum_load, now.maximum_node = now.time, now.load, now.top_node
 
@@ -132,8 +142,8 @@ def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
     if now.in_event:
         now.in_event = 0
         # Once all nodes have broken the event cannot have been arrested.
-        if not now.all_broken and now.event_slip_rate > unstable_rate:
-            now.arrested_events += 1
+        now.last_arrested = not now.all_broken and now.event_slip_rate > unstable_rate
+        now.arrested_events += now.last_arrested
         _set_maximum(now, radiated)
 
 
@@ -143,6 +153,9 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     # 1. The fall by waves.
     below = now.maximum_stress - now.whole_stress
     fall = min(below, radiated - now.maximum_radiated)
+    now.largest_fall = max(now.largest_fall, fall)
+    if now.largest_fall > now.maximum_strength - now.strength_change:
+        fall = 0.0
     # 2. The place of the maximum.
     if below < _AT_MAXIMUM * now.scale and fall > 0.0:
         now.maximum_node = now.top_node
@@ -159,6 +172,8 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     # 5. The end of all strength above the residual.
     if now.weakened_nodes >= thresholds.breakable and not now.all_broken:
         now.all_broken, now.kinetic_stress = 1, now.mean_stress
+        if not now.in_event:
+            now.arrested_events -= now.last_arrested
     return fall
 
 
@@ -191,7 +206,8 @@ def finish_step(
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival
     front_share = setting.thresholds.front_share
-    top_rate, top_node, weakened, slip_sum = -1.0, 0, 0, 0.0
+    top_rate, top_node, weakened, slip_sum, change = -1.0, 0, 0, 0.0, 0.0
+    peak = setting.nodes.peak
     margin, margin_node = now.reverse_margin, now.reverse_node
     for i in range(slip.size):
         if rate[i] > top_rate:
@@ -206,9 +222,12 @@ def finish_step(
             passed = (slip[i] - front_share * residual_slip[i]) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]
+        if peak[i] < np.inf:
+            change += strength[i] - peak[i]
     whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
     now.whole_stress, now.weakened_nodes = whole_stress, weakened
+    now.strength_change = change / slip.size
     now.mean_stress = whole_stress
     if setting.thresholds.held:
         now.mean_stress = _mean_where_breakable(

@@ -150,6 +150,10 @@ class Run:
         # The mean stress before the first slip, when no waves are radiated.
         now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
         now["whole_stress"] = stress.mean()
+        weakens = np.isfinite(limit)
+        now["strength_change"] = (limit[weakens] - nodes.peak[weakens]).sum() / limit.size
+        # Stress above the strength counts as strength.
+        now["maximum_strength"] = now["strength_change"] + impedance * rate.mean()
         now["maximum_breakable"] = now["maximum_stress"]
         if thresholds.held:
             now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)

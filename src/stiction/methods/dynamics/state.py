@@ -83,6 +83,7 @@ DIAGNOSTICS = np.dtype(
         ("mean_slip_rate", "f8"),  # m/s
         ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
         ("whole_stress", "f8"),  # mean stress of all nodes
+        ("strength_change", "f8"),  # change of their mean strength by slip
         ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
         ("top_node", "i8"),
         ("weakened_nodes", "i8"),  # number of nodes at the residual strength
@@ -91,6 +92,8 @@ DIAGNOSTICS = np.dtype(
         ("maximum_stress", "f8"),
         ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time
         ("maximum_radiated", "f8"),  # Z <V>
+        ("maximum_strength", "f8"),  # `strength_change`
+        ("largest_fall", "f8"),  # of the mean stress since then, by waves
         ("maximum_time", "f8"),
         ("maximum_load", "f8"),
         ("maximum_work", "f8"),
@@ -111,6 +114,7 @@ DIAGNOSTICS = np.dtype(
         ("fast_since", "f8"),  # when a node first and last slipped faster than `unstable_rate`
         ("fast_until", "f8"),  # in it, s
         ("arrested_events", "i8"),
+        ("last_arrested", "i8"),  # whether the last instability is among them
         ("first_stress", "f8"),  # mean stress at the first instability
         ("onset_stress", "f8"),  # mean stress of all nodes at the highest instability
         ("critical_stress", "f8"),  # largest mean stress of breakable nodes at an instability

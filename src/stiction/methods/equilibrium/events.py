@@ -16,8 +16,9 @@ table has these measures:
    the mean of K delta over the patch, the second its mean weighted by delta. The
    third is twice the energy that the slip releases beyond friction at the
    residual strength, over the integral of delta. Waves and weakening share this
-   energy. If the stress comes to rest at the residual strength, the third equals
-   the second.
+   energy. If the stress comes to rest at the residual strength at a constant load,
+   the third equals the second. A rupture knows both shares, which contain the work
+   of the load that rises meanwhile.
 4. The fracture energy is dissipated above the residual strength.
 5. Methods with inertia know how long an event takes and, between half-spaces,
    when it begins and what it radiates.
@@ -160,12 +161,16 @@ def _measures(
     stress_after = after.load - problem.relief(after.slip)
     moment = moment_of(problem, added)
     # 3. and 4. Stress drops and fracture energy. Waves and weakening share what the mean of the
-    # stress before and after does on the slip beyond the residual strength.
+    # stress before and after, at a constant load, does on the slip beyond the residual strength.
     drop, residual = problem.released_stress(added), rows.residual_strength[row]
     above = rows.initial_stress[row] + before.load * rows.load_profile - residual
     above = above - problem.released_stress(slips[0])
     weakening = np.where(np.isfinite(rows.strength[row]), rows.strength[row] - residual, 0.0)
     dissipated = [law.dissipated(slip, weakening, rows.weakening_rate[row]) for slip in slips]
+    fracture = float((dissipated[1] - dissipated[0]).sum()) * interface.cell
+    released = 0.5 * float(((2.0 * above - drop) * added).sum()) * interface.cell
+    if "event_radiated_energy" in timed:
+        released = fracture + timed["event_radiated_energy"]
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
@@ -179,8 +184,8 @@ def _measures(
         "event_magnitude": (np.log10(moment) - 9.1) / 1.5,
         "event_area_stress_drop": drop[inside].mean(),
         "event_slip_stress_drop": (drop * added).sum() / added.sum(),
-        "event_energy_stress_drop": ((2.0 * above - drop) * added).sum() / added.sum(),
-        "event_fracture_energy": float((dissipated[1] - dissipated[0]).sum()) * interface.cell,
+        "event_energy_stress_drop": 2.0 * released / (added.sum() * interface.cell),
+        "event_fracture_energy": fracture,
         **timed,
     }
     if problem.specimen is not None:
