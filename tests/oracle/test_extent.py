@@ -122,8 +122,10 @@ def test_the_event_that_breaks_a_fault_is_not_arrested_and_slip_that_restarts_is
 def test_a_local_criterion_that_leaves_out_what_the_ends_take_over_is_doubted():
     """Stresses on two nucleation lengths are 6 % too high on average."""
     problem = within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH))
-    strength = beta_strength(LENGTH, mean_mode=True).sample(problem.interface, samples=20)
-    with pytest.warns(st.AccuracyWarning, match=r"by \+[2-9].* st.Equilibrium"):
+    strength = beta_strength(LENGTH, mean_mode=True).sample(
+        problem.interface, samples=20, seed=1
+    )
+    with pytest.warns(st.AccuracyWarning, match=r"by \+[2-9].*st.Equilibrium"):
         st.onset(problem, strength, method=LOCAL, progress=False)
 
 

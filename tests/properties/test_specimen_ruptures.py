@@ -71,6 +71,11 @@ def test_one_event_in_space_and_time(run):
     assert run.attrs["stopped"] == "rest"
     assert run["attenuated_energy"].values[-1] > 0.0
     assert np.all(np.diff(run["slip"].values, axis=0) >= 0.0)
+    added = (run["slip"][-1] - run["slip"][0]).values.sum() * SPECIMEN.interface.cell
+    moment = SPECIMEN.solid.shear_modulus * added  # the frames begin just after the event
+    assert st.external.event_table(run)["event_moment (N)"][0] == pytest.approx(
+        moment, rel=0.02
+    )
     over = run["shear_stress"] - run["strength"]
     assert over.values[1:].max() < 0.02 * float(run["peak_strength"].mean())
     assert run["machine_force"].values[0] == pytest.approx(run["force"].values[0], rel=1e-3)

@@ -89,7 +89,8 @@ def simulate_rupture(
         to the stress at which the event began. `block_velocity` over ('snapshot',
         'height', 'x') is the velocity along x in the upper block (m/s) at a few
         times. The lower block is its mirror image and moves the opposite way.
-        There is no 'step' and no 'event'.
+        The table of events holds all events of the path that came to rest. There
+        is no 'step'.
 
     Raises
     ------

@@ -27,9 +27,9 @@ from stiction.methods.dynamics.specimens import (
 from stiction.methods.dynamics.summary import SPEEDS, rate_spectrum
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
-from stiction.methods.equilibrium.events import moment_of
+from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
 from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding
+from stiction.methods.equilibrium.solver import SamplePath, follow_to_sliding
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
@@ -104,7 +104,7 @@ def simulate_event(
         for _ in range(0, steps, save.every):
             record.event.take_steps(save.every, ends=False)
             record.add()
-    return record.dataset(method, "sliding" if trial.slides else "rest")
+    return record.dataset(method, "sliding" if trial.slides else "rest", path)
 
 
 class EventRecord:
@@ -192,8 +192,8 @@ class EventRecord:
             "attenuated_energy": work - friction - strain - kinetic,
         }
 
-    def dataset(self, method: Any, stopped: str) -> xr.Dataset:
-        """Return the frames of the event and the pictures of the block as a dataset."""
+    def dataset(self, method: Any, stopped: str, path: SamplePath) -> xr.Dataset:
+        """Return the frames of the event and pictures of the block, with all events of the path."""
         problem, interface = self.problem, self.problem.interface
         arrival = self.event.waves.arrival
         reached = bool(np.isfinite(arrival).any())
@@ -222,6 +222,8 @@ class EventRecord:
                 "m/s", "velocity along x in the upper block", BLOCK_DIMS
             ),
         }
+        variables |= (of_events := event_variables(interface, inertia=True))
+        values |= event_table(problem, self.rows, 0, path.all_events, of_events)
         if problem.area is not None:
             values |= forces(values, problem.area)
             variables |= force_variables(variables)

@@ -139,7 +139,10 @@ class Equilibrium:
         reasons = refused(problem.friction)
         ends = problem.interface.breakable is not None
         if self.sensitivity and ends and problem.interface.is_plane:
-            reasons.append("sensitivity: is not known on planes that end; leave it out")
+            reasons.append(
+                "sensitivity: is not known on planes that end. Leave it out, and take differences"
+                " of st.onset with the strength of a few nodes raised"
+            )
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append(
                 "gap: applies to planes only. Lines are solved to round-off. Leave it out"
