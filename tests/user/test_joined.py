@@ -144,6 +144,12 @@ def test_what_joining_refuses():
         lambda: st.infer(PROBLEM, EVEN, PEAKS, between="weibul", **LOCAL),
     )
     refuses("need parameters with a prior", lambda: found.prior_transform([0.5] * 4))
+    stored = found.interfaces(4)
+    refuses(
+        "holds draws of mean and scatter", lambda: st.infer(PROBLEM, stored, PEAKS, **LOCAL)
+    )
+    longer = {0.0512: PEAKS}
+    refuses("the problem is of 0.05 m", lambda: st.infer(PROBLEM, EVEN, longer, **LOCAL))
 
 
 def test_a_single_specimen_leaves_the_scatter_to_its_prior():
@@ -152,3 +158,8 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     # The median of a half-Cauchy prior below 0.9.
     median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))
     assert fit.parameters["between"] == pytest.approx(median, rel=0.1)
+    with pytest.warns(st.AccuracyWarning, match="profiles come from one specimen"):
+        both = st.infer(PROBLEM, fit, PEAKS, **LOCAL)
+    assert len(both.notes) == 1  # nine tests say more about the scatter than three
+    with pytest.warns(st.AccuracyWarning, match="say little about the scatter"):
+        st.infer(PROBLEM, ROUGH, PEAKS[:3], **LOCAL)

@@ -170,7 +170,8 @@ def infer(
     Warns
     -----
     AccuracyWarning
-        If the posterior piles up at an end of the prior, the method is not
+        If the prior decides about the scatter between specimens, or the profiles come
+        from one specimen. If the posterior piles up at an end of the prior, the method is not
         accurate there, or few samples are simulated for the number of peaks. If
         profiles and peaks contradict each other, with the p-value of
         `stiction.statistics.agreement`.
@@ -225,6 +226,13 @@ def infer(
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
             " standard deviation in the unit of the peaks"
+        )
+    (length, *others), size = measured.lengths, problem.interface.measure
+    several = bool(others) or problem.interface.is_plane
+    if not (several or length is None or math.isclose(length, size)):
+        raise InputError(
+            f"peaks: are of specimens of {length:g} m, but the problem is of {size:g} m. Pass the"
+            " problem of the tests. The posterior serves other problems, too"
         )
     # 1.
     if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):

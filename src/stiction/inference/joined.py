@@ -55,6 +55,9 @@ LIKELY_FIELDS = 60
 ONSETS = {"local_criterion": 200}
 FEW_ONSETS = 100
 """Simulated onsets of each field by other methods."""
+LITTLE_INFORMATION = math.log(4.0 / 3.0)
+"""Information on the scatter, nats, below which its prior decides: a uniform range would shrink
+by less than a quarter."""
 LOG_STRENGTH_MARGIN = 0.3
 """Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
 
@@ -133,7 +136,14 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
             "random: is a posterior. Give its fit or interfaces, and all peaks together"
         )
     given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
-    members = as_random(given).members
+    likely = as_random(given)
+    if len(likely.factor_laws[0]) > 1:
+        raise InputError(
+            "random: holds draws of mean and scatter between specimens, as a stored fit or"
+            " posterior does. Fit the profiles again, and infer from the fit and all peaks at once."
+            " For the fields within alone, pass [one.strength for one in random]"
+        )
+    members = likely.members
     refuse_conditioned(members)
     return Profiles.of_interfaces(members, **more)
 
@@ -172,7 +182,7 @@ def join(
         nothing = measured._replace(values=tuple(np.empty(0) for _ in kinds))
         alone = _result(by_profiles, nothing, **common)
         comparison = agreement(alone, measured, seed=simulation.seed)
-    notes = _notes(profiles, tests, comparison)
+    notes = _notes(grid, comparison)
     for text in notes:
         warn_accuracy(text)
     proper = known or profiles.prior.mean is not None
@@ -247,15 +257,27 @@ def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
     }
 
 
-def _notes(profiles: Profiles, tests: int, comparison: Agreement | None) -> list[str]:
+def _notes(grid: Grid, comparison: Agreement | None) -> list[str]:
     """Return the reasons to doubt the posterior."""
-    notes = []
+    notes, profiles = [], grid.profiles
     if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
         notes.append(
             f"the peaks contradict the profiles, p = {p:.2g} of their agreement. A force from"
             " both is then wrong. Check units, method and surfaces. Until they agree, use the lower"
             " of the two forces from peaks alone and from profiles alone"
         )
-    if profiles.levels.size + tests < 2:
-        notes.append("one specimen has no scatter between specimens: its prior decides")
+    shares = grid.mass.sum(axis=(0, 1, 3))  # equal by the prior
+    usual = profiles.prior.scatter is FactorPrior().scatter
+    if usual and math.log(shares.size) - float(entropy(shares)) < LITTLE_INFORMATION:
+        notes.append(
+            "the measurements say little about the scatter between specimens, so its prior decides"
+            " small probabilities. Measure further specimens, or state what is known,"
+            f" prior={{'{SCATTER_KEY}': ...}}"
+        )
+    if profiles.levels.size == 1:
+        notes.append(
+            "the profiles come from one specimen. The tested specimens are taken to have the same"
+            " field within, and the tests alone show the scatter between specimens. Scan further"
+            " specimens. If the records are of different specimens, fit them with between=True"
+        )
     return notes

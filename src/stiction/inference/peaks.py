@@ -113,8 +113,9 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     different = np.unique(np.concatenate([np.zeros(0), *values])).size
     if different < MIN_PEAKS:
         raise InputError(
-            f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Fewer than"
-            " about ten say little (st.design_of_tests)"
+            f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Test more"
+            " specimens (st.design_of_tests says how many), or pass the fit of profiles alone to"
+            " st.design_stress"
         )
     return Peaks(lengths, values, si_of(unit))
 
