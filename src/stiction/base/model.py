@@ -30,13 +30,7 @@ from typing import (
 import numpy as np
 import pydantic
 import pydantic_core
-from pydantic import (
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    InstanceOf,
-    PlainSerializer,
-)
+from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf, PlainSerializer
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from stiction.base.arrays import Array

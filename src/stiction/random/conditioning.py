@@ -153,11 +153,7 @@ def _table(points: Array) -> dict[str, list[float]]:
     return dict(zip(names, points.tolist(), strict=True))
 
 
-Points = Annotated[
-    Any,
-    BeforeValidator(_points),
-    PlainSerializer(_table),
-]
+Points = Annotated[Any, BeforeValidator(_points), PlainSerializer(_table)]
 
 
 @model

@@ -113,10 +113,7 @@ class DenseProgram:
         return bound, multiplier
 
     def solve(
-        self,
-        sample: StaticSample,
-        cap: float = np.inf,
-        state: EquilibriumState | None = None,
+        self, sample: StaticSample, cap: float = np.inf, state: EquilibriumState | None = None
     ) -> EquilibriumState | None:
         """Return the critical load (at most `cap`) with its proofs, or `None` if the search stalls.
 

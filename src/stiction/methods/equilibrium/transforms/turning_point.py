@@ -186,12 +186,7 @@ def _step_across(state: Held, step: float, last: float, curvature: float, moved:
 
 
 def close(
-    bracket: Bracket,
-    phi: Array,
-    load: float,
-    slip: Array,
-    gap: float,
-    bend: float = 0.0,
+    bracket: Bracket, phi: Array, load: float, slip: Array, gap: float, bend: float = 0.0
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
