@@ -85,13 +85,6 @@ def figures():
 
 
 @pytest.fixture
-def solid():
-    from setups import SOLID
-
-    return SOLID
-
-
-@pytest.fixture
 def problem():
     """The paper's system with the modulus G/(1-nu) that it prints, 256 nodes."""
     from setups import make_problem

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oracles import largest_load, relaxed
-from setups import exact_onset, make_problem, turns
+from setups import SOLID, exact_onset, make_problem, turns
 
 import stiction as st
 import stiction.methods.equilibrium.dense.program
@@ -55,9 +55,9 @@ def test_uniform_critical_slip(make_strength):
     assert_first(problem, tau_p, tau_p / 2e-6)
 
 
-def test_interface_shorter_than_a_critical_patch(solid, make_strength):
+def test_interface_shorter_than_a_critical_patch(make_strength):
     # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
-    rate = 2.0 * 0.57888694185 * solid.effective_modulus() / 0.2
+    rate = 2.0 * 0.57888694185 * SOLID.effective_modulus() / 0.2
     problem = make_problem(128, weakening_rate=rate)
     tau_p = make_strength(2.0).sample(problem.interface, samples=4, seed=10)
     onset = assert_first(problem, tau_p)
