@@ -159,12 +159,15 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 
 
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
-    """Return the patch that becomes unstable, from its multiplier y >= 0, not all zero.
+    """Return the patch that becomes unstable, from its multiplier y >= 0; NaN if y is zero.
 
     On a line it is the run with the largest y. On a plane it is the connected area around the
     largest y in which y is above a tenth of its largest value. Slipping nodes with a smaller y do
     not count: on rough strengths they reach across the whole plane.
     """
+    if not multiplier.any():
+        nowhere = (np.nan,) * len(interface.shape)
+        return Patch(nowhere, nowhere, np.nan)
     if interface.is_plane:
         return largest_patch(multiplier.reshape(interface.shape), interface, MIN_PATCH_WEIGHT)[
             1

@@ -47,6 +47,11 @@ ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
 MIN_PEAK_HEIGHT = 0.02
 """A peak that is hardly higher than the stress of sliding gets a warning. This is its smallest
 height above the mean residual strength, as a share of the fall of strength."""
+OF_INSTABILITY = {
+    "first_instability", "critical_position", "critical_patch_length", "critical_patch_extent",
+    "critical_patch_area",
+}  # fmt: skip
+"""Variables that are NaN without an instability."""
 STRENGTH_STEP = 1e-7
 """Rise of a node's strength in a difference quotient, as a share of the mean strength."""
 
@@ -195,11 +200,12 @@ class OnsetSolver:
             values["certified"] = first.certified
         else:
             values["critical_patch_length"] = patch.area
-        # Behind a stiff machine an interface can slide without any instability.
+        # Behind a stiff machine, or within a short extent, an interface can slide without any
+        # instability.
         stable = path.known and not first.unstable
         if stable:
-            of_patch = ("first_instability", "critical_position", "critical_patch_length")
-            values |= dict.fromkeys(of_patch, np.nan)
+            names = OF_INSTABILITY & values.keys()
+            values |= {name: np.full_like(values[name], np.nan) for name in names}
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
         if self.options.sensitivity:
@@ -245,12 +251,13 @@ class OnsetSolver:
                 "nodes reach a corner of the law or their residual strength before the first"
                 " instability in {samples}: it was found by following equilibria, to {worst:.2g}"
                 " of the load, and has no certificate",
-                unproved,
+                unproved & np.isfinite(first),
                 share,
             )
+        cause = "machine is so stiff" if self.problem.has_machine else "extent is so small"
         warn_of_samples(
-            "no patch becomes unstable in {samples}: the machine is so stiff that the interface"
-            " slides stably, and first_instability is NaN",
+            f"no patch becomes unstable in {{samples}}: the {cause} that the interface slides"
+            " stably, and first_instability is NaN",
             np.isnan(first),
         )
         warn_of_samples(

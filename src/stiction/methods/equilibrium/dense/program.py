@@ -50,6 +50,7 @@ from stiction.methods.equilibrium.sample import (
     present_pieces,
     step_to_corner,
 )
+from stiction.methods.equilibrium.transforms.bracket import TooSmallError
 from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.problem.problem import Problem
 
@@ -152,10 +153,13 @@ class DenseProgram:
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None
-        onset = plane_onset(
-            half_spaces, sample.excess, sample.profile, sample.rate, TRANSFORMS_GAP_RTOL,
-            None if state is None else state.slip,
-        )  # fmt: skip
+        try:
+            onset = plane_onset(
+                half_spaces, sample.excess, sample.profile, sample.rate, TRANSFORMS_GAP_RTOL,
+                None if state is None else state.slip,
+            )  # fmt: skip
+        except TooSmallError:
+            return None
         if not onset.closed:
             return None
         # The multiplier was lifted everywhere to be feasible. At nodes at rest it

@@ -30,7 +30,6 @@ the bracket, and takes over if that fails.
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError
 from stiction.elasticity.operator import (
     NEGATIVE_CURVATURE,
     SOLVED,
@@ -58,6 +57,10 @@ LIFTING_RTOL = 1e-6
 border."""
 
 
+class TooSmallError(Exception):
+    """The part that can break is too small to become unstable at its weakening rates."""
+
+
 def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Array, Array]:
     """As `_lifting_field`, for a part that can break: the lowest eigenvector of A on it."""
     lifting = np.where(can_break, guess, 0.0)
@@ -66,10 +69,7 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
         MAX_EIGENVECTOR_ITERATIONS,
     )  # fmt: skip
     if value >= 0.0:
-        raise InputError(
-            "interface.extent: is too small to become unstable at the given weakening rates; widen"
-            " it, or check the units of lengths, shear modulus and weakening rate"
-        )
+        raise TooSmallError
     image = np.empty_like(lifting)
     product(operator, lifting, image)
     return lifting, -image

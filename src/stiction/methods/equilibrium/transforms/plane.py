@@ -29,7 +29,6 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError
 from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.sample import (
@@ -42,7 +41,7 @@ from stiction.methods.equilibrium.sample import (
     multiplier_of,
     pieces_of,
 )
-from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect
+from stiction.methods.equilibrium.transforms.bracket import Bracket, TooSmallError, bisect
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
@@ -188,7 +187,7 @@ def plane_onset(
             lifting = doubled(coarser.lifting[0].reshape(coarse_shape)).flatten()
         try:
             bracket = Bracket(symbol, weakening, strength, load_profile, lifting)
-        except InputError:  # on a coarse grid a small extent may be smaller
+        except TooSmallError:  # on a coarse grid a small extent may be smaller
             if number == 0:
                 raise
             continue
@@ -244,7 +243,11 @@ class PlaneProgram:
         """
         if state is not None:
             return self._follow_in_steps(sample, state, FIRST_LOAD_STEP * state.load)
-        onset = self._onset(sample, self.pieces.ends[0] * sample.critical)
+        try:
+            onset = self._onset(sample, self.pieces.ends[0] * sample.critical)
+        except TooSmallError:
+            rest = at_rest(sample)
+            return self._follow_in_steps(sample, rest, FIRST_LOAD_STEP * abs(rest.load))
         if onset.slip.size < sample.excess.size:
             turn = self._follow_from_rest(sample, onset)
             if exceeds(sample, turn.slip):
@@ -275,7 +278,8 @@ class PlaneProgram:
         operator = self._operator(sample)
         passed = [(load, slip)]
         can_break = np.isfinite(sample.excess)
-        while can_break.all() or not (slip[can_break] > 0.0).all():
+        ends = not can_break.all()
+        while not (ends and (slip[can_break] > 0.0).all()):
             accuracy = max(0.1 * gap, min(STEP_RESIDUAL * step / abs(load), MAX_STEP_RESIDUAL))
             guess = slip
             if len(passed) > 1:
@@ -283,7 +287,8 @@ class PlaneProgram:
                 steps_ahead = min(step / (load - load_before), MAX_EXTRAPOLATION)
                 guess = slip + steps_ahead * (slip - slip_before)
             end = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
-            if end is None and step > gap * load:
+            all_slip = ends and end is not None and bool((end[can_break] > 0.0).all())
+            if (end is None or all_slip) and step > gap * abs(load):
                 # The last step is below the gap.
                 step = max(STEP_FACTOR_IF_FAILED * step, 0.7 * gap * load)
                 continue
@@ -307,7 +312,8 @@ class PlaneProgram:
             # passed unseen.
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
-        return EquilibriumState(load, slip, np.zeros_like(slip), unstable=False)
+        still = np.zeros_like(slip)
+        return EquilibriumState(load, slip, still, unstable=False, certified=False)
 
     def _turn(
         self,
