@@ -45,22 +45,34 @@ test_what_no_station_is = refusals({
 
 
 def test_files_of_a_line_read_back(tmp_path):
-    run = simulate(LINE, stations={"a": 0.0131}, fields=["slip", "slip_rate", "shear_stress"])
+    """Times count from the onset, and stations a node apart have files of their own."""
+    stations = {"a": 0.0131, "b": 0.004}
+    run = simulate(LINE, stations=stations, fields=["slip", "slip_rate", "shear_stress"])
     about = {"origin": 0.004, "normal_stress": -7e6, "benchmark": "block"}
-    path, contours = st.external.write_scec(run, tmp_path, **about)
+    path, other, contours = st.external.write_scec(run, tmp_path, **about)
     rows, table = (pd.read_csv(one, comment="#", sep=r"\s+") for one in (path, contours))
-    assert path.name == "faultst000dp000.txt"
+    assert path.name == "faultst000.0001dp000.0000.txt"
+    assert other.name == "faultst000.0000dp000.0000.txt"
+    onset = float(run.onset_time)
+    assert onset > 0.0
+    assert rows["t"][0] == 0.0
     assert rows.columns[1:4].tolist() == ["h-slip", "h-slip-rate", "h-shear-stress"]
     assert rows["n-stress"].to_numpy() == pytest.approx(-7.0)
     own = run.sel(station="a")
-    np.testing.assert_allclose(rows["h-slip"][1:], own.station_slip, rtol=1e-6)
+    own = own.isel(step=own.step_time >= onset)
+    np.testing.assert_allclose(rows["h-slip"], own.station_slip, rtol=1e-6)
     np.testing.assert_allclose(
-        rows["h-shear-stress"][1:] * 1e6, own.station_shear_stress, rtol=1e-6
+        rows["h-shear-stress"] * 1e6, own.station_shear_stress, rtol=1e-6
     )
     np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
-    np.testing.assert_allclose(table["t"], run.arrival_time.fillna(1e9), rtol=1e-6)
+    np.testing.assert_allclose(table["t"], (run.arrival_time - onset).fillna(1e9), rtol=1e-6)
     with pytest.raises(st.InputError, match="lacks station_slip. Call st.simulate_rupture"):
         st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **about)
+    with pytest.raises(st.InputError, match="normal_stress: must be negative"):
+        st.external.write_scec(run, tmp_path, **(about | {"normal_stress": 7e6}))
+    run["station_x"] = run.station_x * 0.0
+    with pytest.raises(st.InputError, match="the stations a, b are not"):
+        st.external.write_scec(run, tmp_path, **about)
 
 
 def test_an_end_of_the_interface_is_its_first_node():

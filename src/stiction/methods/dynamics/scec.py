@@ -12,6 +12,8 @@ STATION_UNITS = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
 UNBROKEN_TIME = 1e9
 """Rupture time of nodes that do not break in files of the comparison, s."""
 COLUMN_TITLES = ("slip (m)", "slip rate (m/s)", "shear stress (MPa)")
+MOST_DECIMALS = 9
+"""Decimals of places in names of files, in units of 100 m, that tell stations on a grid apart."""
 COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
 
 
@@ -21,7 +23,8 @@ def write_scec(
     """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
     The direction along strike is x, the direction of slip, and the direction
-    down-dip is y. On lines y is 0. Slip has no vertical component.
+    down-dip is y. On lines y is 0. Slip has no vertical component. Times count
+    from the onset of the first event of the run, and records begin there.
 
     Parameters
     ----------
@@ -32,7 +35,7 @@ def write_scec(
     origin : float or (float, float)
         Origin of distances on the interface, m.
     normal_stress : float
-        Normal stress, Pa, negative in compression.
+        Normal stress, Pa, zero or negative (compression).
     benchmark : str
         Name of the problem, for the headers: "TPV3", or a name of your own.
 
@@ -41,12 +44,14 @@ def write_scec(
     list of pathlib.Path
         A file for each station, such as ``faultst075dp045.txt`` for 7.5 km along
         strike and 4.5 km down-dip, and ``cplot.txt`` with the distances j and k
-        (m) and the rupture time t (s), 1e9 for nodes that do not break.
+        (m) and the rupture time t (s), 1e9 for nodes that do not break. Names
+        have decimals of 100 m if stations are closer.
 
     Raises
     ------
     InputError
-        If the run has no stations or lacks a variable.
+        If the run has no stations or lacks a variable, if stations share a node,
+        or if the normal stress is positive.
 
     Examples
     --------
@@ -74,24 +79,36 @@ def write_scec(
             f"run: lacks {', '.join(lacking)}. Call st.simulate_rupture with save=st.Save("
             f"{list(STATION_UNITS)}, stations=...)"
         )
+    if not normal_stress <= 0.0:
+        raise InputError(
+            f"normal_stress: must be negative, in compression, or zero, got {normal_stress!r}."
+            " Change the sign of a pressure"
+        )
     dims = run.arrival_time.dims
     middle = dict(zip(dims, np.atleast_1d(origin).tolist(), strict=True))
     away = [run[dim].values - middle[dim] for dim in dims] + [np.zeros(1)] * (2 - len(dims))
     size = " x ".join(f"{float(axis[1] - axis[0]):g}" for axis in away[: len(dims)])
     about = f"# problem={benchmark}\n# code=stiction\n# element_size={size} m\n"
     target = Path(folder)
+    places = [
+        ([float(at[f"station_{dim}"]) - middle[dim] for dim in dims] + [0.0])[:2]
+        for at in (run.sel(station=name) for name in run.station.values)
+    ]
+    files = _file_names(places, run.station.values.tolist())
+    begin = _first_onset(run)
     target.mkdir(parents=True, exist_ok=True)
     paths = []
-    for name in run.station.values:
+    for name, file, (j, k) in zip(run.station.values, files, places, strict=True):
         record = run.sel(station=name)
         place = {dim: float(record[f"station_{dim}"]) for dim in dims}
-        j, k, *_ = [place[dim] - middle[dim] for dim in dims] + [0.0]
         # The record begins after the first step. The first frame is the state
         # before it.
         start = run.isel(time=0).sel(place, method="nearest")
-        time = np.append(start.time, record.step_time)
+        time = np.append(start.time, record.step_time) - begin
+        recorded = time >= 0.0
+        time = time[recorded]
         shown = [
-            np.append(start[n], record[f"station_{n}"]) / unit
+            np.append(start[n], record[f"station_{n}"])[recorded] / unit
             for n, unit in STATION_UNITS.items()
         ]
         still = np.zeros_like(time)
@@ -106,20 +123,46 @@ def write_scec(
         titles.append("normal stress (MPa), compression negative")
         header += "".join(f"# Column #{i} = {text}\n" for i, text in enumerate(titles, 2))
         header += COLUMN_NAMES
-        paths.append(target / f"faultst{j / 100.0:03.0f}dp{k / 100.0:03.0f}.txt")
+        paths.append(target / file)
         np.savetxt(
             paths[-1], np.column_stack(columns), "%21.13e" + 7 * " %15.7e", header=header,
             comments="",
         )  # fmt: skip
     # Unbroken nodes need a number in the format.
-    times = np.nan_to_num(run.arrival_time.values, nan=UNBROKEN_TIME).ravel()
-    places = [grid.ravel() for grid in np.meshgrid(*away, indexing="ij")]
+    times = np.nan_to_num(run.arrival_time.values - begin, nan=UNBROKEN_TIME).ravel()
+    nodes = [grid.ravel() for grid in np.meshgrid(*away, indexing="ij")]
     paths.append(target / "cplot.txt")
     header = (
         f"{about}# Column #1, #2 = distance along strike, down-dip (m)\n# Column #3 = rupture"
     )
     header += " time (s)\nj k t"
     np.savetxt(
-        paths[-1], np.column_stack([*places, times]), "%15.7e", header=header, comments=""
+        paths[-1], np.column_stack([*nodes, times]), "%15.7e", header=header, comments=""
     )
     return paths
+
+
+def _first_onset(run: Any) -> float:
+    """Return the time of the first event or onset of a run (s), or its begin without any."""
+    known = [run[name].values.ravel() for name in ("event_time", "onset_time") if name in run]
+    times = np.concatenate([*known, [np.nan]])
+    return float(np.nanmin(times) if np.isfinite(times).any() else run.time[0])
+
+
+def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
+    """Return names with as few decimals as tell the places along strike and down-dip (m) apart."""
+    for decimals in range(MOST_DECIMALS + 1):
+        width = 3 if decimals == 0 else 4 + decimals
+        texts = [
+            # Adding zero leaves no negative zero.
+            [f"{round(at / 100.0, decimals) + 0.0:0{width}.{decimals}f}" for at in place]
+            for place in places
+        ]
+        names = [f"faultst{along}dp{down}.txt" for along, down in texts]
+        if len(set(names)) == len(names):
+            return names
+    twins = [name for name, file in zip(stations, names, strict=True) if names.count(file) > 1]
+    raise InputError(
+        f"run: the stations {', '.join(twins)} are not all at different nodes, which their files"
+        " are named after. Simulate with stations at nodes of their own"
+    )
