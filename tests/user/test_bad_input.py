@@ -88,9 +88,23 @@ def test_objects_are_frozen_compare_and_hash_by_value():
         a.load.profile[0] = 2.0
 
 
-def test_a_warning_stands_where_the_caller_is_and_once():
+DOUBTFUL = {
+    "density in g/cm3": lambda: st.Solid(1e9, 0.33, 1.17),
+    "rock in MPa": lambda: st.Solid(3e4, 0.25, 2700.0),
+    "initial stress in MPa": lambda: make_problem(load=st.Load(initial_stress=0.1)).doubt(
+        make_problem(load=st.Load(initial_stress=0.1)).sample(ONE)
+    ),
+    "a station in km": lambda: st.Save(stations={"a": 1.5e-4}).nodes(LINE),
+    "a station beyond the end": lambda: st.Save(stations={"a": 0.01}).nodes(
+        dataclasses.replace(LINE, extent=(0.02, 0.08))
+    ),
+}
+
+
+@pytest.mark.parametrize("doubt", DOUBTFUL)
+def test_a_warning_stands_where_the_caller_is_and_once(doubt):
     with pytest.warns(st.UnitWarning) as caught:
-        st.Solid(1e9, 0.33, 1.17)
+        DOUBTFUL[doubt]()
     assert [one.filename for one in caught] == [__file__]
 
 
@@ -101,12 +115,14 @@ def test_what_people_study_raises_no_doubt():
         ((3e10, 0.25, 2700.0), 5e6 / 0.5, 5e4, 5e7),  # a natural fault, d_c of half a metre
         ((8e10, 0.3, 7850.0), 3e5 / 1e-6, 1.0, 3e5),  # steel, lightly clamped
         ((2e3, 0.49, 1000.0), 5e2 / 1e-3, 0.1, 5e2),  # a gel
+        ((5e5, 0.49, 1900.0), 1e5 / 1e-3, 0.1, 1e5),  # a filled rubber
         ((4.8e11, 0.1, 3500.0), 1e7 / 1e-8, 1e-3, 1e7),  # diamond
     ):
         h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
         interface = st.Interface(length, max(64, 2 * int(4 * length / h_n)))
         with warnings.catch_warnings(action="error", category=st.UnitWarning):
-            system = st.Problem(st.Solid(*solid), interface, st.LinearWeakening(friction))
+            law, load = st.LinearWeakening(friction), st.Load(initial_stress=1e-4 * strength)
+            system = st.Problem(st.Solid(*solid), interface, law, load)
             system.warn_of_units(strength)
 
 

@@ -160,8 +160,9 @@ class Experiment:
             residual = float(friction.residual(np.array(means["strength"])).mean())
             scales = {name: means[name] for name in SCALES if name in means}
             self.problem.warn_of_units(
-                means["strength"], means.get("residual_strength", residual), scales
-            )
+                means["strength"], means.get("residual_strength", residual), scales,
+                initial=abs(means["initial_stress"]) if "initial_stress" in means else None,
+            )  # fmt: skip
 
     def draws(self, first: int, count: int) -> Array:
         """Return standard normal draws (count, dimension) of samples from `first` on."""

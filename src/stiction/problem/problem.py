@@ -52,6 +52,8 @@ MAX_STRENGTH_RATIO = 1e8
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
 coefficient of 0.1 has 1e-8."""
+INITIAL = (1e-5, math.inf), (0.0, math.inf)
+"""Usual and possible sizes of an initial stress, if there is any, over the strength."""
 SLIP = (1e-8, math.inf), (1e-10, math.inf)
 """Usual and possible slips over which strength falls, m. An atom measures 1e-10 m."""
 MIN_LENGTHS_IN_LINE = 4.0
@@ -258,6 +260,7 @@ class Problem:
             sample.mean_strength,
             float(sample.residual_strength.mean()),
             pressure=None if math.isnan(pressure) else pressure,
+            initial=float(np.abs(sample.initial_stress).max()),
         )
 
     def warn_of_units(
@@ -266,11 +269,13 @@ class Problem:
         residual: float = 0.0,
         scales: Mapping[str, Any] | None = None,
         pressure: float | None = None,
+        initial: float | None = None,
     ) -> None:
         """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
         An `InputError` refuses strengths that cannot fit, and scales of slip by name that
-        are not resolved at these strengths. The default `pressure` is the problem's own.
+        are not resolved at these strengths. The defaults of `pressure` and `initial`, the
+        size of the initial stress, are the problem's own.
         """
         friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -299,6 +304,14 @@ class Problem:
                 " weakening_rate (Pa/m)"
             )
             doubts.append(Doubt(text, slip, *SLIP))
+        if initial is None:
+            initial = float(np.max(np.abs(self.load.initial_stress)))
+        if initial:
+            text = (
+                f"initial_stress: its largest size, {initial:.4g} Pa, is"
+                f" {initial / strength:.2g} of the strength. Check its unit (Pa)"
+            )
+            doubts.append(Doubt(text, initial / strength, *INITIAL))
         if doubt_units(doubts):
             return
         given = friction.scale if friction.weakening_rate is None else None

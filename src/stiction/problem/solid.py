@@ -15,6 +15,9 @@ from stiction.base.units import Doubt, doubt_units
 
 POSSIBLE_SPEED = (0.3, 2e4)
 """Shear wave speed, m/s: 1 m/s in the softest gels, and 12 km/s in diamond."""
+SOFT_DENSITY, SLOWEST_STIFF = 2000.0, 50.0
+"""Density of gels and filled rubbers, kg/m3, above which solids are stiff, and their least shear
+wave speed, m/s. Lead has 700 m/s, and moduli in MPa make 3 m/s of rock."""
 
 
 @model
@@ -74,11 +77,14 @@ class Solid:
     @model_validator(mode="after")
     def _plausible(self) -> Solid:
         speed = self.shear_wave_speed
+        dense, (slowest, fastest) = self.density > SOFT_DENSITY, POSSIBLE_SPEED
         text = (
-            f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has; check the units"
-            f" of shear_modulus = {self.shear_modulus:g} Pa and density = {self.density:g} kg/m3"
+            f"solid: the shear wave speed is {speed:.4g} m/s, which no {'dense ' * dense}solid has;"
+            f" check the units of shear_modulus = {self.shear_modulus:g} Pa and density ="
+            f" {self.density:g} kg/m3"
         )
-        doubt_units([Doubt(text, speed, POSSIBLE_SPEED, (0.0, math.inf))])
+        usual = (SLOWEST_STIFF if dense else slowest), fastest
+        doubt_units([Doubt(text, speed, usual, (0.0, math.inf))])
         return self
 
     @property

@@ -16,7 +16,7 @@ import pydantic
 from numpy.typing import NDArray
 from pydantic import BeforeValidator
 
-from stiction.base.errors import InputError, prefixed, unknown_name
+from stiction.base.errors import InputError, UnitWarning, prefixed, unknown_name, warn_user
 from stiction.base.files import (
     PART,
     UNREADABLE,
@@ -59,6 +59,8 @@ if TYPE_CHECKING:
 MAX_FRAME_BYTES = 2**36
 """Largest file of frames, bytes."""
 FRAMES_PER_FILE = 64
+NEARLY_ZERO = 1e-6
+"""Spacings from the first node to a place beyond round-off."""
 _MAX_STEPS_PER_FILE = 50_000  # steps between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
@@ -162,8 +164,14 @@ class Save:
         return self
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
-        """Return the flat node numbers of the stations, which must lie on the interface."""
+        """Return the flat node numbers of the stations, which must lie on the interface.
+
+        Places that are nearly zero, and stations where nothing can break, are doubted.
+        """
         lengths, numbers = interface.lengths, []
+        breakable = (
+            np.ones(1, dtype=bool) if interface.breakable is None else interface.breakable
+        )
         for name, place in self.stations.items():
             x = np.array(place)
             if x.size != len(lengths) or not np.all((x >= 0.0) & (x <= lengths)):
@@ -172,8 +180,18 @@ class Save:
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m. Give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
-            index = tuple(np.round(x / interface.spacings).astype(int) % interface.shape)
+            nodes = x / interface.spacings
+            index = tuple(np.round(nodes).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
+            text = ""
+            if not np.broadcast_to(breakable, interface.shape)[index]:
+                text = "lies beyond the extent of the interface, where nothing slips"
+            elif np.any((nodes > NEARLY_ZERO) & (nodes < 0.5)):
+                text = "is nearer to the first node than to any other"
+            if text:
+                warn_user(
+                    f"stations[{name!r}]: {place} {text}. Check its unit (m)", UnitWarning
+                )
         return np.array(numbers, dtype=np.int64)
 
 
