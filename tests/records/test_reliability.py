@@ -60,11 +60,6 @@ def a_coefficient_under_a_random_pressure():
     return probability(None, bare, random=PRESSED, method=LOCAL, target_cv=0.5, seed=7, **given)
 
 
-@calls("bounds of the strength, tests/exact/test_reliability_bounds.py")
-def below_and_above_what_any_interface_carries():
-    return [probability(stress, method=LOCAL) for stress in (4.1e5, 2.1e6)]
-
-
 def paper(nodes=256):
     problem = st.paper.problem(nodes=nodes)
     return {"problem": problem, "random": st.paper.strength(problem, 0.5)}

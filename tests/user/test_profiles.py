@@ -50,8 +50,6 @@ ORDERS = {
     "offset": labelled(STRENGTH[ROLLED], np.where(X[-50] <= X, X - 0.1, X)[ROLLED]),
     "whole periods further on": labelled(x=X + 0.3),
     "transposed": labelled().expand_dims("sample", axis=1),
-    "a series": labelled(STRENGTH[::-1], X[::-1]).to_series(),
-    "a series without places": labelled().to_series().reset_index(drop=True),
     "its first node twice": labelled(np.r_[STRENGTH, STRENGTH[0]], np.r_[X, 0.1]),
 }
 
