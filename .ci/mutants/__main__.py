@@ -1,63 +1,64 @@
-"""Do the tests notice? Small faults, one at a time, in a copy of the package.
+"""Do the tests notice small faults? Put one fault at a time into a copy of the package.
 
-    python .ci/mutants criterion --faults 20 --seed 1
+    python .ci/mutants methods/criterion --faults 20 --seed 1
 
-Signs, factors, minima for maxima, bounds off by one, terms and periods left out, arguments swapped,
-warnings not given, at sampled lines of a folder or file of the package. Each runs against the
-tests nearest to it, without the slow ones; `--all` runs all of them on what survived. A survivor
-needs a test, unless the fault changes nothing that a user sees. Kernels are compiled anew where a
-fault is in them, which mutmut and cosmic-ray, working inside one process, do not see to.
+Faults are wrong signs and factors, minima for maxima, bounds off by one, terms and periods left
+out, swapped arguments and missing warnings, at sampled lines of a folder or file. The nearest test
+files run on each fault, without slow tests. With `--all`, all tests run on the survivors. A
+survivor needs a test, unless no user sees its effect. A fault in a kernel compiles the kernel anew,
+which mutmut and cosmic-ray, working inside one process, do not see to.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from itertools import chain
 from pathlib import Path
 
 from faults import Fault, faults_of
 
 ROOT = Path(__file__).parents[2]
-NEAREST = {
-    "base": "refusals mistakes* progress cache warnings own_method",
-    "cli": "runs cli warnings",
-    "criterion": "lines planes specimens criterion griffith crooked",
-    "dynamics": "ruptures dynamics_* rupture_stations plane_rupture specimen_ruptures block_waves",
-    "elasticity": "specimens lines planes blocks block_response dynamics_waves"
-    " criterion dynamics_equilibrium equilibrium",
-    "ensemble": "runs fields store ensemble study progress own_method reliability",
-    "equilibrium": "lines planes specimens crooked equilibrium plane_equilibrium instability"
-    " friction_laws",
-    "friction": "lines ruptures mistakes* friction_laws crooked dynamics_properties",
-    "inference": "inference* mistakes* pictures fit_* joined",
-    "jit": "cache architecture own_method",
-    "plot": "pictures runs",
-    "problem": "refusals mistakes* specimens bad_input crooked criterion equilibrium profiles"
-    " study",
-    "profiles": "profiles mistakes* refusals crooked fit_field",
-    "random": "fields refusals conditional* random_interface reliability",
-    "reliability": "reliability* failure_run runs pictures",
-    "statistics": "fields statistics_* criterion inference",
-    "study": "runs refusals mistakes* study store planes own_method failure_run",
-}
-"""Names of test files; the rest of the package is tested by what uses it."""
-REST = (
-    "refusals mistakes* bad_input specimens crooked criterion study dynamics_input own_method"
-)
+PACKAGE = Path("src", "stiction")
+NEAREST = 12
+"""Number of test files that count as near."""
 
 
-def tests_near(target: str) -> list[str]:
-    """The test files for a folder or file of the package, quick ones first."""
-    parts = Path(target).with_suffix("").parts
-    names = next((NEAREST[part] for part in reversed(parts) if part in NEAREST), REST).split()
-    found = [path for name in names for path in sorted(ROOT.glob(f"tests/*/test_{name}.py"))]
-    return list(dict.fromkeys(str(path.relative_to(ROOT)) for path in found))
+def tests_near(sources: list[Path]) -> list[str]:
+    """Return the test files that share most words with the names in some files, nearest first.
+
+    A shared word weighs -log(share of test files with it). Names are of files, functions, classes.
+    """
+    names = {
+        word
+        for path in sources
+        for word in path.relative_to(ROOT / PACKAGE).with_suffix("").parts
+    }
+    for path in sources:
+        names |= set(re.findall(r"^ *(?:def|class) _*(\w+)", path.read_text(), re.MULTILINE))
+    tests = sorted(ROOT.glob("tests/*/test_*.py"))
+    words = [
+        names
+        & set(
+            re.findall(
+                r"[^\W_]\w*", f"{path.stem.replace(chr(95), chr(32))} {path.read_text()}"
+            )
+        )
+        for path in tests
+    ]
+    holders = Counter(chain.from_iterable(words))
+    near = [sum(math.log(len(tests) / holders[word]) for word in shared) for shared in words]
+    nearest = sorted(zip(near, tests, strict=True), reverse=True)[:NEAREST]
+    return [str(path.relative_to(ROOT)) for _, path in nearest]
 
 
 def fails(tree: Path, tests: list[str], seconds: float) -> str:
@@ -82,9 +83,8 @@ def fails(tree: Path, tests: list[str], seconds: float) -> str:
     return failed[0].split(" - ")[0] if failed else done.stdout[-200:] + done.stderr[-200:]
 
 
-def sampled(target: Path, count: int, seed: int) -> list[tuple[Path, Fault]]:
-    """Faults at different lines, drawn among all lines that can have one."""
-    files = sorted(target.rglob("*.py")) if target.is_dir() else [target.with_suffix(".py")]
+def sampled(files: list[Path], count: int, seed: int) -> list[tuple[Path, Fault]]:
+    """Faults at different lines of some files, drawn among all lines that can have one."""
     lines: dict[tuple[Path, int], list[Fault]] = {}
     for path in files:
         for fault in faults_of(path.read_bytes()):
@@ -121,6 +121,8 @@ def main() -> None:
         "--all", action="store_true", help="survivors against all default tests"
     )
     given = parser.parse_args()
+    target = ROOT / PACKAGE / given.target
+    files = sorted(target.rglob("*.py")) if target.is_dir() else [target.with_suffix(".py")]
     begin, caught, survived = time.monotonic(), 0, []
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
@@ -128,23 +130,23 @@ def main() -> None:
         for name in filter(lambda name: (ROOT / name).is_file(), listed.stdout.splitlines()):
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, tree / name)
-        tests = tests_near(given.target)
-        print(f"{given.target}: {len(tests)} files of tests", flush=True)
+        tests = tests_near(files)
+        print(given.target, *tests, sep="\n  ", flush=True)
         if failed := fails(tree, tests, 3600.0):
             sys.exit(f"without any fault: {failed}")
         allowed = 120.0 + 5.0 * (time.monotonic() - begin)
-        package = tree / "src" / "stiction"
-        for path, fault in sampled(package / given.target, given.faults, given.seed):
+        for original, fault in sampled(files, given.faults, given.seed):
             if time.monotonic() - begin > 60.0 * given.minutes:
                 break
-            source = path.read_bytes()
+            name = original.relative_to(ROOT)
+            path, source = tree / name, original.read_bytes()
             path.write_bytes(fault.put_into(source))
             failed = fails(tree, tests, allowed)
             if not failed and given.all:
                 failed = fails(tree, ["tests"], 3600.0)
             path.write_bytes(source)
             caught += bool(failed)
-            text = f"{path.relative_to(package)}:{fault.line}: {fault}"
+            text = f"{name.relative_to(PACKAGE)}:{fault.line}: {fault}"
             survived += [] if failed else [text]
             print(f"{'caught  ' if failed else 'SURVIVED'} {text}  {failed}", flush=True)
     print(

@@ -15,8 +15,8 @@ PAIRS = (
     ("min", "max"), ("minimum", "maximum"), ("argmin", "argmax"), ("any", "all"),
     ("floor", "ceil"), ("sin", "cos"), ("nanmin", "nanmax"), ("left", "right"), ("sum", "mean"),
 )  # fmt: skip
-OTHER = {one: other for pair in PAIRS for one, other in (pair, pair[::-1])}
-SYMMETRIC = {*OTHER, "isinstance", "hypot", "zip", "getattr", "hasattr", "replace", "print"}
+OPPOSITE = {name: opposite for pair in PAIRS for name, opposite in (pair, pair[::-1])}
+SYMMETRIC = {*OPPOSITE, "isinstance", "hypot", "zip", "getattr", "hasattr", "replace", "print"}
 NOT_LOOKED_INTO = (ast.Raise, ast.JoinedStr, ast.Assert, ast.Import, ast.ImportFrom)
 
 
@@ -60,16 +60,16 @@ def faults_of(source: bytes) -> list[Fault]:
         start, end, _ = whole(node)
         match node:
             case (
-                ast.BinOp(left=one, op=op, right=other)
-                | ast.Compare(left=one, ops=[op], comparators=[other])
-                | ast.BoolOp(values=[one, other], op=op)
+                ast.BinOp(left=left, op=op, right=right)
+                | ast.Compare(left=left, ops=[op], comparators=[right])
+                | ast.BoolOp(values=[left, right], op=op)
             ):
                 if type(op) in OPERATORS:
                     old, new = OPERATORS[type(op)]
-                    at = source.index(old.encode(), place(one, True), place(other))
+                    at = source.index(old.encode(), place(left, True), place(right))
                     yield at, at + len(old), new
                 if isinstance(op, ast.Add | ast.Sub | ast.Mult | ast.Mod):
-                    yield start, end, whole(one)[2]  # a term, a factor, a period left out
+                    yield start, end, whole(left)[2]  # a term, a factor, a period left out
             case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
                 if not isinstance(operand, ast.Constant):
                     yield start, end, f"({whole(operand)[2]})"
@@ -87,14 +87,14 @@ def faults_of(source: bytes) -> list[Fault]:
                 yield start, end, "pass"
             case ast.Call(func=ast.Name() | ast.Attribute() as function, args=args):
                 name = function.id if isinstance(function, ast.Name) else function.attr
-                if name in OTHER:
+                if name in OPPOSITE:
                     last = place(function, True)
-                    yield last - len(name), last, OTHER[name]
+                    yield last - len(name), last, OPPOSITE[name]
                 plain = all(isinstance(arg, ast.Name | ast.Attribute) for arg in args[:2])
                 if len(args) >= 2 and name not in SYMMETRIC and plain:
-                    (first, _, one), (_, last, other) = whole(args[0]), whole(args[1])
+                    (first, _, left), (_, last, right) = whole(args[0]), whole(args[1])
                     between = text(place(args[0], True), place(args[1]))
-                    yield first, last, other + between + one
+                    yield first, last, right + between + left
 
     def nodes(node: ast.AST) -> Iterator[ast.AST]:
         """All that is computed: no messages, annotations or decorators."""
