@@ -151,11 +151,15 @@ def test_weakening_rate_of_each_sample(make_strength):
 
 
 def test_position_lies_on_the_interface(problem):
-    """A minimum a hair left of node 0 is at 0, not at L."""
+    """A minimum a hair left of node 0 is at 0, not at L. Half a spacing left, it is near L."""
     tau_p = 1e6 - 2e5 * np.cos(np.outer([1, 3, 5], turns(256)))
     for signed in (tau_p, tau_p[:, ::-1].copy(), np.roll(tau_p, 1, axis=1)):
         places = local_onset(problem, signed)["critical_position"].values
         assert 0.0 <= places.min() <= places.max() < 0.1
+    at = 0.1 / 256 * np.array([-0.7, -0.5, -0.2, 0.3, 255.6])
+    shifted = 1e6 - 2e5 * np.cos(turns(256) - 2.0 * np.pi / 0.1 * at[:, None])
+    places = local_onset(problem, shifted)["critical_position"].values
+    np.testing.assert_allclose(places, at % 0.1, atol=1e-7)
 
 
 def test_periodic_variance_is_that_of_the_grid(problem, make_strength):

@@ -137,12 +137,20 @@ def test_the_far_end_of_a_beta_marginal_is_its_bound():
     np.testing.assert_allclose(from_normal(marginal, z), 1.2e6, rtol=1e-14)
 
 
-@pytest.mark.parametrize("nodes", [16, 100, (16, 10), (8, 48)])
+@pytest.mark.parametrize(
+    ("nodes", "ends"),
+    [(16, "periodic"), (100, "periodic"), ((16, 10), "periodic"), ((8, 48), "periodic"),
+     (50, "free")],
+)  # fmt: skip
 @pytest.mark.parametrize("mean_mode", [False, True])
-def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, mean_mode):
-    """Waves that a grid does not resolve, and those of Nyquist, included."""
+def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, ends, mean_mode):
+    """Waves that a grid does not resolve and those of Nyquist. Free ends double the period."""
     plane = isinstance(nodes, tuple)
-    interface = st.Interface((0.4, 0.3) if plane else 0.4, nodes)
+    lengths = (0.4, 0.3) if plane else (0.4,)
+    if ends == "free":
+        interface = st.Interface(0.2, nodes, ends="free")
+    else:
+        interface = st.Interface(lengths if plane else 0.4, nodes)
     options = {"anisotropy": 1.7} if plane else {}
     field = beta_strength(0.05, mean_mode=mean_mode, **options)
     modes = field.modes(interface)
@@ -157,7 +165,7 @@ def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, mean_mo
     assert len(wanted) == modes.ranks.size
     assert set(map(tuple, numbers.T.tolist())) == wanted
     x = np.array(np.meshgrid(*interface.coordinates.values(), indexing="ij"))
-    shares = x / np.reshape(interface.lengths, (-1, *[1] * len(numbers)))
+    shares = x / np.reshape(lengths, (-1, *[1] * len(numbers)))
     phase = 2.0 * np.pi * np.tensordot(numbers.T, shares, 1)
     a, b = (
         draws[:, mean_mode::2] * modes.sigma[1:],

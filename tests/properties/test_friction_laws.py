@@ -1,8 +1,12 @@
 """What ruptures do whatever the friction law, and what depends on its shape."""
 
+import dataclasses
+from functools import partial
+
 import numpy as np
 import pytest
-from ruptures import dip
+from refusals import refuses
+from ruptures import dip, wavy_line
 from setups import QUARTER, make_problem
 
 import stiction as st
@@ -66,3 +70,32 @@ def test_stress_is_the_strength_of_the_law_wherever_it_slides(runs, name):
     np.testing.assert_allclose(
         run.shear_stress.values[1:][sliding], expected[1:][sliding], rtol=1e-6
     )
+
+
+@pytest.mark.parametrize("name", ["slip", "strength"])
+def test_corners_are_a_list_or_an_array_of_a_single_dimension(name):
+    corners = {"slip": [0.1, 1.0], "strength": [0.3, 0.0]}
+    law = st.PiecewiseWeakening(**corners, weakening_rate=1.0)
+    for shape in ((2,), (2, 1), (1, 2), (1, 1, 2)):
+        given = corners | {name: np.reshape(corners[name], shape)}
+        make = partial(st.PiecewiseWeakening, **given, weakening_rate=1.0)
+        if shape == (2,):
+            assert make() == law
+        else:
+            refuses(name, make)
+
+
+def test_the_front_reaches_a_node_that_does_not_weaken_when_it_first_slips():
+    problem, strength = wavy_line()
+    firm = np.arange(60, 70)
+    residual = np.full(128, 2e5)
+    residual[firm] = strength[firm]
+    friction = st.LinearWeakening(weakening_rate=0.2e12, residual_strength=residual)
+    problem = dataclasses.replace(problem, friction=friction)
+    method = st.Rupture(loading_rate=1e8)
+    run = st.simulate_rupture(problem, strength, method=method, save=st.Save(["slip"], every=1))
+    first = np.argmax(run.slip.values[:, firm] > 0.0, axis=0)
+    arrival, time = run.arrival_time.values[firm], run.time.values
+    round_off = 1e-9 * time[-1]
+    assert np.all(arrival >= time[first - 1] - round_off)
+    assert np.all(arrival <= time[first] + round_off)

@@ -1,6 +1,7 @@
 """The commands: what they print and write, how they end, and what they make of mistakes."""
 
 import errno
+import math
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import time
 from collections import namedtuple
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomli_w
 from crooked import LINE, LINE_STRENGTH
@@ -19,6 +21,7 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.base import files
 from stiction.base.errors import StoreError
+from stiction.cli.report import shown
 from stiction.ensemble.store import Store
 from stiction.study import run as runs_on_disk
 
@@ -118,6 +121,11 @@ def test_a_full_disk_is_called_so_and_leaves_nothing_half(runs, monkeypatch):
     for line in ("report run --out page.html", "export run out.nc"):
         runs(line, "cannot be written: No space left on device", code=1)
         assert sorted(os.listdir()) == before
+
+
+@pytest.mark.parametrize("number", [12345, -7, True, 0.1234567, -1e-7, math.nan])
+def test_a_report_shows_numbers_of_arrays_as_those_of_python(number):
+    assert shown(np.array([number])[0]) == shown(number)
 
 
 def test_escape_sequences_of_a_run_are_not_printed_raw(runs):

@@ -155,11 +155,31 @@ def test_predicted_curves_come_back_from_a_machine(paths):
         assert summary_of(curve.force, 2.0) == pytest.approx(exact, abs=0.35)
         apart = np.abs(curve.drops.travel[:, None] - path.event_travel.values)
         assert apart.min(axis=1).max(initial=0.0) < 1e-6
-    axes = st.plot.force_travel(paths, measured=curves_of(paths))
+
+
+def test_every_panel_draws_all_paths_and_tests_in_its_unit(paths):
+    """Places of events and precursors, and the ends of the band, in micrometres on every axis."""
+    curves = curves_of(paths)
+    precursors = 1e6 * np.concatenate([test.drops.travel for test in curves])
+    axes = st.plot.force_travel(paths, measured=curves)
     labels = {text.get_text() for text in axes.get_legend().get_texts()}
     assert {"6 tests", "measured precursors"} < labels
-    panels = st.plot.precursors(paths[0], measured=curves_of(paths))
-    assert panels.shape == (2,)
+    above, below = st.plot.precursors(paths, measured=curves)
+    for panel in (axes, above, below):
+        marks = [line.get_xdata() for line in panel.lines if line.get_marker() in {"v", "|"}]
+        np.testing.assert_allclose(np.concatenate(marks), precursors, rtol=1e-12)
+    assert "µm" in axes.get_xlabel() == below.get_xlabel()
+    travels = [path.travel.values for path in paths]
+    ends = [
+        1e6 * np.nanmax(travel[np.isfinite(path.force)])
+        for travel, path in zip(travels, paths, strict=True)
+    ]
+    (band,) = axes.collections
+    assert band.get_paths()[0].vertices[:, 0].max() == pytest.approx(np.median(ends))
+    events = [np.concatenate([lines.get_segments() for lines in below.collections])]
+    expected = 1e6 * np.concatenate([path.event_travel for path in paths])
+    np.testing.assert_allclose(np.concatenate(events)[:, 0, 0], expected, rtol=1e-12)
+
     seconds = st.read_curve((TRAVEL * u.s, machine() * u.N))
     refuses("curves are N over s", lambda: st.plot.force_travel(paths, measured=seconds))
 

@@ -2,12 +2,14 @@
 
 import dataclasses
 import errno
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
 from ruptures import wavy_line
+from setups import make_problem
 
 import stiction as st
 from stiction.base.errors import StoreError
@@ -37,14 +39,21 @@ def test_a_run_that_blows_up_stops_and_says_where(monkeypatch):
 
 
 def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch):
-    """Wherever it was cut or ended; between frames far apart, steps are stored as well."""
+    """A run with two events, cut before, between and after them."""
+    problem = make_problem(128, 0.05, mode="III", residual_strength=2e5)
+    interface = st.Interface(0.05, 128, extent=(0.01, 0.03))
+    problem, x = dataclasses.replace(problem, interface=interface), interface.x
+    strength = 1e6 - 2e5 * np.exp(-(((x - 0.017) / 0.003) ** 2)) + 1.2e6 * (x > 0.02)
+    method = st.Rupture(loading_rate=1e9)
+    simulate = partial(st.simulate_rupture, problem, strength)
     monkeypatch.setattr(save_module, "FRAMES_PER_FILE", 4)
     monkeypatch.setattr(save_module, "_MAX_STEPS_PER_FILE", 70)
     folder = tmp_path / "run"
     kept = st.Save(every=40, to=folder)
-    whole = simulate(st.Save(every=40))
+    whole = simulate(method=method, save=st.Save(every=40))
+    assert whole.sizes["event"] == 2
     # Between two frames of the whole run.
-    part = simulate(kept, method=dataclasses.replace(METHOD, max_steps=113))
+    part = simulate(method=dataclasses.replace(method, max_steps=113), save=kept)
     assert part.attrs["stopped"] == "max_steps"
     assert open_rupture(folder).sizes["step"] == 113
     now = read_arrays(folder / "checkpoint.npz")["diagnostics"][0]
@@ -56,14 +65,14 @@ def test_a_run_cut_short_goes_on_to_the_same_numbers(tmp_path, monkeypatch):
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            simulate(kept, progress=cut)
+            simulate(method=method, save=kept, progress=cut)
         assert open_rupture(folder).sizes["time"] > 0  # readable as it was left
     with monkeypatch.context() as patch:  # killed after its last frame
         patch.setattr(save_module.Recorder, "finish", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
-            simulate(kept)
+            simulate(method=method, save=kept)
     for _ in range(2):  # the second reads what has ended
-        found, read = simulate(kept), open_rupture(folder)
+        found, read = simulate(method=method, save=kept), open_rupture(folder)
         for name in whole.data_vars:
             assert np.array_equal(read[name], whole[name], equal_nan=True), name
         assert found.equals(whole[list(found.data_vars)])

@@ -44,7 +44,10 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(tmp_path):
     assert (stored.status().done, stored.status().samples) == (2, 6)
     # The first repetitions of two points are there: the third has no number yet.
     assert np.isnan(stored.dataset().stress.values).any(axis=1).tolist() == [False, False, True]
-    xr.testing.assert_equal(computed(tmp_path / "broken", one), whole)
+    told = []
+    again = computed(tmp_path / "broken", one, progress=lambda *counts: told.append(counts))
+    xr.testing.assert_equal(again, whole)
+    assert told[-1] == (4, 4)  # repetitions that were missing
 
     with pytest.MonkeyPatch.context() as patch:
         for one_file in (batches, failure):

@@ -108,6 +108,10 @@ def test_a_picture_of_a_fit_is_of_all_records():
         row[40 * number : 40 * number + 9] = np.nan
     records = [labelled(row) for row in rows]
     fit = fitted(records)
+    for panel in st.plot.fit(fit):  # every band has a width
+        vertices = panel.collections[0].get_paths()[0].vertices
+        rows = [np.ptp(vertices[vertices[:, 0] == at, 1]) for at in np.unique(vertices[:, 0])]
+        assert np.median(rows) > 0.0
     panels, reversed_panels = (st.plot.fit(each)[2:] for each in (fit, fitted(records[::-1])))
     for panel, other in zip(panels, reversed_panels, strict=True):
         points, swapped = (axes.lines[1].get_xydata() for axes in (panel, other))

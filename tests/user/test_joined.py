@@ -158,6 +158,10 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     # The median of a half-Cauchy prior below 0.9.
     median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))
     assert fit.parameters["between"] == pytest.approx(median, rel=0.1)
+    prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
+    told = st.fit_field(RECORDS[:1], PROBLEM.interface, between=True, prior=prior, **QUICK)
+    assert 0.2 < told.parameters["between"] < 0.21
+    np.testing.assert_allclose(told.interval["mean"], 1.2e6, rtol=3e-3)
     with pytest.warns(st.AccuracyWarning, match="profiles come from one specimen"):
         both = st.infer(PROBLEM, fit, PEAKS, **LOCAL)
     assert len(both.notes) == 1  # nine tests say more about the scatter than three

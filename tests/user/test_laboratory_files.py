@@ -238,6 +238,17 @@ def test_images_need_a_scale_and_a_map(tmp_path):
     refuses("grey image", lambda: st.read_profile(path, spacing=1e-6, quantity="height"))
 
 
+@pytest.mark.parametrize("separator", " _:.")
+def test_the_first_word_of_a_heading_names_its_column(separator, tmp_path):
+    path = tmp_path / "peaks.csv"
+    lines = "0.21,31", "0.25,31", "0.2,31", "0.45,62", "0.4,62", "0.41,62"
+    path.write_text("\n".join((f"peak{separator}1 [kN],length{separator}l [mm]", *lines)))
+    peaks = st.read_peaks(path)
+    assert (peaks.lengths, peaks.unit) == ((0.031, 0.062), "N")
+    expected = [[210.0, 250.0, 200.0], [450.0, 400.0, 410.0]]
+    np.testing.assert_allclose(peaks.values, expected, rtol=1e-14)
+
+
 def test_a_curve_is_not_a_list_of_peaks(tmp_path):
     path = tmp_path / "curve.csv"
     path.write_text(

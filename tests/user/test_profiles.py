@@ -201,6 +201,13 @@ def test_profiles_in_a_study_file(tmp_path):
     assert st.Study.from_dict(loaded.to_dict()) == loaded
 
 
+@pytest.mark.parametrize("kind", np.typecodes["AllInteger"] + "fd")
+def test_a_netcdf_file_holds_numbers_of_any_type(kind, tmp_path):
+    values = (1 + np.arange(NODES) % 100).astype(kind)
+    labelled(values, x_unit="m", units="kPa").rename("strength").to_netcdf(tmp_path / "a.nc")
+    np.testing.assert_array_equal(st.read_profile(tmp_path / "a.nc"), 1e3 * values)
+
+
 FREE = st.Problem(
     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.35, density=1180.0),
     interface=st.Interface(length=0.15, nodes=64),
@@ -246,6 +253,14 @@ def test_gaps_of_specimens_and_planes_are_interpolated_on_request():
     assert not st.onset(
         FREE, weak[::-1].copy()[::-1] + 0.0, method=LOCAL, gaps="fill"
     ).measured[22]
+    for system, method in ((FREE, st.Rupture()), (SYSTEM, st.Rupture(loading_rate=1e9))):
+        dip = np.exp(-(((system.interface.x - system.interface.length / 3) / 4e-3) ** 2))
+        strength = labelled(np.where(dip > 0.9, np.nan, 1e6 - 4e5 * dip), system.interface.x)
+        filled = st.read_profile(strength, interface=system.interface, gaps="fill")
+        with pytest.warns(st.AccuracyWarning, match="reaches into a gap"):
+            run = st.simulate_rupture(system, filled, method=method)
+        assert run.in_gap.values
+        np.testing.assert_array_equal(run.measured, dip <= 0.9)
     plane = st.Problem(
         solid=FREE.solid, interface=st.Interface(length=(0.1, 0.05), nodes=(64, 32)),
         friction=FREE.friction,

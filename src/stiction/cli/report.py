@@ -88,7 +88,7 @@ def shown(entry: Any) -> str:
     """Return a table entry as text: numbers to five digits, a dash for a missing value."""
     if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
         return "\N{EN DASH}"
-    if isinstance(entry, int | np.integer):
+    if isinstance(entry, int | np.integer) and not isinstance(entry, bool):
         return f"{entry:,}"
     if isinstance(entry, float | np.floating):
         return f"{entry:.5g}".replace("-", "\N{MINUS SIGN}")
