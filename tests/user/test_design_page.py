@@ -52,7 +52,7 @@ def test_a_page_of_a_design(tmp_path):
     assert text.count("certificate 8") == 2  # of both moduli
     assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
     refuses(
-        "sources: ... load.weight ... is no input",
+        "sources: ... load.weight ... is not an input",
         lambda: st.write_design_page(
             design, path, problem=PROBLEM, sources={"load.weight": "scales"}
         ),
