@@ -8,6 +8,7 @@ which means something on any machine. Times are processor times of one core. To 
 of the package, run the same case with each of them on PYTHONPATH, one after the other.
 """
 
+import dataclasses
 import os
 import statistics
 import subprocess
@@ -317,6 +318,62 @@ def rupture_onset():
             apart = np.abs(found["critical_stress"] / first["critical_stress"] - 1.0).max()
             label = f"xi_0/h_n = {ratio}, {rate:.0e} Pa/s"
             row(label, ours, [("from rest", rest)], f"{apart:.0e} apart")
+
+
+@case
+def ends():
+    """Interfaces that end: beside the same without ends, and catalogues beside local samples."""
+    # A catalogue of 200 samples at 512 nodes is to take 6.7 s by equilibrium and 19 s by
+    # rupture where a local sample at 512 nodes takes 57 us.
+    whole = st.paper.problem(nodes=512)
+    period = whole.interface.length
+    part = dataclasses.replace(whole.interface, extent=(0.05 * period, 0.95 * period))
+    part = dataclasses.replace(whole, interface=part)
+    for ratio in RATIOS:
+        strength = st.paper.strength(whole, correlation_ratio=ratio)
+        tau_p = strength.sample(whole.interface, samples=200, seed=1)
+        without = solver_time(whole, st.Equilibrium(), tau_p)[0]
+        ours = solver_time(part, st.Equilibrium(), tau_p)[0]
+        row(f"equilibrium, xi_0/h_n = {ratio}", ours, [("without ends", without)])
+    local = solver_time(whole, st.LocalCriterion(), tau_p)[0]
+    row("local sample", local)
+    fault = heterogeneous_fault(st.Interface(4e3, 512, extent=(1e3, 3e3)), 0.05)
+    for method, budget in (
+        (st.Equilibrium(events=60), 6.7),
+        (st.Rupture(loading_rate=1e5, events=20), 19.0),
+    ):
+        catalogue = partial(
+            st.monte_carlo,
+            *fault,
+            method=method,
+            samples=200,
+            seed=1,
+            workers=1,
+            progress=False,
+        )
+        row(
+            f"catalogue, {method.label}",
+            timed(catalogue, 1),
+            [("budget", budget * local / 57e-6)],
+        )
+    ellipse = st.Ellipse(centre=(1.5e3, 1e3), semi_axes=(1e3, 0.7e3))
+    problem, strength = heterogeneous_fault(
+        st.Interface((3e3, 2e3), (128, 128), extent=ellipse), 0.1
+    )
+    tau_p = strength.sample(problem.interface, samples=1, seed=3)
+    ours = solver_time(problem, st.Rupture(loading_rate=1e5, stop="rest"), tau_p, 1)[0]
+    row("rupture, 128 x 128 nodes", ours, [("budget", 5.0 * local / 57e-6)])
+
+
+def heterogeneous_fault(interface, critical_slip):
+    """Return the problem and the strength of the tutorial on faults, on an interface."""
+    solid = st.Solid(shear_modulus=24.3e9, poisson_ratio=0.25, density=2700.0, plane="strain")
+    law = st.LinearWeakening(critical_slip=critical_slip, residual_strength=30e6)
+    mode = "II" if interface.is_plane else "III"
+    marginal = st.Beta(alpha=1.5, beta=2.0, low=30.2e6, high=42e6)
+    spectrum = st.PowerLawSpectrum(correlation_length=300.0)
+    strength = st.RandomField(marginal, spectrum, mean_mode=True)
+    return st.Problem(solid, interface, law, st.Load(initial_stress=27e6), mode), strength
 
 
 @case

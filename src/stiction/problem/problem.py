@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection, Mapping
-from functools import reduce
+from functools import cached_property, reduce
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -348,12 +348,22 @@ class Problem:
         A machine gives, and nodes beyond the extent of the interface take over stress. The mean is
         the mean over the nodes that can break, over the mean of their load profile.
         """
-        interface = self.interface
-        if interface.breakable is None:
+        if self.interface.breakable is None:
             return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
-        profile = np.broadcast_to(self.load_profile, interface.shape)
-        released = self.released_stress(slip.reshape(interface.shape))
-        return float(interface.mean(released) / interface.mean(profile))
+        return float(self.relief_of_nodes @ slip)
+
+    @cached_property
+    def relief_of_nodes(self) -> Array:
+        """Relief by a unit slip of each node of an interface that ends, (nodes,), Pa/m.
+
+        K is symmetric, so the mean of K d over the nodes that can break is <K b, d> over their
+        number, where b is 1 at these nodes and 0 beyond.
+        """
+        interface, can_break = self.interface, self.interface.breakable
+        assert can_break is not None
+        profile = np.broadcast_to(self.load_profile, interface.shape)[can_break].sum()
+        relief: Array = self.released_stress(1.0 * can_break).reshape(-1) / profile
+        return relief
 
     @property
     def half_spaces(self) -> HalfSpaces:

@@ -318,8 +318,7 @@ class DenseProgram:
         slip_rate[slips] = np.linalg.solve(block, p[slips])
         if not self.ends:
             return y - self.elastic.relief / y.size * ((p @ slip_rate) * y - slip_rate)
-        can_break = np.isfinite(sample.excess)
-        c = self.problem.released_stress(1.0 * can_break) / p[can_break].sum()
+        c = self.problem.relief_of_nodes
         derivative = (1.0 - c @ slip_rate) * y
         derivative[slips] += np.linalg.solve(block, c[slips])
         return derivative
