@@ -25,7 +25,7 @@ SHORTEST = 1e-30
 
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
-    """Return the entries of a given value: a single entry for a line, two for a plane."""
+    """Return the entries of a given value: one entry for a line, two entries for a plane."""
     value = in_si(value, "length")
     if isinstance(value, np.ndarray):
         value = value.tolist()
@@ -55,7 +55,7 @@ _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
 
 
 def _place(value: Any) -> float:
-    """Return a length in m: of a number, a quantity, or text such as "0.5 km"."""
+    """Return a length in m from a number, a quantity, or text such as "0.5 km"."""
     if isinstance(value, str):
         number, _, unit = value.strip().partition(" ")
         value = float(number) * factor_to("m", unit or "m")
@@ -77,7 +77,7 @@ _pair = BeforeValidator(_two_places)
 
 @model(kw_only=True)
 class Ellipse:
-    """Ellipse on a plane in which an interface can break, with axes along x and y.
+    """Ellipse on a plane, with axes along x and y. The interface can break inside the ellipse.
 
     Parameters
     ----------
@@ -146,31 +146,33 @@ class Interface:
     Parameters
     ----------
     length : float or (float, float)
-        Period, m. A number gives a line, and two numbers give a plane: along x, the
-        direction of load and slip, and along y.
+        Period, m. A number gives a line. Two numbers give a plane: the first is the
+        period along x, the direction of load and slip, and the second is the period
+        along y.
     nodes : int or (int, int)
         Number of nodes in each direction, even and at least 8, at most 2^24 in all.
         Powers of two are fastest.
     width : float, optional
-        Width of a line, m, which turns its stresses into forces, N. A plane has its
-        area, and a specimen its thickness.
+        Width of a line, m, which turns its stresses into forces, N. A plane does not
+        need a width. A specimen has a thickness instead.
     ends : {"periodic", "free"}
         Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the
         centres of cells, x_i = (i + 1/2) length/nodes, and the interface stops at
         its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
-        Part of the interface that can break, by default all of it. Beyond, both
-        solids are a single piece, which never slips. A line takes its two ends (m,
-        or text such as "0.5 km"), a plane two pairs (along x and y) or an
-        `Ellipse`. Both take a mask: a boolean array of shape (*shape), in a study
-        file the path of a ``.npy``. Nodes at the ends can break.
+        Part of the interface that can break, by default the whole interface. Beyond
+        the extent, both solids are a single piece, which never slips. For a line,
+        give its two ends (m, or text such as "0.5 km"). For a plane, give two pairs
+        of ends (along x and y) or an `Ellipse`. For a line or a plane you may also
+        give a mask: a boolean array with shape (*shape), or in a study file the path
+        of a ``.npy`` file. Nodes at the ends can break.
 
     Notes
     -----
-    With an extent, mean stresses, friction coefficients, forces and mean strengths belong
-    to the nodes that can break. Periodic images of the extent interact. If the extent is
-    small compared with the period, results depend on the period through the square of
-    their ratio only.
+    With an extent, only the nodes that can break count in mean stresses, friction
+    coefficients, forces and mean strengths. Periodic images of the extent interact.
+    If the extent is small compared with the period, this effect is proportional to
+    the square of their ratio.
 
     Examples
     --------
@@ -218,7 +220,7 @@ class Interface:
         return self
 
     def _wrong_extent(self) -> str | None:
-        """Return what is wrong with the extent, if anything."""
+        """Return what is wrong with the extent, or nothing if it is valid."""
         extent, ends = self.extent, self._ends
         if extent is None:
             return None
@@ -243,7 +245,7 @@ class Interface:
 
     @property
     def _ends(self) -> tuple[tuple[float, float], ...] | None:
-        """Ends of the extent along each direction, m; None without one, and of a mask."""
+        """Ends of the extent along each direction, m. None if there is no extent, or for a mask."""
         extent = self.extent
         if isinstance(extent, Ellipse):
             pairs = zip(extent.centre, extent.semi_axes, strict=True)
@@ -254,7 +256,7 @@ class Interface:
 
     @property
     def _inside(self) -> Mask:
-        """Nodes in the extent, (*shape); a node on its border counts."""
+        """Mask of the nodes in the extent, with shape (*shape). It includes nodes on the border."""
         extent, grid = self.extent, np.meshgrid(*self.coordinates.values(), indexing="ij")
         if isinstance(extent, np.ndarray):
             return extent
@@ -273,13 +275,13 @@ class Interface:
 
     @cached_property
     def breakable(self) -> Mask | None:
-        """Read-only mask of the nodes that can break, (*shape), unless all can."""
+        """Read-only mask of the nodes that can break, with shape (*shape), unless all can break."""
         inside = np.ones(1, dtype=bool) if self.extent is None else self._inside
         inside.flags.writeable = False
         return None if inside.all() else inside
 
     def mean(self, profiles: Array) -> Array:
-        """Return the means of profiles (..., *shape) over the nodes that can break, (...)."""
+        """Return means of profiles (..., *shape) over the nodes that can break."""
         mask = self.breakable
         means: Array = (
             profiles.mean(self.axes) if mask is None else profiles[..., mask].mean(-1)
@@ -305,7 +307,7 @@ class Interface:
 
     @property
     def embedding(self) -> Interface:
-        """The periodic interface of its random fields: itself, or twice as long with free ends."""
+        """The periodic interface for random fields. It is twice as long if the ends are free."""
         if not self.is_free:
             return self
         return Interface(2.0 * self.measure, 2 * self.size)
@@ -317,7 +319,7 @@ class Interface:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of nodes in each direction: the shape of a profile."""
+        """Number of nodes in each direction, which is the shape of a profile."""
         return self.nodes if isinstance(self.nodes, tuple) else (self.nodes,)
 
     @property
@@ -368,18 +370,18 @@ class Interface:
 
     @property
     def x(self) -> Array:
-        """Node positions along x in [0, L), shape (nodes,), m."""
+        """Node positions along x in [0, L), m, with shape (nodes,)."""
         return self.coordinates["x"]
 
     @property
     def y(self) -> Array:
-        """Node positions along y of a plane, shape (nodes,), m."""
+        """Node positions along y on a plane, m, with shape (nodes,)."""
         if not self.is_plane:
             raise InputError("y: the interface is a line along x. Only a plane has y")
         return self.coordinates["y"]
 
     def describe_node(self, node: int) -> str:
-        """Return the position of a node in the flat profile, in words."""
+        """Describe in words where a node of the flattened profile lies."""
         entry = np.unravel_index(int(node), self.shape)
         places = zip(self.dims, entry, self.spacings, strict=True)
         return ", ".join(
@@ -402,16 +404,16 @@ class Interface:
 
     @property
     def wavenumbers(self) -> Array:
-        """Absolute values of the wave vectors, rad/m: (n//2 + 1,) or (nx, ny//2 + 1)."""
+        """Absolute values of the wave vectors, rad/m, with shape (n//2 + 1,) or (nx, ny//2 + 1)."""
         vectors = self.wave_vectors
         return vectors[0] if len(vectors) == 1 else np.hypot(*vectors)
 
     @property
     def in_plane_share(self) -> Array:
-        """Share of mode II, (kx/k)², at each wave vector of a plane. The rest is mode III.
+        """Share of mode II, (kx/k)², at each wave vector of a plane. The other share is mode III.
 
-        The constant mode counts as mode II. On a line, where the problem sets the mode,
-        it is 1.
+        The constant mode counts as mode II. On a line the share is 1, because the
+        problem sets the mode.
         """
         k = self.wavenumbers
         k.flat[0] = 1.0
@@ -422,13 +424,13 @@ class Interface:
     def transform(self, profiles: Array) -> Array:
         """Return the real Fourier transform of profiles (..., *shape), unscaled.
 
-        Each profile is transformed by itself, so that the result does not depend on the
+        Profiles are transformed one at a time, so the result does not depend on the
         batch.
         """
         return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 
     def inverse_transform(self, spectra: Array) -> Array:
-        """Return the profiles (..., *shape) of real Fourier transforms."""
+        """Return profiles (..., *shape) from their real Fourier transforms."""
         if self.is_plane:
             return np.fft.irfft2(spectra, self.shape)
         return np.fft.irfft(spectra, self.shape[0])

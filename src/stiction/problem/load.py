@@ -1,4 +1,4 @@
-"""The load: a profile that grows, on top of an initial stress."""
+"""The load: an initial stress plus a profile that grows."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 
 
 class LoadShape(ABC):
-    """A load profile given by a formula, scaled to a mean of 1, so that tau_0 is the mean stress.
+    """Load profile given by a formula and scaled to a mean of 1, so that tau_0 is the mean stress.
 
-    To add a shape, derive a class. Decorate it with `stiction.extensions.model`, which
-    checks its parameters, and with `stiction.extensions.register`, after which study
-    files accept its `type`.
+    To add a shape, write a subclass. Decorate it with `stiction.extensions.model`,
+    which checks its parameters. Study files accept its `type` if you also decorate it
+    with `stiction.extensions.register`.
     """
 
     family: ClassVar[str] = "loads"
@@ -43,7 +43,7 @@ class LoadShape(ABC):
         """Return the profile at the nodes, of any mean, broadcasting to ``interface.shape``."""
 
     def on(self, interface: Interface) -> Array:
-        """Return the profile p at the nodes, (*shape), with a mean of 1."""
+        """Return the profile p at the nodes, with shape (*shape) and a mean of 1."""
         values, name = np.asarray(self.values(interface), np.float64), type(self).__name__
         try:
             np.broadcast_to(values, interface.shape)
@@ -66,7 +66,7 @@ LOADS = Kinds("loads")
 
 
 def distance(interface: Interface, centre: float) -> Array:
-    """Return the distance (m) along x from a share of the length, (nx,), on a plane (nx, 1)."""
+    """Return distances (m) along x from a share of the length, with shape (nx,) or (nx, 1)."""
     length = interface.lengths[0]
     x = np.arange(interface.shape[0]) * length / interface.shape[0]
     away = np.mod(x - centre * length + 0.5 * length, length) - 0.5 * length
@@ -76,12 +76,12 @@ def distance(interface: Interface, centre: float) -> Array:
 @register
 @model(kw_only=True)
 class GradientLoad(LoadShape):
-    """Load that falls linearly from a ridge to half a period away.
+    """Load that falls linearly from a ridge to a valley, half a period away.
 
     Parameters
     ----------
     amplitude : float
-        The profile runs from 1 + amplitude down to 1 - amplitude (1), in [0, 1).
+        The profile falls from 1 + amplitude to 1 - amplitude (1). In [0, 1).
     centre : float
         Position of the maximum as a share of the length, in [0, 1).
     """
@@ -101,13 +101,13 @@ class GradientLoad(LoadShape):
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
 
-    The profile is proportional to 1 + excess exp(-distance/decay). Both sides of
-    the edge are loaded, like a specimen and its mirror image.
+    The profile is proportional to 1 + excess exp(-distance/decay). It is symmetric
+    about the edge, as for a specimen and its mirror image.
 
     Parameters
     ----------
     excess : float
-        Excess load at the edge over the load far away (1), not negative.
+        Excess load at the edge, relative to the load far away (1), not negative.
     decay : float
         Decay length, m, positive.
     edge : float
@@ -130,7 +130,7 @@ def _shape(value: Any) -> Any:
 
 @model
 class Load:
-    """Shear stress on an interface without slip: tau_i(x) + tau_0 p(x), with rising tau_0.
+    """Shear stress tau_i(x) + tau_0 p(x) on an interface without slip. The load factor tau_0 rises.
 
     Parameters
     ----------
@@ -141,9 +141,9 @@ class Load:
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
     pressing_force : float, optional
-        Force instead of `normal_pressure`, N, positive. Divided by the area of
-        the interface, which must be known, it is the pressure: uniform, or the
-        mean between glued plates.
+        Force, N, positive, in place of `normal_pressure`. The force over the area of
+        the interface, which must be known, is the uniform pressure, or the mean
+        pressure between glued plates.
 
     Examples
     --------

@@ -90,20 +90,20 @@ class Problem:
     interface : Interface
     friction : LinearWeakening, ExponentialWeakening or PiecewiseWeakening
     load : Load, optional
-        By default uniform and without initial stress.
+        By default a uniform load without initial stress.
     mode : {"II", "III"}
         In-plane or anti-plane shear. A plane is in-plane along x and anti-plane
         along y.
     specimen : Blocks, optional
-        Finite blocks instead of half-spaces. Their drive makes the load profile,
-        the interface ends with them (`interface.ends` is "free"), and tau_0 is the
-        drive: the mean stress that the drive would cause without slip.
+        Finite blocks instead of half-spaces. Their drive determines the load profile.
+        The interface ends with the blocks (`interface.ends` is "free"). tau_0 is the
+        mean stress that the drive would cause without slip.
 
     Raises
     ------
     InputError
-        If an array has another shape than the interface, fewer than four nodes span
-        the nucleation length, or another argument is invalid. The message lists
+        If an array does not have the shape of the interface, fewer than four nodes
+        span the nucleation length, or another argument is invalid. The message lists
         every problem.
 
     Examples
@@ -208,7 +208,7 @@ class Problem:
             )
 
     def _place_profiles(self) -> list[str]:
-        """Put profiles with coordinates of their own on the nodes, and return misfits."""
+        """Put profiles that have coordinates on the nodes, and return errors of profiles."""
         problems: list[str] = []
         shape = self.interface.shape
         for part in ("friction", "load"):
@@ -254,7 +254,7 @@ class Problem:
             )
 
     def doubt(self, sample: Sample) -> None:
-        """Doubt the units of given profiles, as `warn_of_units` does."""
+        """Warn about the units of given profiles, as `warn_of_units` does."""
         pressure = float(sample.mean(sample.normal_pressure).mean())
         self.warn_of_units(
             sample.mean_strength,
@@ -271,11 +271,11 @@ class Problem:
         pressure: float | None = None,
         initial: float | None = None,
     ) -> None:
-        """Doubt mean peak and residual strengths (Pa) that do not fit the rest of the problem.
+        """Warn about mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        An `InputError` refuses strengths that cannot fit, and scales of slip by name that
-        are not resolved at these strengths. The defaults of `pressure` and `initial`, the
-        size of the initial stress, are the problem's own.
+        Raise an `InputError` for strengths that cannot fit, and for scales of slip,
+        given by name, that the grid does not resolve at these strengths. By default,
+        `pressure` and `initial`, the size of the initial stress, come from the problem.
         """
         friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -332,7 +332,7 @@ class Problem:
 
     @property
     def has_machine(self) -> bool:
-        """Whether a machine of finite stiffness drives a specimen, which slip unloads."""
+        """Whether a machine of finite stiffness drives the specimen. Slip then lowers its force."""
         return self.specimen is not None and self.specimen.drive.stiffness > 0.0
 
     def released_stress(self, slip: Array) -> Array:
@@ -343,10 +343,11 @@ class Problem:
         return self.interface.inverse_transform(symbol * self.interface.transform(slip))
 
     def relief(self, slip: Array) -> float:
-        """Return by how much a flat slip, m, lowers the mean stress below the load factor, Pa.
+        """Return the load factor minus the mean stress, Pa, at a slip (m, flattened).
 
-        A machine gives, and nodes beyond the extent of the interface take over stress. The mean is
-        the mean over the nodes that can break, over the mean of their load profile.
+        A machine of finite stiffness loses force when the interface slips, and nodes
+        beyond the extent take over stress. The mean covers the nodes that can break,
+        and is divided by the mean of their load profile.
         """
         if self.interface.breakable is None:
             return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
@@ -374,7 +375,7 @@ class Problem:
 
     @property
     def area(self) -> float | None:
-        """Area that can break, m², if the width, or the specimen's thickness, is known."""
+        """Area that can break, m², if the width or the thickness of the specimen is known."""
         interface, specimen = self.interface, self.specimen
         depth = interface.width if specimen is None else specimen.thickness
         if interface.is_plane:
@@ -382,7 +383,7 @@ class Problem:
         return None if depth is None else interface.breakable_measure * depth
 
     def stress_of(self, name: str, force: float) -> float:
-        """Return a force, N, over the area of the interface, Pa. `name` begins a refusal."""
+        """Return force (N) over area of the interface, Pa. An error message begins with `name`."""
         if self.area is None:
             raise InputError(f"{name}: {NO_AREA}")
         return force / self.area
@@ -410,7 +411,7 @@ class Problem:
 
     @property
     def pressing(self) -> Any:
-        """Normal pressure at the nodes over the given pressure: 1, or (nodes,) if glued."""
+        """Ratio of the pressure at the nodes to the given pressure: 1, or (nodes,) if glued."""
         glued = self.specimen is not None and self.specimen.pressing == "glued"
         return self.blocks.pressure if glued else 1.0
 
@@ -424,7 +425,7 @@ class Problem:
 
     @property
     def effective_modulus(self) -> float:
-        """Static modulus G* of the plane state and mode, Pa, on a plane along x."""
+        """Static modulus G*, Pa, for the plane state and the mode. On a plane, G* along x."""
         return self.solid.effective_modulus(self.mode)
 
     @property
@@ -448,19 +449,20 @@ class Problem:
         return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
-        """Return h_n of a uniform weakening rate (Pa/m) in each direction, m.
+        """Return h_n, m, in each direction, for a uniform weakening rate (Pa/m).
 
-        On a plane, the length along x belongs to mode II, and the length along y to mode
-        III.
+        On a plane, the length along x belongs to mode II and the length along y to
+        mode III.
         """
         if not rate > 0.0:
             raise InputError(f"rate: must be a positive number, got {describe(rate)}")
         return self.half_spaces.nucleation_lengths(rate)
 
     def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
-        """Return the number of nodes in the nucleation length of a weakening rate (Pa/m).
+        """Return how many nodes span the nucleation length at a weakening rate (Pa/m).
 
-        There is a number for each direction. If the law steepens, the steepest rate counts.
+        There is a number for each direction. If the law steepens, its steepest rate
+        is used.
         """
         lengths = self.nucleation_lengths(rate * self.friction.steepening)
         return tuple(np.divide(lengths, self.interface.spacings).tolist())
@@ -487,7 +489,7 @@ class Problem:
         )
 
     def _check_extent(self, resolution: tuple[float, ...]) -> None:
-        """Refuse an extent that is narrower than the nucleation length, given in nodes."""
+        """Refuse an extent narrower than the nucleation length, which is given in nodes."""
         interface, breakable = self.interface, self.interface.breakable
         if breakable is None or self.specimen is not None:  # blocks have no single length
             return
@@ -504,7 +506,7 @@ class Problem:
                 )
 
     def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
-        """Return the number of nodes with which the nucleation length would span `wanted`."""
+        """Return the number of nodes for which the nucleation length spans `wanted` nodes."""
         growth = wanted / np.maximum(resolution, 1e-300)
         halves = np.ceil(0.5 * np.array(self.interface.shape) * growth)
         return " x ".join(f"{2 * n:.10g}" for n in halves)
@@ -525,19 +527,19 @@ class Problem:
             )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
-        """Return the validated profiles of samples, with the problem's own values for all others.
+        """Return validated profiles of samples. Profiles that are not given come from the problem.
 
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa), of shape (samples, *shape) or (*shape), or
-            profiles by name: 'strength' and any others in `PROFILES`, but only
-            'weakening_rate', 'critical_slip' or 'fracture_energy'. Give each
-            profile here or in the problem, not in both. All but the strength may
-            also be (samples, 1) or a number. Such a 'normal_pressure' is a mean,
-            which glued blocks distribute. A 'friction_coefficient' in place of the
-            strength, or a DataArray that states the unit 1, is multiplied by the
-            pressure.
+            Peak strength tau_p (Pa) with shape (samples, *shape) or (*shape), or
+            profiles by name: 'strength' and other names in `PROFILES`, but at most
+            one of 'weakening_rate', 'critical_slip' and 'fracture_energy'. Give each
+            profile here or in the problem, not in both. Except for the strength, a
+            profile may also be a number or have shape (samples, 1). Such a
+            'normal_pressure' is a mean, which glued blocks distribute. The strength
+            may be replaced by a 'friction_coefficient', or by a DataArray that states
+            the unit 1. These are multiplied by the pressure.
         accept : collection of {"overstress"}
             Extreme profiles that the method accepts: initial stress above the
             strength.
@@ -545,22 +547,22 @@ class Problem:
         Raises
         ------
         InputError
-            If a name, shape or value is invalid, a strength is not above the
-            initial stress, no strength is above the residual strength, or a
-            `Sample` was made by another problem. The message lists every problem.
+            If a name, shape or value is invalid, a strength is not above the initial
+            stress, no strength is above the residual strength, or a `Sample` was made
+            by a different problem. The message lists every problem.
 
         Notes
         -----
-        A node whose strength is not above its residual strength does not weaken: its
-        strength is constant. An `AccuracyWarning` gives the share of such nodes, and the
-        share of nodes at which the initial stress is below minus the strength.
+        A node whose strength is not above its residual strength has a constant
+        strength. An `AccuracyWarning` gives the share of such nodes. It also gives
+        the share of nodes whose initial stress is below minus the strength.
         """
         return self.placed_sample(profiles, accept)[0]
 
     def placed_sample(
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
-        """Return a sample of users' data, and a mask of the measured nodes, or True."""
+        """Return a sample made from users' data, and a mask of the measured nodes, or True."""
         friction, interface = self.friction, self.interface
         problems: list[str] = []
         ready = isinstance(profiles, Sample)
@@ -617,7 +619,7 @@ class Problem:
         return sample, reduce(np.logical_and, measured)
 
     def constants(self, strength: Any) -> dict[str, Any]:
-        """Return values by name of profiles that are not given, None where there are none."""
+        """Return, by name, values for profiles that are not given, or None without a value."""
         return {
             "residual_strength": self.friction.residual(strength),
             "initial_stress": self.load.initial_stress,
@@ -626,10 +628,11 @@ class Problem:
         }
 
     def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
-        """Return a sample of arrays by name that the package made, (samples, *shape) in SI.
+        """Return a sample from arrays by name that the package made. They are in SI units.
 
-        Only values are checked here, because some samples may not fit the problem. The
-        caller checks the resolution, and nodes that do not weaken, for all samples.
+        Only values are checked here, because some samples may not fit the problem.
+        The caller checks the resolution, and the nodes that do not weaken, for all
+        samples together.
         """
         problems: list[str] = []
         for name, rows in profiles.items():
@@ -658,7 +661,7 @@ class Problem:
         self, strength: Array, residual: Array, initial: Array, scale: str, value: Array,
         pressure: Array, accept: Collection[str],
     ) -> Sample:  # fmt: skip
-        """Return a sample of rows with valid values, if the rows fit together."""
+        """Return a sample made from rows with valid values, if the rows fit together."""
         breakable = self.interface.breakable
         if breakable is not None:
             strength = np.where(breakable, strength, np.inf)
@@ -683,10 +686,10 @@ class Problem:
         return Sample(strength, residual, rates, initial, load_profile, pressure, self)
 
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
-        """Return refusals of values that profiles, or random properties, would replace.
+        """Return messages about values that profiles or random properties would replace.
 
-        They also name values that are missing in both. The `owner` of the names begins
-        each text.
+        There are also messages about values that are given in neither place. In the
+        messages, `owner` stands before the names.
         """
         twice = [
             f"problem.{key}: has no effect beside {owner}.{name}, which replaces it. Leave either"
@@ -709,7 +712,7 @@ class Problem:
         return twice
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
-        """Return the profiles of a ready-made sample by name, or refuse a foreign sample."""
+        """Return the profiles of a given `Sample` by name. Refuse a sample of another problem."""
         if sample.shape != self.interface.shape:
             shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
             raise InputError(f"profiles: the sample has {shapes}")
@@ -780,7 +783,7 @@ class Problem:
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:
-    """Return why a method does not take a problem, an empty list if it does."""
+    """Return the reasons why a method does not accept a problem, or an empty list."""
     reasons = method.supports(problem)
     if not isinstance(reasons, list):
         return [f"method: supports must return a list of reasons, got {describe(reasons)}"]

@@ -1,4 +1,4 @@
-"""Results: labelled datasets with units and all it takes to run them again."""
+"""Results: labelled datasets with units, and with the inputs that are needed to repeat them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def study_attributes(**parts: Any) -> dict[str, Any]:
-    """Return the problem, the method, ... by name in plain form, or why that is impossible."""
+    """Return the problem, the method and so on by name in plain form, or why this is impossible."""
     try:
         return {"study": {name: to_plain(part) for name, part in parts.items()}}
     except InputError as error:
@@ -30,18 +30,18 @@ def study_attributes(**parts: Any) -> dict[str, Any]:
 
 
 def along(interface: Interface, variable: Variable) -> Variable:
-    """Return the same variable with a value for each node."""
+    """Return the variable with a value for each node."""
     return replace(variable, dims=(*variable.dims, *interface.dims))
 
 
 def position(interface: Interface, variable: Variable) -> Variable:
-    """Return the same variable as a place, which has two components on a plane."""
+    """Return the variable as a position, which has two components on a plane."""
     dims = (*variable.dims, DIRECTION) if interface.is_plane else variable.dims
     return replace(variable, dims=dims)
 
 
 def per_area(interface: Interface, variable: Variable) -> Variable:
-    """Return a variable for a plane, where a quantity per length of a line is a total."""
+    """Return the variable for a plane: a quantity per length of a line becomes a total."""
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "N/s": "N m/s", "J/m": "J"}.get(variable.units, variable.units)

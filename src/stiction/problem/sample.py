@@ -1,4 +1,4 @@
-"""The profiles of samples, and how given arrays become them."""
+"""The profiles of samples, and their construction from given arrays."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ nodes that weaken."""
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
     """Return the largest weakening rate of nodes that may break, Pa/m, from (samples, *shape).
 
-    Barriers are left out, because with a uniform critical slip they weaken steeply but
-    never slip.
+    Barriers do not count: with a uniform critical slip they weaken steeply but never
+    slip.
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():
@@ -57,21 +57,22 @@ class _Profiles(NamedTuple):
 
 
 class Sample(Result, _Profiles):
-    """The profiles of an interface or many, from which every method starts.
+    """The profiles of one or more interfaces, from which every method starts.
 
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to
-        them. Strength is infinite beyond the extent of the interface. Where it is
-        at or below the residual strength, both are equal and W has no effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to these
+        arrays. The strength is infinite beyond the extent of the interface. If a
+        strength is not above the residual strength, both are set equal and W has no
+        effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
         In Pa, NaN if the problem has no pressure.
     problem : Problem, optional
-        The problem that made the sample, and the only problem that takes it. A sample
-        made by hand has no problem.
+        The problem that made the sample. Other problems do not accept the sample. A
+        sample made by hand has no problem.
     """
 
     def _summary(self) -> Summary:
@@ -120,24 +121,25 @@ class Sample(Result, _Profiles):
 
     @property
     def mean_strength(self) -> float:
-        """Mean strength where it is finite, Pa."""
+        """Mean of the finite strengths, Pa."""
         return float(self.strength.mean(where=np.isfinite(self.strength)))
 
     @property
     def steepest_rate(self) -> float:
-        """Largest weakening rate of nodes that may break, Pa/m."""
+        """Largest weakening rate, Pa/m, among nodes that may break."""
         return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
 
     def mean_stress(self, load: Array) -> Array:
-        """Return <tau_i> + tau_0 <p>, Pa, at the loads tau_0 of shape (samples,)."""
+        """Return <tau_i> + tau_0 <p>, Pa, at loads tau_0 with shape (samples,)."""
         return self.mean(self.initial_stress) + load * self.mean(self.load_profile)
 
 
 def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
 
-    A single profile (*shape) is a sample. If `samples` is given, a number, a profile
-    or a number for each sample, of shape (samples, 1), is broadcast to all.
+    A single profile (*shape) counts as one sample. If `samples` is given, a number, a
+    profile, or one number per sample with shape (samples, 1) is broadcast to
+    (samples, *shape).
     """
     shape, array = interface.shape, as_numbers(value)
     valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
@@ -158,7 +160,7 @@ def rows_of(name: str, value: Any, interface: Interface, samples: int | None) ->
 
 
 def check_values(name: str, array: Array, interface: Interface) -> None:
-    """Raise an `InputError` if a value is not possible for a profile of this name.
+    """Raise an `InputError` if a value is impossible for the profile with this name.
 
     `array` is a number, a profile or rows of profiles.
     """
@@ -196,9 +198,10 @@ def no_coefficients(values: Array, pressure: Array) -> list[str]:
 
 
 def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name: of a mapping or dataset, or of the strength alone.
+    """Return profiles by name, from a mapping, a dataset or the strength alone.
 
-    The strength may be friction coefficients, by that name or by the unit that it states.
+    The strength may consist of friction coefficients. Their name or their unit shows
+    this.
     """
     if hasattr(given, "marginal") or hasattr(given, "members"):
         raise InputError(

@@ -114,9 +114,9 @@ class Solid:
     def rayleigh_wave_speed(self) -> float:
         """c_R, m/s, from Rayleigh's cubic in q = (c_R/c_s)^2.
 
-        q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2) = 0 with eta = c_d/c_s: the
-        equation (2-q)^2 = 4 sqrt(1-q) sqrt(1-q/eta^2), squared and divided by q
-        (Rayleigh, 1885).
+        The cubic is q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2) = 0 with eta =
+        c_d/c_s. It follows from (2-q)^2 = 4 sqrt(1-q) sqrt(1-q/eta^2), squared and
+        divided by q (Rayleigh, 1885).
         """
         slowness = self.wave_speed_ratio**-2
         roots = np.roots([1.0, -8.0, 24.0 - 16.0 * slowness, -16.0 * (1.0 - slowness)])

@@ -22,7 +22,7 @@ def _stiffness(value: Any) -> float:
 
 
 def _written(value: float) -> Any:
-    """Return a number, or 'inf', which JSON has no number for."""
+    """Return a number, or 'inf' because JSON has no infinite number."""
     return "inf" if value == math.inf else value
 
 
@@ -42,9 +42,9 @@ class Platen:
     Parameters
     ----------
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, N/m. 0 is dead
-        load (the force is controlled), ``float("inf")`` a rigid machine (the travel
-        is controlled).
+        Stiffness of the machine between the grips of the two blocks, N/m. 0 is a dead
+        load (the force is controlled). ``float("inf")`` is a rigid machine (the
+        travel is controlled).
     mass : float
         Mass of the platen and the grip that move with a block, kg. It counts in
         ruptures with inertia only.
@@ -57,7 +57,7 @@ class Platen:
 
 @model(kw_only=True)
 class Pusher:
-    """A uniform traction on a side of each block, whose top face lies on rollers.
+    """A uniform traction on one or both sides of each block. The top face lies on rollers.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ class Pusher:
     width : float
         Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
-        The trailing side, from which slip is driven. Pushers on both sides take
-        half of the force each: the shear of a lap joint, whose bending and change
-        of pressure are not modelled.
+        The trailing side, from which slip is driven. Two pushers share the force
+        equally. This is the shear of a lap joint. Its bending, and its change of
+        pressure, are not modelled.
     stiffness : float
         Stiffness of the machine between the grips of the two blocks, N/m (see
         `Platen`).
     mass : float
-        Mass that moves with the pushers of a block, kg (see `Platen`).
+        Mass, kg, that moves with the pushers of a block (see `Platen`).
     """
 
     height: Positive
@@ -107,13 +107,13 @@ class Blocks:
         needs it.
     drive : Platen or Pusher
     pressing : {"frictionless", "glued"}
-        How the blocks are pressed: by a uniform pressure, or between plates on
-        which the top faces do not slide. Between plates,
-        ``Load(normal_pressure=...)`` is the mean.
+        How the blocks are pressed: by a uniform pressure, or between plates on which
+        the top faces do not slide. With plates, ``Load(normal_pressure=...)`` is the
+        mean pressure.
     quality_factor : float
         Q of the slowest shear wave along a block, at the frequency f = c_s/(2 L).
-        Momentum is lost at the rate 2 pi f/Q, in ruptures with inertia only. 25
-        is the inverse of the loss tangent of acrylic at some 10 kHz, 0.04. With
+        Momentum decays at the rate 2 pi f/Q, in ruptures with inertia only. The value
+        25 is for acrylic at about 10 kHz, with a loss tangent of 0.04. With
         ``float("inf")``, waves echo for ever.
 
     Examples
@@ -159,7 +159,7 @@ class Blocks:
         return Pushes(sides, drive.height, drive.width)
 
     def driven(self, length: float, nodes: int, solid: Solid, mode: Mode) -> Driven:
-        """Return stiffness and profiles of the blocks behind their machine, at the nodes."""
+        """Return the stiffness and the profiles of the blocks and their machine, at the nodes."""
         from stiction.elasticity.driven import driven  # scipy takes half a second
 
         machine = self.drive.stiffness

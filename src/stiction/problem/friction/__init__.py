@@ -1,4 +1,4 @@
-"""Friction laws, and in `kernels.py` their strength inside compiled kernels."""
+"""Friction laws. `kernels.py` evaluates their strength inside compiled kernels."""
 
 from stiction.problem.friction.laws import SCALES as SCALES
 from stiction.problem.friction.laws import ExponentialWeakening as ExponentialWeakening

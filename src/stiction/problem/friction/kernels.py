@@ -1,8 +1,8 @@
-"""Strength of any friction law at a slip, inside compiled kernels.
+"""Strength at a given slip for any friction law, inside compiled kernels.
 
-A law hands kernels its numbers as a NamedTuple of its own type. The line that its
-strength follows is resolved by that type when a kernel is compiled. A new law therefore
-changes no kernel, and its cost in a kernel is the cost of its own formula.
+A law passes its parameters to kernels as a NamedTuple of its own type. When a
+kernel is compiled, this type selects the formula for the strength. A new law
+therefore changes no kernel, and it costs only as much as its own formula.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from stiction.problem.friction.parameters import Linear
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:
-    """Stand for `line_at` of a law, which is chosen by the type of its parameters."""
+    """Stand for the `line_at` of a law. The type of its parameters selects the compiled version."""
     raise NotImplementedError
 
 
@@ -34,13 +34,13 @@ def _line_of(law, peak, residual, rate, slip, ahead):
 
 @cache
 def compiled(parameters: Any) -> Any:
-    """Return f and -f' of laws with parameters of a type, compiled."""
+    """Return the compiled f and -f' for a type of parameters."""
     return jit(parameters.f)
 
 
 @cache
 def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
-    """Return `line_at` for laws with parameters of a type."""
+    """Return `line_at` for a type of parameters."""
 
     def linear(law, peak, residual, rate, slip, ahead):
         if peak - rate * (slip + ahead) > residual:
@@ -68,7 +68,7 @@ def line_at(
 ) -> tuple[float, float]:
     """Return the straight line that the strength follows at ``slip + ahead``.
 
-    The line is given by its value at `slip` (Pa) and its rate of fall (Pa/m). For a
+    The line is given by its value at `slip` (Pa) and its weakening rate (Pa/m). For a
     piecewise linear law it is the piece itself.
 
     Parameters
@@ -76,20 +76,20 @@ def line_at(
     law : NamedTuple
         ``friction.parameters`` of the problem.
     peak, residual, rate, slip, ahead : float
-        tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), slips (m).
+        tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), and slips (m).
     """
     return _line(law, peak, residual, rate, slip, ahead)
 
 
 @jit
 def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float) -> float:
-    """Return the strength tau_f, Pa, at a slip, with the parameters of `line_at`."""
+    """Return the strength tau_f, Pa, at a slip. The parameters are the same as in `line_at`."""
     return _line(law, peak, residual, rate, slip, 0.0)[0]
 
 
 @jit_allocating
 def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
-    """Return the strength tau_f at every node, Pa, from (nodes,) arrays as in `line_at`."""
+    """Return the strength tau_f, Pa, at every node. Parameters of `line_at` are (nodes,) arrays."""
     result = np.empty(slip.size)
     for i in range(slip.size):
         result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])

@@ -1,6 +1,7 @@
 """Friction laws: strength that falls with slip from tau_p to tau_r.
 
-To add a law, derive from `FrictionLaw`. `register` makes it known to study files.
+To add a law, write a subclass of `FrictionLaw`. Call `register` to allow it in
+study files.
 """
 
 from __future__ import annotations
@@ -44,11 +45,11 @@ _VALID = {
 
 @model
 class FrictionLaw(ABC):
-    """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), f falling from 1 to 0.
+    """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), in which f falls from 1 to 0.
 
-    A law consists of the function f in its `parameters`, its integral and its inverse. It
-    takes the arguments of `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and
-    Gamma = (tau_p - tau_r) d_c times the integral of f.
+    A law consists of the function f in its `parameters`, the integral of f and the
+    inverse of f. A law takes the arguments of `LinearWeakening`, with W = -f'(0)
+    (tau_p - tau_r)/d_c and Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
     family: ClassVar[str] = "laws"
@@ -86,17 +87,17 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def area(self, u: Any) -> Array:
-        """Return the integral of f from 0 to slips u in units of d_c, any shape."""
+        """Return the integral of f from 0 to u, where u is slip in units of d_c, with any shape."""
 
     @abstractmethod
     def slip_at(self, fraction: float) -> float:
-        """Return a u at which f has fallen to a fraction in [0, 1].
+        """Return a slip u, in units of d_c, at which f equals a fraction in [0, 1].
 
         For a law with a tail, ``slip_at(0.0)`` is `math.inf`.
         """
 
     def fraction(self, u: Any) -> Array:
-        """Return f(u) at slips u in units of d_c, any shape."""
+        """Return f(u), where u is slip in units of d_c, with any shape."""
         f = self.parameters.f
         return np.vectorize(lambda slip: f(slip)[0], otypes=[float])(u)
 
@@ -107,7 +108,7 @@ class FrictionLaw(ABC):
 
     @property
     def steepest_slope(self) -> float:
-        """The largest -f'(u), which counts as -f'(0) unless it is larger by 0.1 %."""
+        """The largest -f'(u), or -f'(0) if the two differ by less than 0.1 %."""
         first = self.initial_slope
         if isinstance(self.parameters, Linear | Exponential):
             return first
@@ -116,7 +117,7 @@ class FrictionLaw(ABC):
 
     @property
     def steepening(self) -> float:
-        """The steepest slope over the first, at least 1. It decides about stability."""
+        """Ratio of the steepest slope to the initial slope, at least 1. It governs stability."""
         return self.steepest_slope / self.initial_slope
 
     @property
@@ -131,19 +132,19 @@ class FrictionLaw(ABC):
 
     @property
     def reach(self) -> float:
-        """u from which strength counts as residual. For a law that never ends, f is 1 % there."""
+        """The u beyond which strength counts as residual: where f reaches 0, or else 1 %."""
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
     @property
     def scale(self) -> tuple[str, Any] | None:
-        """Name and value of the given scale (W, d_c or Gamma), if it is not in the profiles."""
+        """Name and value of the given scale (W, d_c or Gamma), or None if it is in the profiles."""
         return next(
             ((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None), None
         )
 
     def residual(self, strength: Array) -> Array:
-        """Return tau_r, Pa, of a peak strength (Pa, any shape)."""
+        """Return tau_r, Pa, for a peak strength (Pa, with any shape)."""
         if self.residual_ratio is None:
             return np.asarray(self.residual_strength, dtype=np.float64)
         return np.asarray(self.residual_ratio) * strength
@@ -151,7 +152,8 @@ class FrictionLaw(ABC):
     def rate(self, drop: Array, scale: str, value: Any) -> Array:
         """Return the weakening rate W at zero slip, Pa/m.
 
-        `drop` is tau_p - tau_r, Pa, and `value` the value of a scale, in Pa/m, m or J/m².
+        `drop` is tau_p - tau_r, Pa. `value` is the value of a scale, in Pa/m, m or
+        J/m².
         """
         value = np.asarray(value, dtype=np.float64)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -166,10 +168,10 @@ class FrictionLaw(ABC):
         return self.initial_slope * drop / rate
 
     def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
-        """Return the energy dissipated above the residual strength up to a slip, J/m².
+        """Return the energy that slip up to `slip` dissipates above the residual strength, J/m².
 
-        `slip` (m) has the shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W
-        (Pa/m) have the shape (nodes,).
+        `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W
+        (Pa/m) have shape (nodes,).
         """
         if self.linear:
             weakened = np.minimum(slip, drop / rate)
@@ -189,7 +191,7 @@ class LinearWeakening(FrictionLaw):
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
         W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p -
         tau_r)/d_c varies with the strength. With Gamma, W = (tau_p - tau_r)²/(2
-        Gamma) does. Leave all three out if the scale is a profile or random
+        Gamma) also varies. Leave all three out if the scale is a profile or random
         (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
@@ -223,9 +225,8 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The law has the parameters of `LinearWeakening`. W is the rate at zero slip,
-    d_c the slip at which 1/e of tau_p - tau_r remains, and Gamma = (tau_p -
-    tau_r) d_c.
+    The law has the same parameters as `LinearWeakening`. W is the rate at zero slip.
+    At the slip d_c, 1/e of tau_p - tau_r remains. Gamma is (tau_p - tau_r) d_c.
 
     Examples
     --------
@@ -268,12 +269,13 @@ class PiecewiseWeakening(FrictionLaw):
     strength : sequence of float
         (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
-        As for `LinearWeakening`. W is the rate of the first piece, and the
-        strength is residual from d_c on.
+        As for `LinearWeakening`. W is the rate of the first piece. The strength is
+        residual if the slip exceeds d_c.
 
     Examples
     --------
-    Strength that loses 70 % within a tenth of the critical slip and the rest slowly:
+    A strength that loses 70 % within a tenth of the critical slip, and then falls
+    slowly:
 
     >>> import stiction as st
     >>> law = st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.3, 0.0], critical_slip=1e-5)
@@ -333,7 +335,7 @@ class PiecewiseWeakening(FrictionLaw):
         return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
 
     def slip_at(self, fraction: float) -> float:
-        """Return u at f."""
+        """Return the u at which f has the given value."""
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
 
@@ -347,11 +349,11 @@ class PiecewiseWeakening(FrictionLaw):
     @classmethod
     @checked
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
-        """Approximate another law by a number of linear `pieces`, at least 2.
+        """Approximate a law by linear pieces. `pieces` is their number, at least 2.
 
-        Corners lie on the law at equal steps of strength. If the law never
-        reaches its residual strength, the last piece dissipates as much as the
-        rest of the law.
+        The corners lie on the curve of the law, at equal steps of strength. If the
+        law never reaches its residual strength, the last piece dissipates the same
+        energy as the remaining part of the law.
 
         Examples
         --------
@@ -387,7 +389,7 @@ class PiecewiseWeakening(FrictionLaw):
 
 @lru_cache(maxsize=64)
 def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
-    """Return slips u up to the reach of a law, and f and -f' there, compiled."""
+    """Return slips u up to the reach of a law, with the compiled f and -f' at these slips."""
     from stiction.problem.friction.kernels import compiled  # imports numba
 
     parameters = law.parameters
@@ -397,7 +399,7 @@ def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return the mistakes in a law of the user, which may rise or contradict its f."""
+    """Return the mistakes in a user's law. Its f may rise, or contradict its other members."""
     if type(law).__module__.startswith("stiction."):
         return []
     name, parameters = type(law).__name__, law.parameters

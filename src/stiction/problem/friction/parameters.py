@@ -1,4 +1,4 @@
-"""Parameters of friction laws for kernels: NamedTuples with the function f of their law."""
+"""Parameters of friction laws for kernels: NamedTuples that also define the function f."""
 
 import math
 from typing import NamedTuple, Protocol
@@ -7,7 +7,7 @@ from stiction.base.arrays import Array
 
 
 class Parameters(Protocol):
-    """The part of a law for kernels: its own type of NamedTuple with these members."""
+    """The part of a law that kernels use: a NamedTuple of its own type with these members."""
 
     @property
     def initial_slope(self) -> float:
@@ -18,7 +18,7 @@ class Parameters(Protocol):
 
 
 class Linear(NamedTuple):
-    """Parameters of the linear law, which needs the numbers of the sample only."""
+    """Parameters of the linear law. It needs only the profiles of the sample."""
 
     initial_slope: float = 1.0
 
@@ -27,7 +27,7 @@ class Linear(NamedTuple):
 
 
 class Exponential(NamedTuple):
-    """Parameters of the exponential law, which needs the numbers of the sample only."""
+    """Parameters of the exponential law. It needs only the profiles of the sample."""
 
     initial_slope: float = 1.0
 
@@ -37,7 +37,7 @@ class Exponential(NamedTuple):
 
 
 class Polygon(NamedTuple):
-    """Corners of f: slip u in units of d_c, from 0 to 1, and f there, from 1 to 0."""
+    """Corners of f: the slip u in units of d_c rises from 0 to 1, and f falls from 1 to 0."""
 
     slip: Array
     fraction: Array

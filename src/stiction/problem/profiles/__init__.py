@@ -1,1 +1,1 @@
-"""Profiles along the interface: read from files and arrays, converted, placed at the nodes."""
+"""Profiles along the interface: reading from files and arrays, units, and placing at the nodes."""

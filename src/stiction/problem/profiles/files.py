@@ -1,4 +1,4 @@
-"""Files of measured data, by their endings. A file may come from a stranger.
+"""Read files of measured data, chosen by their endings. A file may come from a stranger.
 
 Each reader takes these steps:
 
@@ -89,7 +89,7 @@ def _read_image(content: bytes) -> xr.DataArray:
 
 
 def _read_instrument(content: bytes) -> xr.DataArray:
-    """Return the heights in a binary file of an instrument."""
+    """Return the heights in a binary file that an instrument wrote."""
     try:
         from SurfaceTopography import read_topography
     except ImportError:
@@ -103,7 +103,7 @@ def _read_instrument(content: bytes) -> xr.DataArray:
 
 
 def heights_of(surface: Any) -> xr.DataArray:
-    """Return the heights of an object of SurfaceTopography over x, and y if it is a map."""
+    """Return the heights in an object of SurfaceTopography over x, and over y if it is a map."""
     import xarray as xr
 
     *places, heights = surface.positions_and_heights()

@@ -1,15 +1,16 @@
-"""A profile from anything that has labels: the right variable, its coordinates, its values in SI.
+"""Take a profile from labelled data: choose the variable and its coordinates, convert to SI.
 
 A source is a file, an xarray object, a table of pandas, a surface, a quantity with
-a unit or an array. It may hold many variables, under names and in units that nobody
-agreed on. A wrong choice would be a wrong number, so every choice is either clear
-or refused. `labelled` takes these steps:
+a unit or an array. It may hold many variables, and their names and units follow no
+standard. A wrong choice would give a wrong number, so an ambiguous choice is
+refused. `labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
 2. Take a table without headings for a map if its comments, `rows` or `spacing` say so.
-3. Choose the variable and its coordinates: by the argument, else by the name, else by the
-   unit.
-4. Name the dimensions 'x' and 'y', or 'row' for a list of points, after the sample.
+3. Choose the variable and its coordinates by the argument. Without an argument,
+   choose by the name, and then by the unit.
+4. Name the dimensions 'x' and 'y', or 'row' for a list of points. The sample comes
+   first.
 5. Convert values and coordinates to SI, and check them.
 """
 
@@ -90,7 +91,7 @@ def unit_of(array: Any) -> str:
 
 
 def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
-    """Return the values of a DataArray in SI, by its own unit or the unit of the caller."""
+    """Return the values of a DataArray in SI, converted from its unit or the unit of the caller."""
     stated = unit_of(array)
     with prefixed(what, " "):
         values = as_numbers(magnitude(array.data, si))
@@ -102,7 +103,7 @@ def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
 
 
 def simplified(value: Any, quantity: str) -> Any:
-    """Return a labelled array if the source has labels, and else numbers in SI."""
+    """Return a labelled array if the source has labels. Otherwise return numbers in SI."""
     si = QUANTITIES[quantity].units
     if is_labelled(value):
         whole = value.dims or hasattr(value, "data_vars")
@@ -115,7 +116,7 @@ def simplified(value: Any, quantity: str) -> Any:
 
 
 def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
-    """Return numbers without labels, and the unit that they state, if they do.
+    """Return numbers without labels, and the unit if the source states a unit.
 
     The unit belongs to a quantity, is the attribute `units`, or stands in the name of a
     Series.
@@ -137,9 +138,10 @@ def without_missing(array: Any, options: Options) -> Any:
 
 
 def of_pandas(value: Any) -> Any:
-    """Return a Series or DataFrame as labelled, or as an array if its labels are 0, 1, 2, ...
+    """Return a Series or DataFrame with labels, or an array if its labels are 0, 1, 2, ...
 
-    Labels that are floats are positions, m. A DataFrame with headings is read like a file.
+    Labels of type float are positions, m. A DataFrame with headings is read like a
+    file.
     """
     import xarray as xr
 
@@ -168,7 +170,7 @@ def _is_range(index: Any) -> bool:
 
 
 def _positions(index: Any, what: str) -> dict[str, Array]:
-    """Return positions, m, or an empty dictionary if labels only number the values."""
+    """Return positions, m, or an empty dictionary if the labels are only numbers of rows."""
     if _is_range(index):
         return {}
     if index.dtype.kind != "f" or not np.all(np.isfinite(index)):
@@ -196,10 +198,10 @@ def labelled(
     rows: str | None = None,
     spacing: Any = None,
 ) -> Any:
-    """Return a quantity of `source` in SI along the directions `dims`, or along its own.
+    """Return a quantity from `source` in SI, along `dims` or the directions of the source.
 
-    A dimension of another name comes first. If each sample has a single value, it is the
-    only dimension.
+    A dimension with a different name, such as the sample, comes first. It is the only
+    dimension if each sample has a single value.
     """
     # 1. Make the source a DataArray or a Dataset.
     is_file = isinstance(source, str | Path)
@@ -276,7 +278,7 @@ def _of_array(values: Any, source: Any) -> Any:
 
 
 def _as_map(data: Any, dims: Any, rows: str | None, spacing: Any, value: Column) -> Any:
-    """Return a matrix in a text as a map, and other data as they are.
+    """Return a matrix from a text file as a map. Return other data unchanged.
 
     Comments may state the width, the height and the unit of a map, as Gwyddion writes them.
     """
@@ -332,7 +334,7 @@ def _is_map(data: Any) -> bool:
 def _chosen(
     data: Any, quantity: str, dims: tuple[str, ...], x: Column, value: Column
 ) -> tuple[Any, dict[str, Any]]:
-    """Return the name of the variable, and the names of its coordinates by direction."""
+    """Return the name of the variable, and by direction the names of its coordinates."""
     names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
     if table and data.attrs.get("headed"):  # a column without a name is an index
         names = [name for name in names if data.variables[name].attrs["heading"]]
@@ -371,7 +373,7 @@ def _chosen(
 
 
 def _choose(data: Any, names: list[Any], words: Sequence[str], si: str = "") -> Any:
-    """Return the variable with the first of some names, else the only variable in a unit."""
+    """Return the first variable found among some names, or else the only variable in a unit."""
     for word in words:
         if fitting := [name for name in names if _plain(_name(data, name)) == word]:
             return _only(data, fitting)
@@ -397,10 +399,10 @@ def _stated(data: Any, names: list[Any], argument: str, wanted: str | int) -> An
 def column_of(
     table: Any, kinds: Sequence[str], units: Iterable[str] = (), wanted: Column = None
 ) -> Any:
-    """Return the wanted column in a table of tests, or the column that begins with a certain word.
+    """Return the wanted column in a table of tests, or the column whose name begins with a word.
 
-    If no name begins with such a word, return the only column in a unit of `units`, if
-    there is a single column.
+    If no name begins with such a word, return the column in a unit of `units`,
+    provided that only one column has such a unit.
     """
     names = list(table.data_vars)
     if wanted is not None:
@@ -422,7 +424,7 @@ def _name(data: Any, name: Any) -> Any:
 
 
 def _only(data: Any, names: list[Any]) -> Any:
-    """Return the only name, or refuse several columns with one heading."""
+    """Return the only name. Refuse several columns with the same heading."""
     if len(names) > 1:
         numbers = " and ".join(str(data[name].attrs.get("column", name)) for name in names)
         raise InputError(
@@ -457,7 +459,7 @@ def _plain(name: Any) -> str:
 
 
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
-    """Return an array over 'x' ('x' and 'y', or 'row'), after the sample if there are several."""
+    """Return an array over 'x' ('x' and 'y', or 'row'). Samples, if any, come first."""
     if len(dims) == 1 and "x" in array.coords:
         array = array.swap_dims({array["x"].dims[0]: "x"})
     names = [str(dim) for dim in array.dims]
@@ -485,7 +487,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
 
 
 def _place(entry: int, lines: Any, size: int) -> str:
-    """Return where an entry stands in the source: its line in a table, or its number."""
+    """Describe the place of an entry in the source: its line in a table, or its number."""
     return f"line {lines[entry]}" if np.size(lines) == size else f"entry {entry}"
 
 
@@ -504,7 +506,7 @@ def check_positive(values: Array, quantity: str, lines: Any = (), raw: Any = Non
 
 
 def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
-    """Warn of a number far from all others that usually stands for a missing value."""
+    """Warn about a number that is far from all others and often stands for a missing value."""
     flat = np.ravel(values)
     known = flat[np.isfinite(flat)]
     for end in (known.min(), known.max()) if known.size else ():
@@ -521,7 +523,7 @@ def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
 
 
 def _doubt_metres(heights: Array) -> None:
-    """Warn of heights without a unit that are probably in um or nm."""
+    """Warn about heights without a unit that are probably in um or nm."""
     if heights.size and np.ptp(heights) > TALL:
         warn_user(
             f"height: has no unit, so it is taken in m, and ranges over {np.ptp(heights):.3g} m."

@@ -1,11 +1,12 @@
-"""Values put on the nodes of a line or a plane, and their gaps.
+"""Put values on the nodes of a line or a plane, and handle gaps.
 
 The nodes are x_i = i L/n in each direction. The interface is periodic, so points
 may come in any order and begin anywhere. On a specimen, the nodes are x_i = (i +
 1/2) L/n, and the profile stops at its ends. The steps are:
 
-1. Find by how much of a spacing all points lie beside nodes, and warn of such an offset.
-   Refuse points that do not lie on nodes, unless the caller wants to interpolate.
+1. Find the common offset of the points from the nodes, as a share of the spacing.
+   Warn about an offset. Refuse points that do not lie on nodes, unless the caller
+   wants to interpolate.
 2. Number the node of each point. Refuse two different values at a node.
 3. Give each node the value of its point, or interpolate between points.
 4. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
@@ -42,10 +43,10 @@ OF_A_PLANE = (
 
 
 def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
-    """Return values (..., points), their places (m) by direction, and a mask of measured points.
+    """Return values (..., points), positions (m) by direction, and a mask of measured points.
 
-    The mask is True if all were measured. Values without coordinates keep their shape,
-    and have an empty dictionary of places.
+    The mask is True if all points were measured. Values without coordinates keep
+    their shape, and their dictionary of positions is empty.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -60,7 +61,7 @@ def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
 def place(
     array: Any, interface: Interface, interpolate: bool = False, gaps: Gaps = "refuse"
 ) -> tuple[Array, Any]:
-    """Put values on the nodes of an interface, (..., *shape), with a mask of measured nodes.
+    """Return values at the nodes of an interface (..., *shape), and a mask of measured nodes.
 
     The mask is False at filled and missing values. It is True if all values are there.
     """
@@ -119,17 +120,17 @@ def place(
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """Return the hint for a message on the shape of a plane if its axes are swapped."""
+    """Return a hint for the message about the shape of a plane, if its axes are swapped."""
     if len(shape) == 2 and given == shape[::-1]:
         return ". x and y are swapped: the first axis of a profile is x"
     return ""
 
 
 def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
-    """Return the offset of all points from nodes, in spacings, in (-0.5, 0.5] (step 1).
+    """Return the common offset of the points from the nodes, in spacings, in (-0.5, 0.5] (step 1).
 
-    It is None if points must be interpolated, for example on a line that is coarser than
-    the nodes.
+    The offset is None if the points must be interpolated, for example if a line has
+    fewer points than nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
@@ -187,7 +188,7 @@ def _check_repeats(
 
 
 def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
-    """Return linear interpolations, constant a little beyond free ends, NaN in gaps (step 3)."""
+    """Return linear interpolations: constant just beyond free ends, and NaN in gaps (step 3)."""
     length, nodes = interface.measure, interface.x
     margin = TOLERANCE * interface.spacing
     if not interface.is_free:
@@ -223,7 +224,7 @@ def _interpolated(x: Array, values: Array, interface: Interface) -> Array:
 def close_gaps(
     values: Array, measured: Any, interface: Interface, gaps: Gaps
 ) -> tuple[Array, Any]:
-    """Return values (..., *shape) with NaN refused, left or filled, and a mask (step 4)."""
+    """Refuse, leave or fill NaN. Return values (..., *shape) and a mask (step 4)."""
 
     missing = np.isnan(values)
     if not missing.any():
@@ -254,10 +255,10 @@ def close_gaps(
 
 
 def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
-    """Return values (*shape) whose holes are interpolated linearly.
+    """Return values (*shape) with gaps filled by linear interpolation.
 
-    Free ends take the nearest value. On a plane, triangles span the nodes around each
-    hole, and a period repeats on all sides.
+    Free ends take the nearest value. On a plane, triangles connect the nodes around
+    each gap, and the period is repeated on all sides.
     """
     if not hole.any():
         return row
@@ -281,7 +282,7 @@ def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
 
 
 def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
-    """Return a result with the gaps of its profiles, and a mark of patches that reach into them."""
+    """Add to a result the gaps of its profiles, and mark patches that reach into gaps."""
     interface, position = problem.interface, result["critical_position"]
     if np.all(measured):
         return result

@@ -1,8 +1,8 @@
-"""Measured profiles: read in SI, and put on the nodes of an interface.
+"""Read measured profiles in SI, and put them on the nodes of an interface.
 
 A profile enters in three ways: through `read_profile`, as an argument of a call or
 an object (`at_nodes`), or by its name in a study file (`profile_in_file`).
-`read_profile`, to which study files lead, takes these steps, and `at_nodes` takes
+`read_profile`, which study files also use, takes these steps. `at_nodes` takes
 steps 1 and 4:
 
 1. Find the quantity in the source, in SI (`labels.py`).
@@ -82,20 +82,21 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas and units of pint and astropy count. An ``.npy``
-        file has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``, ``.dat``,
-        ``.tsv`` or ``.xlsx`` file has columns, with or without a line of names such
-        as ``x (mm), strength (MPa)``. A ``.nc`` file has variables with `units`,
-        and x as a coordinate. A map over 'x' and 'y' is a table with both as
+        Labels of xarray and pandas are used, and units of pint and astropy. An
+        ``.npy`` file has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``,
+        ``.dat``, ``.tsv`` or ``.xlsx`` file has columns, with or without a line of
+        names such as ``x (mm), strength (MPa)``. A ``.nc`` file has variables with
+        `units`, and x as a coordinate. A map over 'x' and 'y' is a table with both as
         columns, a matrix without headings, a grey image (``.png``, ``.tif``), or a
         binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or variable. By
-        default a name such as ``x`` or ``position``, and ``strength`` or ``tau_p``,
-        decides, else a single column in a unit of length or of `quantity`. Of two
-        columns without headings, the first is x.
+        default, columns are recognised by a name such as ``x`` or ``position``, and
+        ``strength`` or ``tau_p``, or else as the single column in a unit of length or
+        of `quantity`. If two columns have no headings, the first is x.
     unit, x_unit : str, optional
-        Units of the values and of positions if the source states none; SI by default.
+        Units of the values and the positions, if the source does not state them. By
+        default SI.
     quantity : str
         'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
         'critical_slip', 'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or
@@ -109,7 +110,8 @@ def read_profile(
         ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always
         do.
     decimal : {".", ","}, optional
-        Decimal mark of a text, if the file does not tell it from a mark of thousands.
+        Decimal mark of a text file. It is needed if the mark could also separate
+        thousands.
     skip : int
         Number of lines, or rows of a sheet, to pass over before the headings.
     sheet : int or str
@@ -118,30 +120,31 @@ def read_profile(
         Number (from 0) of the record, if empty lines or repeated headings separate
         several.
     spacing : float or (float, float), optional
-        Distance of the points of an array, a matrix or an image along x, and along
-        y, m.
+        Distance between the points of an array, a matrix or an image along x, and
+        along y, m.
     rows : {"x", "y"}, optional
-        Direction in which the lines of a matrix in a text follow each other. It
-        is y if comments state the width and height of the map, as Gwyddion writes
-        them.
+        Direction in which the lines of a matrix in a text file follow each other. The
+        default is y if comments state the width and height of the map, as in files of
+        Gwyddion.
     interface : Interface, optional
-        Map the profile to the nodes x_i = i L/n, modulo L, from points in any order.
+        Map the profile to the nodes x_i = i L/n, modulo L. Points may have any order.
     offset : float, (float, float) or "centre"
         Offset that is added to the coordinates, m. With "centre", the centre of the
         record moves to the centre of the interface.
     interpolate : bool
         Interpolate linearly if the points of a line do not coincide with the nodes.
     gaps : {"refuse", "fill", "skip"}
-        Refuse missing values (NaN, empty cells, missing points), fill them with
-        straight lines (on planes with triangles), or leave NaN, for
-        `stiction.fit_field` and `RandomField.given`, which draws equally likely
-        values. Without an interface, missing values always stay.
+        "refuse" raises an error for missing values (NaN, empty cells, missing
+        points). "fill" interpolates linearly (on planes within triangles). "skip"
+        leaves NaN, for `stiction.fit_field` or for `RandomField.given`, which draws
+        equally likely values. Without an interface, missing values always stay.
 
     Returns
     -------
     xarray.DataArray
-        Over 'x' (m), on a plane over 'x' and 'y', with `units`. With gaps it has the
-        coordinate 'measured', False in a gap, which results take over.
+        Profile over 'x' (m), or over 'x' and 'y' on a plane, with `units`. If there
+        are gaps, the coordinate 'measured' is False in a gap. Results have the same
+        coordinate.
 
     Raises
     ------
@@ -217,7 +220,7 @@ def read_profile(
 
 
 def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
-    """Return strengths, Pa, from heights, m; NaN in place of missing heights (step 2)."""
+    """Return strengths, Pa, from heights, m. Missing heights give NaN (step 2)."""
     values = as_numbers(strength(heights.copy()))
     if values.shape != heights.shape:
         raise InputError(
@@ -270,8 +273,9 @@ def at_nodes(
 ) -> tuple[Any, Any]:
     """Return the values of a quantity at the nodes, and a mask of the measured nodes.
 
-    `name` may be a dotted key. Numbers, and arrays of another shape, pass as given,
-    because the caller checks them. The mask is True if all values are there.
+    `name` may be a dotted key. Numbers, and arrays with a different shape, are
+    returned unchanged, because the caller checks them. The mask is True if all values
+    are there.
     """
     quantity = quantity_of(name)
     with prefixed(name):
@@ -293,7 +297,7 @@ def at_nodes(
 
 
 class ProfileFile(NamedTuple):
-    """A profile that a study file names. It is read once its interface is known."""
+    """A profile file named in a study file. It is read when the interface is known."""
 
     path: Path
     options: dict[str, Any]
@@ -304,7 +308,7 @@ class ProfileFile(NamedTuple):
 
 
 def profile_in_file(given: Any, field: str, folder: Path) -> Any:
-    """Return the profile that a study file names: its path, or `file` and options of the reader."""
+    """Return the profile named in a study file by its path, or by `file` and reader options."""
     table = dict(given) if isinstance(given, Mapping) else {"file": given}
     if "file" not in table:
         return given
@@ -316,6 +320,6 @@ def profile_in_file(given: Any, field: str, folder: Path) -> Any:
 
 
 def quantity_of(key: str) -> str:
-    """Return the quantity in the parameter of this name or dotted key."""
+    """Return the quantity that the parameter with this name or dotted key holds."""
     field = key.rsplit(".", 1)[-1]
     return "load_profile" if field == "profile" else field

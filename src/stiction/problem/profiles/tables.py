@@ -1,9 +1,9 @@
-"""Tables of numbers, as instruments, spreadsheets and colleagues write them.
+"""Read tables of numbers that instruments, spreadsheets and colleagues write.
 
-A table is text or a sheet of a workbook. Its dialect is unknown: what separates
-columns, which mark is decimal, where headings end, where units stand. A wrong guess
-could change a value by a factor of a thousand, so the reader refuses a table
-wherever two readings of it differ. The steps are:
+A table is a text file or a sheet of a workbook. Its format is unknown: the
+separator, the decimal mark, the end of the headings and the place of the units. A
+wrong guess could change a value by a factor of a thousand, so the reader refuses a
+table that can be read in two ways. The steps are:
 
 1. Split lines into cells. The last lines that contain numbers show the separator.
 2. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
@@ -13,8 +13,8 @@ wherever two readings of it differ. The steps are:
 4. Turn cells into numbers. Empty cells and words for a missing value become NaN.
 5. Split headings into names and units.
 
-A text above `LARGE` bytes takes the same steps for its first lines. pandas then reads the
-other lines if all of them are alike. Otherwise the steps above read the whole file.
+For a text above `LARGE` bytes, these steps read the first lines. pandas then reads
+the other lines if all of them are alike. Otherwise the steps read the whole file.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ _OTHER = {".": ",", ",": "."}
 
 
 class Options(NamedTuple):
-    """Statements of the caller about a file."""
+    """What the caller states about a file."""
 
     skip: int = 0
     sheet: int | str = 0
@@ -95,7 +95,7 @@ class Options(NamedTuple):
 
     @property
     def stated(self) -> tuple[float | str, ...]:
-        """Numbers and words of the caller for a missing value."""
+        """Numbers and words that the caller uses for a missing value."""
         several = self.missing if isinstance(self.missing, tuple | list) else (self.missing,)
         return tuple(value for value in several if value is not None)
 
@@ -107,7 +107,7 @@ class Options(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line of a table: its number, from 1, and its cells."""
+    """A line of a table: its number (from 1) and its cells."""
 
     number: int
     cells: list[str]
@@ -122,7 +122,7 @@ class Grid(NamedTuple):
 
 
 class Table(NamedTuple):
-    """The numbers of a table by column, and its headings."""
+    """The numbers of a table in columns, and its headings."""
 
     columns: Array  # (columns, rows)
     header: list[Row]
@@ -135,15 +135,15 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
     """Read a table of numbers from a text file or a sheet of a workbook.
 
     Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#``
-    are comments. The last line above the numbers names the columns, or gives their
-    units below a line of names. If there is no such line, the last comment may name
-    the columns.
+    are comments. The last line above the numbers holds the names of the columns, or
+    their units below a line of names. If there is no such line, the last comment may
+    hold the names.
 
-    Columns become variables along 'row', with NaN in empty cells. A column without a name
-    is called by its number, from 0. The attributes are `lines` (number of the line of
-    each row), `blocks` (number of its record), `comments`, and `headed` (whether columns
-    have names). The attribute `text` of a column without any number describes its
-    content.
+    Columns become variables along 'row', with NaN in empty cells. A column without a
+    name has its number, from 0, as its name. The attributes are `lines` (the line
+    number of each row), `blocks` (the record number of each row), `comments`, and
+    `headed` (whether columns have names). If a column contains no number, its
+    attribute `text` describes the content.
     """
     content = content_of(path)
     if path.suffix.lower() == EXCEL:
@@ -171,7 +171,7 @@ def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa:
 
 
 def table_of_frame(frame: Any) -> xr.Dataset:
-    """Return a DataFrame whose columns have headings like a table from a file."""
+    """Convert a DataFrame with headings to the form of a table from a file."""
     import pandas as pd
 
     headings = [str(name) for name in frame.columns]
@@ -212,7 +212,7 @@ def _labelled(
 
 
 def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Table]:
-    """Return the cells and the numbers of a text."""
+    """Return the cells and the numbers in a text."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         content = _text(content).encode()
     if len(content) > LARGE:
@@ -231,7 +231,7 @@ def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Table]:
 
 
 def _text(data: bytes) -> str:
-    """Decode UTF-8, UTF-16 with a byte order mark, or else Windows' western encoding."""
+    """Decode UTF-8, UTF-16 with a byte order mark, or otherwise the western encoding of Windows."""
     try:
         wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
         text = data.decode("utf-16" if wide else "utf-8-sig")
@@ -273,7 +273,7 @@ def _lines(text: str, options: Options) -> Grid:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """Return the separator in most of the last lines that contain numbers."""
+    """Return the separator that most of the last lines with numbers contain."""
     ends = [line for line in lines[-2 * END :] if re.search(r"\d", line)][-END:]
     for mark in (";", "\t"):
         if ends and 2 * sum(mark in line for line in ends) >= len(ends):
@@ -308,7 +308,7 @@ def _split(line: str, words: set[str]) -> list[str]:
 
 
 def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
-    """Return a large table whose lines are all alike, and None for any other text."""
+    """Return a large table if all its lines are alike, and None for any other text."""
     import pandas as pd
 
     end = content.find(b"\n", HEAD) + 1
@@ -349,7 +349,7 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
 
 
 def _sheet(content: bytes, options: Options) -> Grid:
-    """Return the cells of a sheet of a workbook as texts."""
+    """Return the cells in a sheet of a workbook as strings."""
     try:
         import openpyxl
     except ImportError:
@@ -378,7 +378,7 @@ def _sheet(content: bytes, options: Options) -> Grid:
 
 
 def _cells_of(sheet: Any, size: int) -> list[Row]:
-    """Return the cells of a sheet as texts, where `size` is the size of the file, bytes."""
+    """Return the cells of a sheet as strings. `size` is the size of the file in bytes."""
     most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
     sheet.reset_dimensions()  # the stated size of a sheet need not be true
     rows, width = [], 0
@@ -472,7 +472,7 @@ def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
 
 
 def _without_empty_end(row: Row, width: int) -> Row:
-    """Return a heading with one cell a column, if only empty cells stand beyond them."""
+    """Return a heading with one cell for each column, if all further cells are empty."""
     cells = list(row.cells)
     while len(cells) > width and not cells[-1]:
         cells.pop()
@@ -498,8 +498,8 @@ def _decimal_mark(
 ) -> str | None:
     """Return the decimal mark of a file, or None if its numbers have no mark (step 3).
 
-    The number 1.020 is 1.02 in one country and 1020 in another. Such a file is refused
-    unless the caller or another cell decides.
+    The number 1.020 means 1.02 in some countries and 1020 in others. Such a file is
+    refused unless the caller or a different cell decides.
     """
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
     decimal: set[str] = set()  # marks that stand where a mark of thousands cannot stand
@@ -625,6 +625,6 @@ _SIZE = re.compile(r"(width|height|value units)\s*[:=]\s*(?:([\d.,eE+-]+)\s*)?(\
 
 
 def sizes_of(comments: Iterable[str]) -> dict[str, tuple[float, str]]:
-    """Return 'width', 'height' and 'value units' of a map from comments, with their units."""
+    """Return from comments the 'width', 'height' and 'value units' of a map, with their units."""
     matches = filter(None, map(_SIZE.match, comments))
     return {m[1].lower(): (float(m[2] or 1.0), m[3]) for m in matches}
