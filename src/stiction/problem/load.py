@@ -40,7 +40,7 @@ class LoadShape(ABC):
 
     @abstractmethod
     def values(self, interface: Interface) -> Array:
-        """Return the profile at the nodes, of any mean, broadcasting to ``interface.shape``."""
+        """Return the profile at the nodes, with any mean. It must broadcast to the nodes."""
 
     def on(self, interface: Interface) -> Array:
         """Return the profile p at the nodes, with shape (*shape) and a mean of 1."""

@@ -27,7 +27,7 @@ nodes that weaken."""
 
 
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
-    """Return the largest weakening rate of nodes that may break, Pa/m, from (samples, *shape).
+    """Return the largest weakening rate, Pa/m, in (samples, *shape) among nodes that may break.
 
     Barriers do not count: with a uniform critical slip they weaken steeply but never
     slip.

@@ -1,4 +1,4 @@
-"""Random properties: marginals, spectra, and profiles by (seed, sample).
+"""Random properties: marginals, spectra, and profiles that depend on (seed, sample).
 
 Read `fields` first. It defines a `RandomField`, and a `RandomInterface` with several fields. Then
 read `marginals`, `spectra`, `mapping` (from the Gaussian field to the property), `modes` (waves on

@@ -1,4 +1,4 @@
-"""A field with measured values at some places: its draws, conditioned on these values.
+"""Condition the draws of a field on values measured at some places.
 
 Problem
 -------
@@ -16,13 +16,13 @@ normal, with
     covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
 
 With the symmetric root, mu + P^(1/2) a turns the usual draws into conditioned
-draws, with the same distribution as by Matheron's rule (A. G. Journel and C. J.
-Huijbregts, Mining Geostatistics, 1978). For a caller only the draws change.
+draws. Their distribution is the same as with Matheron's rule (A. G. Journel and C.
+J. Huijbregts, Mining Geostatistics, 1978). The caller only replaces the draws.
 
 Algorithm (`conditioned`)
 -------------------------
-Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17,
-2001), then a map for the skewness that Gaussians miss:
+The method is expectation propagation (T. P. Minka, Uncertainty in Artificial
+Intelligence 17, 2001), followed by a map for the skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place, as if no other value had been measured.
 2. Replace each l_k by a Gaussian. Choose it so that the product with the normal
@@ -33,18 +33,20 @@ Expectation propagation (T. P. Minka, Uncertainty in Artificial Intelligence 17,
    + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
    densely. If some p_k are negative, V is turned so that P is diagonal in it, and
    s^2 stands for the eigenvalues of P^-1 - 1, which may be negative.
-4. Remove the Gaussian of each place from the posterior. The result is the cavity: mean
-   and variance of z_k given all other values (`_from_others`).
-5. Repeat from 2 until these means stay, or for `MAX_UPDATES`.
+4. Remove the Gaussian of each place from the posterior. The result, called the
+   cavity, is the mean and variance of z_k given all other values (`_from_others`).
+5. Repeat from step 2 until these means no longer change, at most `MAX_UPDATES`
+   times.
 6. Map draws before the regression, so that they have the density (1) instead of
    its Gaussian approximation (`stiction.random.transport`, which also estimates
    the remaining error).
 7. Compare the misfit of values and draws at the mean with chi-square, for a
    warning.
 
-Departures from Minka: all places are updated at once. If the Gaussians have no
-posterior (P is not positive definite), b and p are reduced by a common factor. In
-step 4 a place keeps at least half of its precision before any measurement.
+The algorithm departs from Minka in three points. All places are updated at once. If
+the Gaussians have no posterior (P is not positive definite), b and p are reduced by
+a common factor. In step 4 each place keeps at least half of the precision that it
+has without measurements.
 """
 
 from collections.abc import Sequence
@@ -102,11 +104,11 @@ QUANTILE_SAMPLES = 1024  # for quantiles beyond the Gaussian
 
 
 class ReadPoints(np.ndarray):
-    """Places and values that were checked before, unlike an array that a user gives."""
+    """Places and values that are checked already, unlike an array from a user."""
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
-    """Return places (rows x, and y on a plane) and values (last row) of a measurement."""
+    """Return an array from a measurement: rows with x (and y on a plane), and a row with values."""
     if isinstance(value, ReadPoints):
         return value
     context = info.context or {}
@@ -140,7 +142,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
 
 
 def _values(array: Any) -> Array:
-    """Return the values of a labelled array in SI, by the property whose unit it states."""
+    """Return the values of a labelled array in SI. The stated unit determines the property."""
     stated = unit_of(array)
     for quantity in QUANTITIES.values():
         if is_in(stated or "1", quantity.units):
@@ -158,19 +160,19 @@ Points = Annotated[Any, BeforeValidator(_points), PlainSerializer(_table)]
 
 @model
 class Conditions:
-    """Measured values and their error, in the unit of the field."""
+    """Measured values and their standard error, in the unit of the field."""
 
     profile: Points
     noise: Positive
 
     @property
     def places(self) -> Array:
-        """Places of the measured values, m, (dimensions, points)."""
+        """Places of the measured values, m, with shape (dimensions, points)."""
         return np.asarray(self.profile[:-1])
 
     @property
     def values(self) -> Array:
-        """Measured values, (points,)."""
+        """Measured values with shape (points,)."""
         return np.asarray(self.profile[-1])
 
     def check(self, marginal: Any, interface: Interface) -> None:
@@ -201,7 +203,7 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """Measured values of a property. z at their places is phi @ draws; phi (points, dimension)."""
+    """Measured values of a property. At their places z is phi @ draws, phi (points, dimension)."""
 
     conditions: Conditions
     marginal: Any
@@ -215,7 +217,7 @@ class Measured(NamedTuple):
         return np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
 
     def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
-        """Step 2: return b and p, (points,), for mean and variance of z given all other values."""
+        """Step 2: return b and p (points,) from mean and variance of z given all other values."""
         law, noise = self.marginal.distribution, self.conditions.noise
         value = self.conditions.values
         # The range of z in which likelihood and normal distribution both matter.
@@ -265,7 +267,7 @@ class Measured(NamedTuple):
 
 
 def _normal_score(below: Array, above: Array) -> Array:
-    """Return the z with these probabilities below and above, from the smaller probability."""
+    """Return the z with given probabilities below and above. The smaller probability is used."""
     return np.where(below < 0.5, ndtri(below), -ndtri(above))
 
 
@@ -278,7 +280,7 @@ class Regression(NamedTuple):
     data: Array  # V' sum_k b_k phi_k, (1, directions)
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
-        """Return mean and standard deviation of z = phi @ draws, (points,)."""
+        """Return the mean and standard deviation of z = phi @ draws, with shape (points,)."""
         along, gain = phi @ self.right, 1.0 + self.power
         # Variance in directions that no measurement changes.
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
@@ -293,7 +295,7 @@ class Regression(NamedTuple):
 
 
 class Conditioning(NamedTuple):
-    """Map of standard normal draws to draws given measured values; see `conditioned`."""
+    """Map from standard normal draws to draws given measured values. See `conditioned`."""
 
     regression: Regression
     mapped: Transport  # of the draws, before the regression
@@ -302,16 +304,17 @@ class Conditioning(NamedTuple):
     points: int
 
     def draws(self, draws: Array) -> Array:
-        """Return conditioned draws (samples, dimension)."""
+        """Return conditioned draws with shape (samples, dimension)."""
         out = np.array(draws)
         if len(self.mapped.basis):
             transport(*self.mapped, out, np.zeros(len(out)))
         return self.regression.apply(out)
 
     def quantile_at(self, phi: Array, probability: float) -> Array:
-        """Return the quantile of z = phi @ draws, (points,).
+        """Return the quantile of z = phi @ draws at each point.
 
-        It is exact for the regression. The effect of the map is estimated by samples.
+        The quantile is exact for the regression. Samples estimate the effect of the
+        map.
         """
         mean, deviation = self.regression.moments(phi)
         quantile = mean + float(ndtri(probability)) * deviation
@@ -324,7 +327,7 @@ class Conditioning(NamedTuple):
         return quantile
 
     def warn(self) -> None:
-        """Warn of measured values that do not suit the field."""
+        """Warn about measured values that do not suit the field."""
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 f"given: the measured values are unlikely for this field (chi-square"
@@ -342,7 +345,7 @@ class Conditioning(NamedTuple):
 
 
 def conditioned(measured: Sequence[Measured]) -> Conditioning:
-    """Condition draws on measured values of properties, by the algorithm of this file."""
+    """Condition draws on measured values of properties, with the algorithm in this file."""
     phi = np.concatenate([values.phi for values in measured])
     # 1. and 2. Gaussians as if each value were the only one.
     cavity = np.zeros(len(phi)), np.ones(len(phi))
@@ -372,7 +375,7 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
 def _gaussians(
     measured: Sequence[Measured], cavity: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Step 2: return b and p of all properties, for mean and variance given all other values."""
+    """Step 2: return b and p for all properties, from means and variances given other values."""
     ends = np.cumsum([len(values.phi) for values in measured])[:-1]
     moments = zip(*(np.split(moment, ends) for moment in cavity), strict=True)
     gaussians = [
@@ -386,9 +389,10 @@ def _gaussians(
 def _log_ratio(
     measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
 ) -> LogRatio:
-    """Return the logarithm of l_k divided by its Gaussian, as a function of place and z.
+    """Return the logarithm of the ratio of l_k to its Gaussian, as a function of place and z.
 
-    The Gaussian is scaled to 1 at the `mean`, as constant factors of a place do not matter.
+    The Gaussian is scaled to 1 at the `mean`, because a constant factor at a place
+    does not matter.
     """
 
     def log_ratio(places: NDArray[np.int64], z: Array) -> Array:
@@ -406,7 +410,7 @@ def _log_ratio(
 
 
 def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
-    """Step 3: return the regression with its b and p, reduced if they have no posterior."""
+    """Step 3: return the regression, with b and p. They are reduced if they have no posterior."""
     scale = np.sqrt(np.maximum(np.abs(precision), MIN_SCALE))
     left, singular, right = svd(phi * scale[:, None], full_matrices=False)
     kept = singular > MIN_SINGULAR_VALUE
@@ -427,7 +431,7 @@ def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression,
 def _from_others(
     phi: Array, regression: Regression, shift: Array, precision: Array
 ) -> tuple[Array, Array]:
-    """Step 4: return mean and variance of z at each place, given the values at all others."""
+    """Step 4: return the mean and variance of z at each place, given the values at other places."""
     mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
     remaining = np.maximum(deviation**-2 - precision, least)

@@ -1,4 +1,4 @@
-"""Dotted keys of parameters, such as ``random.strength.marginal.low``, and their values."""
+"""Parameters and their values by dotted keys, such as ``random.strength.marginal.low``."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,10 +20,11 @@ MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 
 
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
-    """Return a copy of a model object or a list of them, with values at dotted keys.
+    """Return a copy of a model object, or of a list of them, with values set by dotted keys.
 
-    Messages begin with `path`, the dotted key of the object itself. Raises an `InputError` if a
-    key does not exist (with the nearest valid key) or a value is invalid.
+    Messages begin with `path`, the dotted key that leads to the object. Raises an
+    `InputError` if a value is invalid, or if a key does not exist. The message then
+    names the nearest valid key.
     """
     if isinstance(owner, list):
         return [with_values(member, values, path) for member in owner]
@@ -61,7 +62,7 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
 
 
 def full_key(key: str) -> str:
-    """Return a key as in a sweep, with the prefix that keys of the strength may leave out."""
+    """Return the full key, as in a sweep. Keys that belong to the strength may omit the prefix."""
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key
@@ -75,7 +76,7 @@ def full_key(key: str) -> str:
 
 
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
-    """Return a Latin hypercube: for each distribution, a value in every interval of 1/count."""
+    """Return a Latin hypercube: each distribution has a value in every 1/count of probability."""
     rng = np.random.default_rng([seed, 6])
     # Permute the intervals of each distribution, and take a random place in each
     # interval.
@@ -86,7 +87,7 @@ def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, 
 
 
 def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
-    """Return frozen distributions by the given keys, or raise an `InputError` with all mistakes.
+    """Return frozen distributions by key, or raise an `InputError` that lists all mistakes.
 
     Full keys must begin with `begin`.
     """
@@ -108,7 +109,7 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
 
 
 def distribution_of(key: str, value: Any) -> Any:
-    """Return a frozen distribution from a distribution, two ends or a table {low, high, spacing}.
+    """Return a frozen distribution, given a distribution, two ends or a table {low, high, spacing}.
 
     A marginal of a field, or its table, is also accepted.
     """

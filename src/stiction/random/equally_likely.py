@@ -1,4 +1,4 @@
-"""Equally likely random interfaces as a mixture: a first draw selects the member of a sample.
+"""Mixtures of equally likely random interfaces: the first draw of a sample selects the member.
 
 A mixture behaves as a single random interface, so that one search for failures
 covers all members.
@@ -7,7 +7,7 @@ covers all members.
    and mode (`_columns`).
 2. A first draw, mapped to a uniform number, selects the member
    (`EquallyLikely.member`).
-3. The member maps its share of the other draws to profiles
+3. The member maps the other draws that it uses to profiles
    (`EquallyLikely.from_draws`).
 """
 
@@ -63,7 +63,7 @@ FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 
 @runtime_checkable
 class Source(Protocol):
-    """Source of any number of equally likely interfaces: a fit, a posterior, parameters."""
+    """Source that returns any number of equally likely interfaces, such as a fit or a posterior."""
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
         """Return `count` equally likely interfaces."""
@@ -98,7 +98,8 @@ class EquallyLikely:
     """Mixture of equally likely random interfaces, with the protocol of a random interface.
 
     The first draw of a sample selects its member. Members share the other draws: a property and a
-    mode have the same draw in every member. A sample that changes its member keeps its form.
+    mode have the same draw in every member. If a sample changes its member, its profiles
+    keep their form.
     """
 
     members: tuple[RandomInterface, ...]
@@ -136,12 +137,12 @@ class EquallyLikely:
 
     @cached_property
     def varying(self) -> set[str]:
-        """Names of what differs from sample to sample: random, or with a factor."""
+        """Names of properties that differ between samples: random properties, or with a factor."""
         return set().union(*(member.varying for member in self.members))
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
-        """Number of each member's fields, the same for equal fields, (members,)."""
+        """Number for each member. Members with equal fields have the same number."""
         known: dict[Any, int] = {}
         numbers = [
             known.setdefault(tuple(member.properties.items()), len(known))
@@ -151,7 +152,7 @@ class EquallyLikely:
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
-        """Number of each member's group; the strengths of a group are in proportion."""
+        """Number of each member's group. The strengths in a group are proportional."""
         known: dict[Any, int] = {}
         forms = [form_of(member.strength) for member in self.members]
         numbers = np.array([known.setdefault(form, len(known)) for form in forms])
@@ -160,12 +161,12 @@ class EquallyLikely:
 
     @cached_property
     def means(self) -> Array:
-        """Mean strength of each member."""
+        """Mean strength for each member."""
         return np.array([member.strength.mean for member in self.members])
 
     @cached_property
     def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
-        """Distributions of the strength's factor, and the number of each member's distribution."""
+        """Distributions of the strength's factor, and each member's number among them."""
         known: dict[Any, int] = {}
         laws = [(member.between or {}).get("strength") for member in self.members]
         numbers = [known.setdefault(law, len(known)) for law in laws]
@@ -174,7 +175,7 @@ class EquallyLikely:
     def factor_column(self, interface: Interface) -> int | None:
         """Return the column of the draw for the strength's factor, or `None`.
 
-        It is `None` if any member has no factor.
+        Return `None` if any member has no factor.
         """
         if None in self.factor_laws[0]:
             return None
@@ -190,15 +191,15 @@ class EquallyLikely:
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
-        """Return a source with uncertain parameters, as by `stiction.uncertain`."""
+        """Return a source with uncertain parameters, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 
     def variant(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the constants that each sample takes."""
+        """Return, for each sample, the number of the set of constants that it uses."""
         return self.member(draws) % max(len(self.constants), 1)
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return a number of members, in a cycle."""
+        """Return `count` members, repeated in a cycle if necessary."""
         return [self.members[number % len(self.members)] for number in range(count)]
 
     def larger(self, count: int, seed: int) -> "EquallyLikely":
@@ -207,17 +208,17 @@ class EquallyLikely:
         return drawn_from(self.source, count, seed)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the member that each sample selects, by number."""
+        """Return the number of the member that each sample selects."""
         count = len(self.members)
         place = np.minimum((ndtr(draws[:, 0]) * count).astype(np.int64), count - 1)
         return np.array(self.order, np.int64)[place] if self.order else place
 
     def dimension(self, interface: Interface) -> int:
-        """Return how many standard normal draws a sample has."""
+        """Return the number of standard normal draws in a sample."""
         return _columns(self, interface).dimension
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
-        """Draw samples `first`, `first` + 1, ..., (samples, dimension)."""
+        """Draw samples `first`, `first` + 1, ... as an array (samples, dimension)."""
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
@@ -229,7 +230,7 @@ class EquallyLikely:
         return draws
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
-        """Map draws (samples, dimension) to profiles by name, (samples, *shape) each."""
+        """Map draws (samples, dimension) to profiles (samples, *shape) by name."""
         profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
         for name in self.varying - {*self.names}:  # of members without such a factor it is 1
             profiles[FACTOR + name] = np.ones((len(draws), *interface.shape))
@@ -244,7 +245,7 @@ class EquallyLikely:
 
 
 class Columns(NamedTuple):
-    """Columns of each member's draws among all draws of a mixture."""
+    """Columns that each member uses among the draws of a mixture."""
 
     of: list[NDArray[np.int64]]
     dimension: int
@@ -277,7 +278,7 @@ def _named(kinds: Mapping[str, Any]) -> str:
 
 
 def form_of(field: RandomField) -> Any:
-    """Return what fields share whose values are in proportion."""
+    """Return a key that is equal for fields whose values are proportional to each other."""
     if field.conditions is not None:
         return field
     relative = field.marginal.distribution.ppf(FORM_SHARES) / field.mean
@@ -286,7 +287,7 @@ def form_of(field: RandomField) -> Any:
 
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
-    """Return a mixture of `count` interfaces from a source."""
+    """Return a mixture that holds `count` interfaces from a source."""
     constants = source.constants(seed) if isinstance(source, Uncertain) else ()
     members = tuple(source.interfaces(count, seed))
     return EquallyLikely(members, source=source, constants=tuple(constants))
@@ -294,7 +295,7 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertain(Result):
-    """Source whose parameters, and constants of the problem, have distributions."""
+    """Source with distributions of parameters and of constants in the problem."""
 
     given: Any  # a random interface, several, or a source
     laws: Mapping[str, Any]  # by full key
@@ -307,7 +308,7 @@ class Uncertain(Result):
         return Summary("Uncertain parameters, means", rows, "90 % interval")
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return `count` equally likely interfaces, without the constants of the problem."""
+        """Return `count` equally likely interfaces, without constants of the problem."""
         source = self.given if isinstance(self.given, Source) else None
         if isinstance(self.given, EquallyLikely):
             source = self.given.source
@@ -335,14 +336,14 @@ class Uncertain(Result):
         ]
 
     def constants(self, seed: int) -> list[dict[str, float]]:
-        """Return values for the constants of the problem, by keys without ``problem.``."""
+        """Return values for constants in the problem, by key. The keys omit ``problem.``."""
         keys = [key for key in self.laws if key.startswith("problem.")]
         laws = {key.removeprefix("problem."): self.laws[key] for key in keys}
         return hypercube(laws, VARIANTS, seed + 1) if keys else []
 
 
 def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
-    """Give distributions to parameters of random properties and to constants of the problem.
+    """Give distributions to parameters of random properties and to constants in the problem.
 
     Parameters
     ----------
@@ -358,8 +359,8 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
     -------
     Uncertain
         Pass it to `design_stress`, `failure_probability` or any function that
-        takes a fit. Constants of the problem have forty values, evenly spread
-        over their distributions.
+        takes a fit. Each constant of the problem takes forty values, evenly spread
+        over its distribution.
 
     Examples
     --------
@@ -384,9 +385,9 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
 def as_random(
     given: Any, seed: int = 0, mixture: bool = False
 ) -> RandomInterface | EquallyLikely:
-    """Return a random interface, or a mixture for a list or a source of several.
+    """Return a random interface. A list or a source of several interfaces gives a mixture.
 
-    With `mixture` the list is complete, and no other interface is possible.
+    If `mixture` is true, the list is complete: no other interface is possible.
     """
     if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
         raise InputError(

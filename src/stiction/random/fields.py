@@ -1,8 +1,8 @@
 """Random fields, and the random interface that holds all random properties.
 
-Problem: map independent standard normal draws to profiles of correlated
-properties, each a translation field (M. Grigoriu, Applied Non-Gaussian Processes,
-1995). `layout` says which draws belong to which property and mode.
+Problem: map independent standard normal draws to profiles of correlated properties.
+Each property is a translation field (M. Grigoriu, Applied Non-Gaussian Processes,
+1995). `layout` assigns the draws to properties and modes.
 
 Algorithm (`RandomInterface.from_draws`)
 ----------------------------------------
@@ -12,7 +12,7 @@ Algorithm (`RandomInterface.from_draws`)
    Cholesky factor of the correlation matrix (`lower_factor`).
 3. Synthesise the Gaussian field z from its modes (`modes`), and map it to the
    marginal (`mapping`).
-4. Multiply by the factors between specimens, which are a draw each.
+4. Multiply by the factors between specimens. Each factor takes one draw.
 """
 
 from __future__ import annotations
@@ -81,11 +81,11 @@ class RandomField:
     spectrum : PowerLawSpectrum, ..., CustomSpectrum
         Power spectral density of the Gaussian field z.
     mean_mode : bool
-        Whether z has the mean mode, k = 0. Without it, as in Albertini et al.
-        (2020), every sample has the same mean of z, which is harmless only if the
-        correlation length is short compared with the interface.
+        Whether z has the mean mode, k = 0. Without this mode, as in Albertini et al.
+        (2020), the mean of z is the same in every sample. This is harmless only if
+        the correlation length is short compared with the interface.
     anisotropy : float, optional
-        On a plane, the ratio of the correlation lengths along y and along x, by
+        On a plane, the correlation length along y divided by the length along x, by
         default 1. The spectrum gives the correlation length along x.
     of : {"friction_coefficient"}, optional
         Declares that the field holds friction coefficients. The stress (strength,
@@ -140,18 +140,18 @@ class RandomField:
 
     @checked
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
-        """Return the field conditioned on measured values: fixed there, random elsewhere.
+        """Return the field conditioned on measured values. It remains random at other places.
 
-        Its samples use the draws of this field, and tend to its samples as the
-        noise grows.
+        Samples of the conditioned field use the same draws as this field. The larger
+        the noise, the closer they are to the samples of this field.
 
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
-            Measured values at any places, in the unit of the field, such as
-            ``st.read_profile("scan.csv")``. NaN stands for a missing value.
+            Measured values, for example ``st.read_profile("scan.csv")``, at any
+            places and in the unit of the field. NaN stands for a missing value.
         noise : float
-            Standard deviation of the error of a value, in the same unit, positive.
+            Standard deviation of the measurement error, in the same unit, positive.
 
         Examples
         --------
@@ -178,7 +178,7 @@ class RandomField:
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
-        """Return the quantile of the field at each node, given the measured values, (*shape)."""
+        """Return the quantile of the field at each node, given the measured values."""
         z = np.full(interface.size, float(ndtri(probability)))
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
@@ -190,7 +190,7 @@ class RandomField:
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> Array:
-        """Sample profiles, (samples, *shape), in the unit of the field.
+        """Return sampled profiles (samples, *shape) in the unit of the field.
 
         Sample i depends on the seed and on i only.
 
@@ -206,7 +206,7 @@ class RandomField:
 
     @cached_property
     def _alone(self) -> RandomInterface:
-        """Random interface with this field as its only random property."""
+        """Random interface in which only this field is random."""
         return RandomInterface(strength=self)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
@@ -241,10 +241,11 @@ class RandomField:
     def correlation(
         self, interface: Interface, *, of: Literal["strength", "z"] = "strength"
     ) -> Array:
-        """Compute the correlation at the lags ``interface.coordinates``, (*shape), periodic.
+        """Compute the periodic correlation at the lags ``interface.coordinates``.
 
-        `of` chooses the mapped field (by Hermite expansion; Grigoriu, 1995) or z. If the tails of
-        the marginal are too heavy, an `AccuracyWarning` gives the error.
+        `of` selects the mapped field (with a Hermite expansion: Grigoriu, 1995) or z.
+        If the tails of the marginal are too heavy, an `AccuracyWarning` gives the
+        error.
         """
         modes = self.modes(interface)
         origin = np.zeros((len(interface.shape), 1))
@@ -265,8 +266,8 @@ class RandomField:
     def efolding_length(self) -> float:
         """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
-        It holds on a line, and on a plane along x. `spectrum.efolding_length` is the distance for
-        z.
+        The distance is along a line, or along x on a plane.
+        `spectrum.efolding_length` is the distance for z.
         """
         coefficients = self._map_coefficients()
 
@@ -279,7 +280,7 @@ class RandomField:
 
 
 def _pairs(value: Any) -> Any:
-    """Return {("a", "b"): rho} or {"a": {"b": rho}} as the latter, in the order of names."""
+    """Return {("a", "b"): rho} or {"a": {"b": rho}} as {"a": {"b": rho}}, in the order of names."""
     if not isinstance(value, Mapping):
         return value
     pairs: dict[str, dict[str, Any]] = {}
@@ -323,31 +324,32 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa. With ``of="friction_coefficient"`` it is a friction
+        Peak strength, Pa, or with ``of="friction_coefficient"`` a friction
         coefficient, which is multiplied by the normal pressure.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
-        Other stresses, Pa. The first two may be coefficients, too. Leave random
+        Other stresses, Pa. The first two may also be coefficients. Leave random
         properties out of the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
-        At most one of them, in Pa/m, m or J/m². Leave all three out of the
-        friction law then.
+        At most one of the three, in Pa/m, m or J/m². If one is random, leave all
+        three out of the friction law.
     correlation : mapping, optional
-        Correlation coefficients of the Gaussian fields of two properties, mode by
-        mode: ``{("strength", "residual_strength"): 0.8}``, in a study file
-        ``correlation.strength.residual_strength = 0.8``. Other pairs are
+        Correlation coefficients between the Gaussian fields of two properties, mode
+        by mode. Example: ``{("strength", "residual_strength"): 0.8}``. In a study
+        file, write ``correlation.strength.residual_strength = 0.8``. Other pairs are
         independent.
     between : mapping, optional
         Marginals of positive factors with mean 1 that are constant along a
         specimen and differ from specimen to specimen: ``{"strength":
-        st.Lognormal(mean=1.0, cv=0.1)}``. A property that is not random here may
-        have one, too, such as ``"critical_slip"``, and so may
-        ``"pressing_force"``: the problem then gives its mean.
+        st.Lognormal(mean=1.0, cv=0.1)}``. A property that is not random here, such as
+        ``"critical_slip"`` or ``"pressing_force"``, may also have a factor. The
+        problem then gives its mean.
 
     Notes
     -----
-    Correlated translation fields follow Grigoriu (1995). The Cholesky factor of the correlation
-    matrix combines a property's own draws with the draws of earlier properties in the list above.
-    If spectra differ, the fields at a point are a little less correlated than the modes.
+    Correlated translation fields follow Grigoriu (1995). The Cholesky factor of the
+    correlation matrix combines a property's own draws with the draws of the
+    properties before it in the list above. If spectra differ, the correlation of the
+    fields at a point is slightly weaker than the correlation of the modes.
 
     Examples
     --------
@@ -445,11 +447,11 @@ class RandomInterface:
 
     @property
     def members(self) -> tuple[RandomInterface, ...]:
-        """The interface itself, as a mixture with a single member."""
+        """A tuple with this interface only, like the members of a mixture."""
         return (self,)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the member that each sample selects, always 0."""
+        """Return the number of the member that each sample selects, which is always 0."""
         return np.zeros(len(draws), np.int64)
 
     groups = np.zeros(1, np.int64)
@@ -500,11 +502,11 @@ class RandomInterface:
     def draws(
         self, interface: Interface, samples: Number, seed: Number, first: Number = 0
     ) -> Array:
-        """Draw the independent standard normal numbers of samples `first`, `first` + 1, ....
+        """Draw independent standard normal numbers for samples `first`, `first` + 1, ....
 
-        Draw j for a property in sample i depends on (seed, property, i, j) only. The result is
-        (samples, dimension): the draws for each property in the order of `names`, then for
-        `between`.
+        Draw j for a property in sample i depends on (seed, property, i, j) only. The
+        result has shape (samples, dimension). It holds the draws for the properties
+        in the order of `names`, and then the draws for `between`.
         """
         streams = layout(self, interface)
         numbers_per_sample = streams[-1].columns.stop + len(self.names) * interface.size
@@ -516,7 +518,8 @@ class RandomInterface:
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles by name, (samples, *shape) each.
 
-        Factors of properties that are not random begin with `FACTOR` and a property.
+        For a property that is not random, the name is `FACTOR` followed by the
+        property.
         """
         streams = layout(self, interface)
         dimension = streams[-1].columns.stop
@@ -555,7 +558,7 @@ class RandomInterface:
     def profiles(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> dict[str, Array]:
-        """Sample profiles by name, (samples, *shape) each.
+        """Return sampled profiles (samples, *shape) by name.
 
         Sample i depends on the seed and on i only.
         """
@@ -568,19 +571,19 @@ class RandomInterface:
         """Return equally likely random interfaces whose parameters have given distributions.
 
         Pass the list to a failure probability. The parameters are independent.
-        Each has a value in every interval of probability 1/count (a Latin
-        hypercube; McKay and others, 1979).
+        Each parameter has a value in every interval of probability 1/count (a Latin
+        hypercube: McKay and others, 1979).
 
         Parameters
         ----------
         parameters : mapping
-            Distributions by dotted key, as priors of `infer`: frozen
+            Distributions by dotted key, like the priors of `infer`: frozen
             `scipy.stats` distributions, ranges (low, high), or tables as in a
             study file.
         count : int
-            Number of interfaces; 30 show a 90 % band.
+            Number of interfaces. 30 are enough for a 90 % band.
         seed : int
-            Seed of the values, not negative.
+            Seed for the values, not negative.
 
         Examples
         --------
@@ -617,7 +620,7 @@ class RandomInterface:
 
 @lru_cache(maxsize=8192)
 def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
-    """Return the stream for each property, and for each factor between specimens."""
+    """Return the stream of draws for each property and each factor between specimens."""
     fields = list(random.properties.values())
     streams, start, block = [], 0, block_of(len(interface.shape))
     for name, field, row in zip(random.names, fields, random.linked, strict=True):
@@ -645,7 +648,7 @@ def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
 def _conditioned(
     random: RandomInterface, interface: Interface
 ) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Return the columns and the conditioning of each group of correlated properties."""
+    """Return the columns and the conditioning for each group of correlated properties."""
     fields = list(random.properties.values())
     if all(field.conditions is None for field in fields):
         return []
@@ -673,7 +676,7 @@ def _conditioned(
 
 
 def as_random_interface(given: Any) -> RandomInterface:
-    """Return a `RandomInterface`, in which a bare `RandomField` becomes the strength."""
+    """Return a `RandomInterface`. A `RandomField` becomes its strength."""
     if isinstance(given, RandomField):
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):

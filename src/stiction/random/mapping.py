@@ -1,4 +1,4 @@
-"""The mapping of a Gaussian field to a marginal, z -> F^-1(Phi(z)), and its correlation.
+"""Mapping z -> F^-1(Phi(z)) from a Gaussian field to a marginal, and correlation of the result.
 
 Problem
 -------
@@ -7,8 +7,8 @@ g(z(x)) with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
-for millions of z. The quantile F^-1 of scipy is a thousand times too slow. If the
-correlation of z at a lag is rho, the correlation of v at this lag is
+and is needed for millions of z. The quantile F^-1 of scipy is a thousand times too
+slow. If z at a lag has the correlation rho, v at this lag has the correlation
 
     sum_m c_m^2 rho^m / sum_m c_m^2, m >= 1,   c_m = E[g(Z) h_m(Z)],                          (2)
 
@@ -16,27 +16,27 @@ with the orthonormal Hermite polynomials h_m of a standard normal Z.
 
 Algorithm of the mapping (`from_normal`): our own
 -------------------------------------------------
-1. Reduce the marginal to its family at scale 1, so that all multiples share a
-   table (`_standard`).
+1. Reduce the marginal to scale 1, so that all multiples share a table
+   (`_standard`).
 2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes
    by central differences of fourth order. Check every piece at three points, and
    mark pieces that miss `TABLE_RTOL`, for example at a kink of the density
    (`quantile_table`).
-3. Interpolate (`interpolate`). Values of z outside the table, or on a marked
-   piece, go to a second table of [-8, 8]. Values that it does not serve go to
-   scipy.
+3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece,
+   use a second table for [-8, 8]. scipy computes the values that this table does
+   not cover.
 
 The relative error is at most 1e-9, or the absolute error 1e-15 standard
 deviations.
 
 Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------
-4. Compute c_m of (2) by the trapezoidal rule on [-8, 8], and the polynomials by
+4. Compute c_m of (2) with the trapezoidal rule on [-8, 8], and the polynomials with
    their recursion.
-5. Stop after at least `MIN_TERMS`, once the rest of the variance is a small
-   share.
-6. Let a last coefficient stand for the rest, so that the correlation is 1 at zero
-   lag.
+5. Stop after at least `MIN_TERMS` terms, when the remaining share of the variance
+   is small.
+6. Append a coefficient for the remaining variance, so that the correlation is 1 at
+   zero lag.
 """
 
 from functools import lru_cache
@@ -60,7 +60,7 @@ MAX_REST = 1e-6  # share of the variance for which the last coefficient may stan
 
 
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
-    """Compute F^-1(Phi(z)) of a frozen scipy.stats distribution (Grigoriu, 1995).
+    """Compute F^-1(Phi(z)) for a frozen scipy.stats distribution (Grigoriu, 1995).
 
     Phi(z) rounds to 1 long before z = 8. The upper tail therefore uses Phi(-z), which keeps its
     digits if scipy inverts the survival function of the family directly.
@@ -73,7 +73,7 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
 
 @jit
 def interpolate(z: Array, table: Array, out: Array) -> int:
-    """Step 3: write the tabulated mapping of `z` to `out` (flat arrays). Return how many are NaN.
+    """Step 3: write the tabulated mapping of `z` to `out` (flat arrays). Return the number of NaN.
 
     Values are NaN outside the table and on marked pieces.
     """
@@ -102,10 +102,10 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
 
 @lru_cache(maxsize=8192)
 def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
-    """Step 2: return values of the mapping and slopes times the step, (nodes, 2).
+    """Step 2: return an array (nodes, 2) with values of the mapping, and slopes times the step.
 
-    The slopes of a marked piece are NaN. Most tables take 32 KiB, so that the cache can hold a
-    table for each of many equally likely interfaces.
+    The slopes of a marked piece are NaN. Most tables take 32 KiB, so that the cache
+    can hold the tables of many equally likely interfaces.
     """
     distribution = marginal.distribution
     step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * end * PIECES_PER_UNIT)
@@ -134,7 +134,7 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
 
 
 def from_normal(marginal: Any, z: Array) -> Array:
-    """Compute F^-1(Phi(z)) for an array of any shape, to 1e-9 relative (Grigoriu, 1995)."""
+    """Compute F^-1(Phi(z)) for an array with any shape, to a relative 1e-9 (Grigoriu, 1995)."""
     if hasattr(marginal, "of_normal"):
         return np.asarray(marginal.of_normal(np.asarray(z, np.float64)))
     flat = np.ascontiguousarray(z, dtype=np.float64).ravel()
@@ -156,7 +156,7 @@ def from_normal(marginal: Any, z: Array) -> Array:
 
 
 class Standard(NamedTuple):
-    """Family of scipy from 0 at scale 1, whose table serves all multiples."""
+    """Distribution of scipy from 0 at scale 1. Its table serves all multiples."""
 
     family: Any
     shapes: tuple[float, ...]
@@ -168,11 +168,11 @@ class Standard(NamedTuple):
 
 
 def _standard(marginal: Any) -> tuple[Any, float, float]:
-    """Step 1: return the marginal at scale 1, with the lower bound and scale of the given marginal.
+    """Step 1: return the marginal at scale 1, and the lower bound and scale of the given marginal.
 
-    Shapes are rounded to 12 digits, as the shapes of multiples differ by round-off. A marginal with
-    a lower bound below zero keeps its own table, since subtraction would magnify the relative
-    error.
+    Shapes are rounded to 12 digits, because the shapes of multiples differ by
+    round-off. A marginal with a lower bound below zero has its own table, because
+    subtraction would magnify the relative error.
     """
     family = marginal.scipy_family
     if family is None or marginal.low < 0.0:
@@ -185,12 +185,12 @@ def _standard(marginal: Any) -> tuple[Any, float, float]:
 def hermite_coefficients(
     marginal: Any, step: float = HERMITE_STEP, most_terms: int = MAX_TERMS
 ) -> Array:
-    """Return c_m = E[F^-1(Phi(Z)) h_m(Z)], h_m the orthonormal Hermite polynomials, m = 0, 1, ...
+    """Return c_m = E[F^-1(Phi(Z)) h_m(Z)] for the orthonormal Hermite polynomials h_0, h_1, ...
 
     c_0 is the mean, and the sum of the squares of all other coefficients is the variance (Grigoriu,
-    1995). The steps are so fine that the rule is accurate at kinks of the mapping, too. The last
-    coefficient stands for the rest of the variance. Raises an `InputError` if the quantile and the
-    moments of scipy disagree.
+    1995). The steps are fine enough for kinks in the mapping. The last coefficient accounts
+    for the remaining variance. Raises an `InputError` if the quantile and the moments of
+    scipy disagree.
     """
     distribution, half = marginal.distribution, round(TABLE_END / step)
     z = np.arange(-half, half + 1) * step

@@ -1,8 +1,8 @@
 """Marginals: distributions of a property at a point.
 
-To add a family, derive from `Marginal`, define `distribution`, and `register` the
-class. Study files also take every continuous distribution of `scipy.stats` by its
-name.
+To add a family, write a subclass of `Marginal`, define `distribution`, and
+`register` the class. Study files also accept every continuous distribution of
+`scipy.stats` by its name.
 """
 
 import math
@@ -30,9 +30,10 @@ Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 class Marginal(ABC):
     """Base class of marginals.
 
-    A class may also have ``of_normal(z)``, which returns F^-1(Phi(z)) in closed form in place of
-    the tables of `mapping`. Its marginals share tables if `scipy_family` is their family of scipy,
-    and `distribution` the family with shapes, `low` and scale in this order.
+    A class may also define ``of_normal(z)``, which returns F^-1(Phi(z)) in closed
+    form and replaces the tables in `mapping`. Marginals of the class share tables if
+    `scipy_family` is their family in scipy, and `distribution` is this family with
+    shapes, `low` and scale in this order.
     """
 
     family: ClassVar[str] = "marginals"
@@ -66,10 +67,10 @@ def _frozen_once(family: Any) -> Any:
 
 
 def frozen(family: Any, *args: float) -> Any:
-    """Return a frozen distribution of a family of scipy, by its shapes, loc and scale.
+    """Return a frozen distribution from a family in scipy, with given shapes, loc and scale.
 
-    scipy writes the documentation of each frozen distribution anew, which takes a millisecond.
-    A copy shares it.
+    scipy generates the documentation of each new frozen distribution, which takes a
+    millisecond. A copy shares the documentation.
     """
     distribution = copy(_frozen_once(family))
     distribution.args = args
@@ -118,7 +119,7 @@ class Beta(Marginal):
 
 @model(kw_only=True)
 class _ByMoments(Marginal):
-    """Families above a lower bound, given by mean and coefficient of variation."""
+    """Families above a lower bound, described by the mean and the coefficient of variation."""
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
@@ -142,7 +143,7 @@ class _ByMoments(Marginal):
         return self
 
     def _shape(self, ratio: float) -> tuple[float, float]:
-        """Return the shape, and mean divided by scale, for a cv of the values above `low`."""
+        """Return the shape, and mean divided by scale. `cv` belongs to the values minus `low`."""
         raise NotImplementedError  # a family without a shape overrides `distribution`
 
     @cached_property
@@ -278,10 +279,10 @@ class TruncatedNormal(_ByMoments):
 
 @dataclass(frozen=True)
 class ScipyMarginal(Marginal):
-    """Continuous `scipy.stats` distribution by its name and parameters.
+    """Continuous `scipy.stats` distribution, given by its name and parameters.
 
-    A distribution without a name in scipy is kept `frozen`. It exists in Python only, and equals
-    only itself.
+    A distribution without a name in scipy is kept `frozen`. It cannot be written to a
+    study file, and it equals only itself.
     """
 
     type: str
@@ -296,7 +297,7 @@ class ScipyMarginal(Marginal):
         return self.frozen or getattr(scipy.stats, self.type)(**dict(self.parameters))
 
     def plain(self) -> dict[str, Any]:
-        """Return the table of this marginal in a study file."""
+        """Return the table that describes this marginal in a study file."""
         if self.frozen is not None:
             raise ValueError(
                 f"marginal is the Python distribution {self.type!r}, which scipy does not know by"
@@ -314,7 +315,7 @@ FACTOR_FAMILIES: dict[str, Any] = {
 
 
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
-    """Return the names of parameters that only shift or scale a marginal, and shift a and scale b.
+    """Return the names of parameters that only shift or scale a marginal, with shift a and scale b.
 
     The distribution of (tau_p - a)/b does not depend on these parameters. a and b are linear in
     them.
@@ -335,7 +336,7 @@ MARGINALS = Kinds("marginals")
 
 
 def marginal_of(value: Any) -> Marginal:
-    """Return the marginal given as a marginal, a table {type, ...} or a frozen distribution.
+    """Return a marginal, given as a marginal, a table {type, ...} or a frozen distribution.
 
     Raises an `InputError` for any other value, or if a moment is not finite.
     """
@@ -362,7 +363,7 @@ def marginal_of(value: Any) -> Marginal:
 
 
 def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) -> Marginal:
-    """Return the marginal of a scipy family by name and parameters, the `first` in order."""
+    """Return the marginal from a scipy family, by name and parameters. `first` are in order."""
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]

@@ -1,20 +1,20 @@
-"""The modes of a field: waves on an interface, and their amplitudes.
+"""The modes of a field: waves on an interface and their amplitudes.
 
 Problem
 -------
-On a periodic interface a field has the waves k = 2 pi (jx/Lx, jy/Ly). With the
-spectral density g(k) and its truncation K, their amplitudes have the variances
+On a periodic interface a field consists of waves with k = 2 pi (jx/Lx, jy/Ly). With
+the spectral density g(k) and the truncation K, the amplitudes have the variances
 
     sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (1)
 
 Algorithm (`make_modes`)
 ------------------------
-1. List candidate wave vectors, either k or -k, in an order that depends on the
-   proportions of the interface only. The place of a mode in this order is the
-   number of its draws (`_numbers`).
+1. List candidate wave vectors, either k or -k, in an order that depends only on the
+   proportions of the interface. The position of a mode in this order selects its
+   draws (`_numbers`).
 2. Keep the wave vectors up to the truncation.
-3. Compute (1). The mean mode k = 0 stands for a single wave vector, every other
-   mode for k and -k. The mean mode therefore has half of g(0).
+3. Compute (1). The mean mode k = 0 is a single wave vector, and every other mode
+   stands for k and -k. The mean mode therefore takes half of g(0).
 """
 
 import math
@@ -36,7 +36,7 @@ CUTOFF_RTOL = 1e-9  # round-off keeps a mode exactly at the truncation, such as 
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Modes of a field on an interface: the mean mode, and then J modes."""
+    """Modes of a field on an interface: the mean mode, followed by J modes."""
 
     interface: Interface
     # Standard deviations, (J + 1,), with unit sum of squares; the first is 0
@@ -59,7 +59,7 @@ class Modes:
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
-        """Return the nodes that leave at most a share unresolved, in the present proportions."""
+        """Return how many nodes leave at most a given share unresolved, in the same proportions."""
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
         # Refinement of the present grid that resolves each mode.
@@ -69,9 +69,10 @@ class Modes:
         return [2 * math.ceil(n / 2 * refinement[order][last] - 1e-9) for n in shape.tolist()]
 
     def gaussian(self, draws: Array) -> Array:
-        """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x), (samples, *shape).
+        """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x) as (samples, *shape).
 
-        Each sample has its own inverse transform, so that the numbers do not depend on the batch.
+        Each sample has its own inverse transform, so that the result does not depend
+        on the batch.
         """
         numbers, shape = self.numbers, self.interface.embedding.shape
         if len(shape) == 1:
@@ -86,7 +87,7 @@ class Modes:
         return fields
 
     def _from_first_node(self, draws: Array) -> Array:
-        """Return the draws for the same waves with their origin at the first node.
+        """Return draws for the same waves, with the origin moved to the first node.
 
         The first node of a specimen lies half a spacing from its end.
         """
@@ -98,7 +99,7 @@ class Modes:
         return shifted
 
     def basis(self, places: Array) -> Array:
-        """Return phi, (points, dimension): z at places (dimensions, points) is phi @ draws."""
+        """Return phi (points, dimension), with z = phi @ draws at places (dimensions, points)."""
         lengths = np.array(self.interface.embedding.lengths)[:, None]
         phase = 2.0 * np.pi * (places / lengths).T @ self.numbers[:, 1:]
         phi = np.empty((phase.shape[0], self.dimension))
@@ -113,10 +114,11 @@ class Modes:
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
-    """Return the modes of a spectrum, or raise an `InputError` for too many or no modes.
+    """Return the modes of a spectrum. Raise an `InputError` if there are too many or no modes.
 
-    A field on a specimen is half of a periodic field with twice its length. With this period, lags
-    along the specimen have the correlation of an infinite interface.
+    A field on a specimen is half of a periodic field that is twice as long. With this
+    period, the correlation at lags along the specimen is the same as on an infinite
+    interface.
     """
     placed_on, interface = interface, interface.embedding
     dimensions = len(interface.shape)

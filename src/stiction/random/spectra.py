@@ -4,20 +4,20 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-K being the truncation. Samples have the truncated spectrum, so correlations and
-lengths refer to the truncated spectrum, too.
+with the truncation K. Samples have the truncated spectrum, so correlations and
+lengths also refer to the truncated spectrum.
 
-1. Integrate (1) octave by octave, because densities span decades, by QUADPACK's
+1. Integrate (1) octave by octave, because densities span decades, with QUADPACK's
    rule for a cosine (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D.
    Kahaner, QUADPACK, 1983) (`_integrate`).
 2. Find the length at which the correlation falls to 1/e by marching and a search
    (`lag_of_correlation`).
 
-On a plane the field is isotropic, and a line through it has the correlation of
-the field on a line. For this, the exponent of 1 + k^2 grows by (D - 1)/2 in D
-dimensions, and a Gaussian keeps its form.
+On a plane the field is isotropic, and along any straight line it has the same
+correlation as a field on a line. Therefore, in D dimensions the exponent of 1 + k^2
+grows by (D - 1)/2, and a Gaussian keeps its form.
 
-To add a spectrum, derive from `ScaledSpectrum` and `register` the class.
+To add a spectrum, write a subclass of `ScaledSpectrum` and `register` it.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # requested and accepted errors
 
 
 class SpectralDensity(ABC):
-    """Base class of spectra on infinite lines (`dimensions` = 1) and planes (2)."""
+    """Base class for spectra on infinite lines (`dimensions` = 1) and planes (2)."""
 
     family: ClassVar[str] = "spectra"
 
     @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
-        """Return the density at wave vectors of length k (rad/m), up to a factor."""
+        """Return the density at wave vectors with length k (rad/m), up to a factor."""
 
     @abstractmethod
     def cutoff(self, dimensions: int = 1) -> float:
@@ -63,7 +63,7 @@ class SpectralDensity(ABC):
 
     @property
     def scale(self) -> float:
-        """Wavenumber (rad/m) from which integrals proceed octave by octave."""
+        """Wavenumber (rad/m) at which the integration by octaves begins."""
         return 1e-6 * self.cutoff()
 
     def correlation(self, lag: Array) -> Array:
@@ -75,7 +75,7 @@ class SpectralDensity(ABC):
 
     @property
     def efolding_length(self) -> float:
-        """Distance at which the correlation of z first falls to 1/e, m, on a line."""
+        """Distance, m, at which the correlation of z on a line first falls to 1/e."""
         return lag_of_correlation(self, math.exp(-1.0))
 
 
@@ -88,7 +88,7 @@ def _integrate(
 ) -> float:
     """Step 1: return the integral of g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
 
-    Errors are 1e-12 of `power` if it is known, otherwise of each piece.
+    The tolerance is 1e-12 of `power`, or of each piece if `power` is not known.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {
@@ -113,7 +113,7 @@ def _integrate(
 
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
-    """Return ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
+    """Return the ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
     scale, end = spectrum.scale, spectrum.cutoff()
     octaves = scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / scale))))
     edges = np.concatenate(([0.0], octaves[octaves < end], [end]))
@@ -148,10 +148,11 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 
 @model
 class ScaledSpectrum(SpectralDensity):
-    """Base class of spectra with a single length: g depends only on k times this length.
+    """Base class for spectra with a single length: g depends only on k times this length.
 
-    Your own class defines `density`, `power_within` and its inverse `quantile`, and
-    `untruncated_correlation`, with which `stiction.fit_field` finds the correlation length.
+    A subclass defines `density`, `power_within`, its inverse `quantile`, and
+    `untruncated_correlation`. `stiction.fit_field` uses the latter to find the
+    correlation length.
     """
 
     correlation_length: Magnitude
@@ -176,11 +177,11 @@ class ScaledSpectrum(SpectralDensity):
 
     @abstractmethod
     def untruncated_correlation(self, lag: Array) -> Array:
-        """Return the correlation of z at `lag` (m), any shape, without truncation, on a line."""
+        """Return the correlation of z on a line, without truncation, at `lag` (m, any shape)."""
 
     @property
     def scale(self) -> float:
-        """Wavenumber by which all spectra of a class scale, rad/m."""
+        """Wavenumber, rad/m, with which all spectra of a class scale."""
         return 1.0 / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
@@ -195,7 +196,7 @@ class ScaledSpectrum(SpectralDensity):
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
     def with_efolding_length(self, length: float) -> Any:
-        """Return the spectrum with the same shape whose e-folding length (of z) is `length`, m."""
+        """Return the spectrum with the same shape, with `length` (m) as e-folding length of z."""
         xi = self.correlation_length * length / self.efolding_length
         return dataclasses.replace(self, correlation_length=xi)
 
@@ -232,9 +233,9 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     exponent : float
         Exponent in [0.6, 64], 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
-        Truncation in multiples of lambda. By default it retains 0.99969 of the
-        power on a line, and is at least 2.5: 2.5 at the exponent 4 (as in the
-        paper), 11 at 2 and 2,100 at 1.
+        Truncation in multiples of lambda. By default it retains 0.99969 of the power
+        on a line, but it is at least 2.5. It is 2.5 for the exponent 4 (as in the
+        paper), 11 for 2 and 2,100 for 1.
     power_kept : float, optional
         Share of the power retained by truncation, in (0, 1).
 
@@ -256,7 +257,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     @property
     def scale(self) -> float:
-        """Wavenumber lambda = 2 pi/xi_0 above which the density falls as a power law, rad/m."""
+        """Wavenumber lambda = 2 pi/xi_0, rad/m, above which the density falls as a power law."""
         return 2.0 * math.pi / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
@@ -277,7 +278,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 @register
 @model
 class SquaredExponentialSpectrum(ScaledSpectrum):
-    """Spectrum of the correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
+    """Spectrum for the correlation exp(-(x/xi_0)^2): g(k) ~ exp(-(k xi_0/2)^2).
 
     Parameters
     ----------
@@ -285,8 +286,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
         Correlation length xi_0, m, at which the correlation of z is 1/e without
         truncation.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or the share of the power that is
-        retained, by default 0.9997.
+        Truncation in multiples of 2 pi/xi_0, or share of the power to retain, by
+        default 0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -309,10 +310,11 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 @register
 @model
 class ExponentialSpectrum(_PowerOfWavenumber):
-    """Spectrum of the correlation exp(-|x|/xi_0), a rough field: g(k) ~ 1/(1 + (k xi_0)^2).
+    """Spectrum for the correlation exp(-|x|/xi_0), a rough field: g(k) ~ 1/(1 + (k xi_0)^2).
 
-    The parameters are those of `SquaredExponentialSpectrum`. By default 0.99 of the power is
-    retained, since every further digit 9 takes ten times as many modes.
+    The parameters are the same as for `SquaredExponentialSpectrum`. By default 0.99
+    of the power is retained, because every further digit 9 takes ten times as many
+    modes.
     """
 
     type: Literal["exponential"] = "exponential"
@@ -329,14 +331,14 @@ def _refuse_to_write(function: Any) -> Any:
 
 @model
 class CustomSpectrum(SpectralDensity):
-    """Spectrum of your own: any g(k), up to a factor, in Python only.
+    """User-defined spectrum: any g(k), up to a factor. It cannot be used in study files.
 
     Parameters
     ----------
     function : callable
-        g(k), which takes an array of wavenumbers (rad/m) and returns an array
-        without negative values. On a plane it is the density at wave vectors of
-        length k.
+        g(k), which takes an array of wavenumbers (rad/m) and returns an array without
+        negative values. On a plane, g(k) is the density at wave vectors with length
+        k.
     max_wavenumber : float
         Truncation, rad/m.
     """
@@ -368,7 +370,7 @@ SPECTRA = Kinds("spectra")
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return the spectrum given as a spectrum or a table {type, ...}."""
+    """Return a spectrum, given as a spectrum or a table {type, ...}."""
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):

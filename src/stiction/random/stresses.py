@@ -1,11 +1,12 @@
-"""Random properties of a problem as stresses, also for friction coefficients under a pressure.
+"""Random properties as stresses. Friction coefficients are multiplied by the pressure.
 
-`share_below_residual` estimates the share of the strength that does not exceed
-the residual strength, by our own algorithm:
+`share_below_residual` estimates the share of the strength that does not exceed the
+residual strength. The algorithm is our own:
 
 1. Replace the residual strength by equally likely values.
-2. Multiply or divide them by equally likely values of each factor on only one of
-   the two strengths: factors between specimens, and the pressure on coefficients.
+2. Some factors apply to only one of the two strengths: factors between specimens,
+   and the pressure if one strength is a coefficient. Multiply or divide by equally
+   likely values of each such factor.
 3. Average the distribution function of the strength over these values. If the two
    strengths are correlated, take the distribution of the strength given the
    residual strength.
@@ -37,7 +38,7 @@ def coefficients_of(random: RandomInterface) -> list[str]:
 
 
 def check_pressure(problem: Problem, random: RandomInterface) -> None:
-    """Raise an `InputError` if coefficients have no pressure, or a factor has no property."""
+    """Raise an `InputError` if coefficients lack a pressure, or a factor lacks its property."""
     names, constants = coefficients_of(random), problem.constants(np.ones(()))
     forces = {"pressing_force": problem.load.pressing_force}
     for name in random.between or {}:
@@ -59,8 +60,8 @@ def profiles_in_stress(
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node.
 
-    A sampled pressure is multiplied by the shape of the pressure between glued blocks. Constants of
-    the problem are multiplied by their factors between specimens.
+    A sampled pressure is multiplied by the pressure profile between glued blocks.
+    Constants in the problem are multiplied by their factors between specimens.
     """
     stresses = {name: rows for name, rows in profiles.items() if not name.startswith(FACTOR)}
     factors = {name: rows for name, rows in profiles.items() if name.startswith(FACTOR)}
@@ -114,7 +115,7 @@ def _equally_likely(marginal: Any, count: int) -> Array:
 
 
 def _pressures(problem: Problem, random: RandomInterface) -> Array:
-    """Return equally likely pressures of a point, Pa."""
+    """Return equally likely pressures at a point, Pa."""
     pressure = problem.normal_pressure
     if "normal_pressure" in random.names:
         levels = _equally_likely(

@@ -1,4 +1,4 @@
-"""From (seed, sample, mode) to standard normal draws, and from draws to the Gaussian field.
+"""Make standard normal draws from (seed, sample, mode), and Gaussian fields from draws.
 
 Problem
 -------
@@ -7,17 +7,17 @@ Mechanics Reviews 44, 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. Sample i must depend on the seed and i only.
-Within a sample, a draw must depend on its property and mode only, not on the
-batch, the number of workers, the spectrum or the grid.
+with standard normal A_j and B_j. Sample i must depend only on the seed and i.
+Within a sample, a draw must depend only on its property and mode, not on the batch,
+the number of workers, the spectrum or the grid.
 
 Draws (`Stream.draw`)
 ---------------------
-1. Samples of a line come in blocks of 256 that share a generator, because a
-   generator for each sample would cost more than the sample. A sample of a plane
-   has so many modes that it is a block of its own. The generator depends on the
-   seed, the property and the number of the block.
-2. Inside a block the draws run mode after mode, A_j before B_j, so that a
+1. On a line, 256 samples form a block that shares a generator, because a generator
+   for each sample would cost more than the sample. On a plane, a sample has so many
+   modes that it forms a block by itself. The generator depends on the seed, the
+   property and the number of the block.
+2. Inside a block the draws follow mode after mode, with A_j before B_j, so that a
    spectrum with more modes extends the same field. Draws of modes outside the
    spectrum are dropped.
 
@@ -42,12 +42,12 @@ SAMPLES_PER_BLOCK = 256
 
 
 def block_of(dimensions: int) -> int:
-    """Return how many samples share a generator on a line (1 dimension) or a plane (2)."""
+    """Return how many samples share a generator, on a line (1 dimension) or a plane (2)."""
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 
 class Stream(NamedTuple):
-    """Draws for a property or a factor between specimens, among all draws in a sample."""
+    """The draws for a property, or for a factor between specimens, among all draws in a sample."""
 
     number: int  # number of the stream; never changes
     block: int  # samples that share a generator
@@ -121,9 +121,9 @@ def synthesise(
 def condition(
     right: Array, transposed: Array, offsets: Array, factors: Array, out: Array
 ) -> None:
-    """Replace each row a of `out` by its draws given measured values, a + V (b + f V^T a).
+    """Replace each row a of `out` by draws given measured values, a + V (b + f V^T a).
 
-    V is `right`, b a row of `offsets`, and f are the `factors`.
+    V is `right`, b is a row of `offsets`, and f are the `factors`.
     """
     dimension, count = right.shape
     weights = np.empty(count)

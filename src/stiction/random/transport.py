@@ -1,4 +1,4 @@
-"""Map draws of a Gaussian to the posterior that it approximates, one direction at a time.
+"""Map draws from a Gaussian to the posterior that it approximates, one direction at a time.
 
 Problem
 -------
@@ -12,42 +12,41 @@ where r_k is the likelihood of value k divided by the Gaussian that replaced it.
 
 Algorithm
 ---------
-A triangular map along orthonormal directions u_1, u_2, ... (M. Rosenblatt, Annals
-of Mathematical Statistics 23, 1952). The coordinate u_j'w is moved, quantile by
-quantile, from the standard normal distribution to that of a coordinate e_j with
-the density, up to a constant,
+The map is triangular, along orthonormal directions u_1, u_2, ... (M. Rosenblatt,
+Annals of Mathematical Statistics 23, 1952). The coordinate u_j'w, with a standard
+normal distribution, is moved quantile by quantile to a coordinate e_j. The density
+of e_j is, up to a constant,
 
     p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
 
-Here e_1, ..., e_j-1 are moved already, and the mean is over w orthogonal to u_1,
-..., u_j. Equation (2) treats places as independent given e_1 to e_j (B. Cseke and
-T. Heskes, Journal of Machine Learning Research 12, 2011). It is exact for a
-single place, for independent places with a direction each, and for many places
-that measure the same number.
+Here e_1, ..., e_j-1 are moved already. The mean E is taken over w orthogonal to
+u_1, ..., u_j. Equation (2) treats places as independent given e_1 to e_j (B. Cseke
+and T. Heskes, Journal of Machine Learning Research 12, 2011). It is exact for a
+single place, for independent places if each has its direction, and for places that
+all measure the same number.
 
 Preparation (`make_transport`):
 
 1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the
-   coefficients shows how far the posterior at a place is from the Gaussian.
-   Ignore the places with the smallest norms, which together stay below
-   `IGNORED_TOTAL`.
+   coefficients measures the departure from the Gaussian at a place. Ignore the
+   places with the smallest norms, which together stay below `IGNORED_TOTAL`.
 2. Choose the directions greedily. The candidates are the a_k of the places that
    differ most from the Gaussian, made orthogonal to the directions chosen before.
    Choose the candidate on which the expansions of all places together have the
    largest projection.
-3. Tabulate the factors of (2) along each direction. A place that depends
-   noticeably on earlier coordinates has a table of its own, over its mean given
-   e_1 to e_j. The other places share a table over e_j, with earlier coordinates
-   at zero.
+3. Tabulate the factors of (2) along each direction. A place that depends noticeably
+   on the coordinates before has its own table, over its mean given e_1 to e_j. The
+   other places share a table over e_j, with the coordinates before at zero.
 4. Estimate the remaining error: map samples, weight them by (1) divided by their
    density, and compare weighted and plain moments of z.
 
-Map of a draw (`transport`), for each direction in turn:
+Mapping of a draw (`transport`), for each direction in turn:
 
-5. Add up the tables on a grid of e_j, which gives the logarithm of (2).
-6. Integrate the density over each cell, taking its logarithm as linear there.
-7. Find the quantile, starting from the nearer end so that tails keep their
-   digits, and move w along u_j by the difference.
+5. Add the tables on a grid of e_j, which gives the logarithm of (2).
+6. Integrate the density over each cell, with a logarithm that is linear in the
+   cell.
+7. Find the quantile, starting from the nearer end so that tails keep their digits.
+   Move w along u_j to this quantile.
 """
 
 import math
@@ -91,7 +90,7 @@ LogRatio = Callable[[NDArray[np.int64], Array], Array]
 
 
 class Transport(NamedTuple):
-    """Directions, and tables of the logarithm of (2) along them, without its factor N(e_j).
+    """Directions, and tables for the logarithm of (2) along them, without the factor N(e_j).
 
     The fields are the first arguments of `transport`, in this order. The caller may express
     `basis` in other coordinates of the draws: `conditioning` does, since its draws are not
@@ -107,7 +106,7 @@ class Transport(NamedTuple):
 
 
 class ErrorEstimate(NamedTuple):
-    """Largest error of the mapped draws at any place that step 1 keeps."""
+    """Largest error of mapped draws, at any place that step 1 keeps."""
 
     mean: float  # of z, in standard deviations of z
     deviation: float  # of the standard deviation of z, as a share of it
@@ -142,7 +141,7 @@ def make_transport(
 
 
 def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
-    """Step 1: return coefficients of Hermite polynomials 1, 2, ..., (N_HERMITE, places)."""
+    """Step 1: return coefficients (N_HERMITE, places) for the Hermite polynomials 1, 2, ..."""
     x = np.linspace(-Z_MAX, Z_MAX, N_HERMITE_POINTS)
     value = log_ratio(np.arange(mean.size), mean[:, None] + deviation[:, None] * x)
     weight = np.exp(-0.5 * x**2)
@@ -161,7 +160,7 @@ def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
 
 
 def _choose_directions(coefficients: Array, unit: Array) -> Array:
-    """Step 2: return the directions, (directions, dimension), from unit vectors a_k / |a_k|."""
+    """Step 2: return an array (directions, dimension), chosen from unit vectors a_k / |a_k|."""
     by_non_gaussianity = np.argsort(-np.linalg.norm(coefficients, axis=0))
     unspanned = unit[by_non_gaussianity[:MAX_CANDIDATES]]
     basis = np.empty((0, unit.shape[1]))
@@ -273,9 +272,9 @@ def transport(
     draws: Array,
     log_density: Array,
 ) -> None:
-    """Map each row of `draws` (rows, dimension) in place.
+    """Map each row of `draws`, with shape (rows, dimension), in place.
 
-    The log density of the coordinates e, less a constant, is added to `log_density`
+    Add the log density of the coordinates e, up to a constant, to `log_density`
     (rows,).
     """
     n_directions, dimension = basis.shape
