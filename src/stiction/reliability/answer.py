@@ -65,7 +65,7 @@ class Estimate:
 
     @cached_property
     def sampling_cv(self) -> float:
-        """Coefficient of variation of the probability by sampling."""
+        """Coefficient of variation of the probability due to sampling."""
         return self.tail.cv(self.stress)
 
     @cached_property
@@ -77,7 +77,7 @@ class Estimate:
 
     @cached_property
     def cv(self) -> float:
-        """Coefficient of variation of the probability by both."""
+        """Coefficient of variation of the probability, due to sampling and the list."""
         return math.hypot(self.sampling_cv, self.members_cv)
 
     @cached_property
@@ -97,36 +97,36 @@ class Answer(Result):
     Attributes
     ----------
     stress, probability : float
-        Stress, Pa, and probability of an onset below it. One is given, and the other
-        estimated.
+        Stress, Pa, and probability of an onset below this stress. One is given, and
+        the other is estimated.
     interval : tuple of float
         95 % confidence interval of the estimated number.
     cv : float
         Coefficient of variation of the probability: estimated standard error over the
-        estimate. Infinite without a failure, and zero if exact.
+        estimate. It is infinite without a failure, and zero if the answer is exact.
     members_cv : float
-        Part of `cv` because a list of equally likely interfaces is a sample of
-        the interfaces that may be true. The squares of this part and of the
+        Part of `cv` that arises because a list of equally likely interfaces is only a
+        sample of the interfaces that may be true. The squares of this part and the
         sampling error add up. 0 for a mixture.
     evaluations, first_stage_evaluations : int
-        Samples solved by the method, and by its less expensive first stage only.
+        Samples solved by the method, and samples solved only by its less expensive
+        first stage.
     lower_bound, stress_above_bound : float
-        No sample slides below `lower_bound`, Pa. It is minus infinity if it is
-        unknown.
+        No sample slides below `lower_bound`, Pa, which is minus infinity if unknown.
+        `stress_above_bound` is `stress` minus this bound.
     algorithm, reason : str
-        'plain', 'subset', 'two_level' or 'exact' (without samples), and the
-        reason for it.
+        'plain', 'subset', 'two_level' or 'exact' (without samples), and the reason
+        for this choice.
     members : (members,) array
-        For a list of equally likely interfaces, the probability of each. NaN if
-        fewer than three samples of an interface slide below the stress.
-        `probability` is their mean, the predictive probability, on which a
-        decision should rest.
+        For a list of equally likely interfaces, the probability for each interface.
+        NaN if fewer than three samples of an interface slide below the stress. Their
+        mean is `probability`, the predictive probability, on which a decision should
+        rest.
     survived : float
         Share of plain samples in which the event does not happen at any stress.
-        Behind a stiff machine an interface may stay stable, and it may carry any
-        load.
+        With a stiff machine, an interface may stay stable and carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer. Empty without doubts.
+        Reasons not to trust the answer. Empty if there are no such reasons.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
@@ -134,25 +134,26 @@ class Answer(Result):
         is unknown: give ``Blocks(thickness=...)``, or ``Interface(width=...)``
         for a line.
     failing_profiles : xarray.Dataset
-        Given by `failure_probability`: some samples of the failure set over
-        ('sample', 'x'), with its distribution: `strength` and other random
+        Given by `failure_probability`: some samples over ('sample', 'x'), drawn from
+        the distribution of failing samples. Variables are `strength` and other random
         properties, `critical_stress`, `critical_position`, ...
     sensitivities : xarray.Dataset
         Given by `design_stress`: effects on the design over 'source', the largest
-        first. `low` and `high` are the settings at both ends, with `force_at_low`
-        and `force_at_high`, N, and `stress_at_low` and `stress_at_high`, Pa.
-        Attributes ``stress by ...`` belong to the families of the factor between
-        specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes a file,
-        and `stiction.plot.sensitivities` draws it.
+        first. `low` and `high` are the settings at both ends. `force_at_low` and
+        `force_at_high`, N, and `stress_at_low` and `stress_at_high`, Pa, are the
+        designs there. Attributes ``stress by ...`` hold the stress for each family of
+        the factor between specimens. ``sensitivities.to_dataframe().to_csv(path)``
+        writes a file, and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
-        Given by `design_stress` if specimens were counted: stress below which 5 %
-        of the specimens slide, with this confidence (EN 1990: 75 %), Pa. It is a
-        quantile over equally likely interfaces. NaN otherwise.
+        Given by `design_stress` if specimens were counted: stress, Pa, below which 5
+        % of the specimens slide, with this confidence (EN 1990: 75 %). It is a
+        quantile over equally likely interfaces. NaN if specimens were not counted.
     partial_factor, reliability_index : float
         `characteristic_stress` over `stress`, and minus the quantile of the normal
         distribution at the probability.
     of_stress : bool
-        Whether the stress is estimated, as by `design_stress`, or the probability.
+        True if the stress is estimated, as in `design_stress`. False if the
+        probability is.
     quantity : str
         First quantity of the printed answer: 'stress', 'force' or
         'friction_coefficient', as requested. For `design_stress` it is the force
@@ -183,7 +184,7 @@ class Answer(Result):
 
     @classmethod
     def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
-        """Return the answer from an estimate and given values, and issue doubts as warnings."""
+        """Return the answer from an estimate and given values. Issue doubts as warnings."""
         for text in doubts:
             warn_accuracy(text)
         state, tail = estimate.state, estimate.tail
@@ -219,24 +220,25 @@ class Answer(Result):
 
     @property
     def reliability_index(self) -> float:
-        """Index beta: the standard normal distribution has this probability below -beta."""
+        """Index beta: a standard normal variable is below -beta with this probability."""
         return -float(ndtri(self.probability))
 
     @property
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces, NaN for a single interface.
 
-        5 % of them have at most the first number, and 95 % at most the second. More tests
-        make the band narrower. It is too wide by the sampling error of each interface,
-        which a smaller `target_cv` reduces. An end is NaN if `members` is NaN at its rank
-        above the interfaces of probability 0, as for lists of thousands. Take a list of
-        tens then. `interval` has the error of the mean.
+        The probability is at most the first number for 5 % of the interfaces, and at
+        most the second number for 95 %. More tests make the band narrower. The
+        sampling error of each interface makes the band too wide, and a smaller
+        `target_cv` reduces this error. An end is NaN if `members` is NaN at its rank,
+        which is usual for lists of thousands. Use a list of tens in this case.
+        `interval` shows the error of the mean.
         """
         return band_of(self.members)
 
     @property
     def stress_above_bound(self) -> float:
-        """`stress` less `lower_bound`, Pa."""
+        """`stress` minus `lower_bound`, Pa."""
         return self.stress - self.lower_bound
 
     def _summary(self) -> Summary:
@@ -334,7 +336,7 @@ class Answer(Result):
 
 
 def band_of(members: Array) -> tuple[float, float]:
-    """Return the 90 % band over equally likely interfaces, NaN if the value at its rank is."""
+    """Return the 90 % band over equally likely interfaces. An end is NaN if its value is NaN."""
     if not members.size:
         return math.nan, math.nan
     # Unknown probabilities are small, but above those that are exactly zero.
@@ -378,7 +380,7 @@ def prepare(
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return why chains of samples take too long by this method, or None."""
+    """Return why chains of samples take too long with this method, or None."""
     seconds, method = CHAIN_EVALUATIONS * experiment.seconds, experiment.method
     fast = seconds <= PATIENCE_SECONDS and not optional_member(method, "counted_only")
     if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
@@ -391,12 +393,12 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
 
 
 def bounded(lowest: float) -> bool:
-    """Return whether a least stress is a bound: finite and above zero."""
+    """Return whether the least stress is a useful bound: finite and above zero."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
 
 
 def sampling_target(state: LimitState, target_cv: float) -> float:
-    """Return the part of the target for the sampling error."""
+    """Return the part of the target that is left for the sampling error."""
     return target_cv * (SAMPLING_SHARE if state.is_sample else 1.0)
 
 
@@ -440,7 +442,7 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
 
 
 def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return up to `count` positions of different values in random order."""
+    """Return up to `count` positions of distinct values, in random order."""
     _, first = np.unique(values, return_index=True)  # chains repeat states
     chosen: NDArray[np.int64] = rng.permutation(first)[:count]
     return chosen
@@ -449,10 +451,11 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(
     state: LimitState, near: tuple[Array, Array], stress: float, probability: float
 ) -> list[str]:
-    """Solve some samples of an approximate method exactly, and warn if more or fewer fail.
+    """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
 
-    `near` has draws and stresses of the lowest samples on both sides of the stress. A small
-    difference of stress may multiply the probability in a tail, so failures are counted.
+    `near` holds draws and stresses of the lowest samples on both sides of the stress.
+    Failures are counted, because in a tail a small change of stress may multiply the
+    probability.
     """
     experiment, (draws, values) = state.experiment, near
     exact = exact_counterpart(experiment.problem, experiment.method)

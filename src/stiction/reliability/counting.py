@@ -1,17 +1,18 @@
 """Plain Monte Carlo: count the failures among the samples of the ensemble.
 
-Problem. Estimate P(T < s) from independent samples of the onset T, so that the
-coefficient of variation is at most a target.
+Problem. Estimate P(T < s) from independent samples of the onset T. The coefficient
+of variation must not exceed a target.
 
-Sources. Inverse binomial sampling: Haldane (1945), Biometrika 33, 222. With
-limits on the number of samples: Girshick, Mosteller and Savage (1946), Annals of
-Mathematical Statistics 17, 13. Intervals: Clopper and Pearson (1934), Biometrika
-26, 404.
+Sources. Haldane (1945), Biometrika 33, 222, introduced inverse binomial sampling.
+Girshick, Mosteller and Savage (1946), Annals of Mathematical Statistics 17, 13,
+added limits on the number of samples. The intervals follow Clopper and Pearson
+(1934), Biometrika 26, 404.
 
 Steps:
 
-1. Fix the number r of failures from the target: the error falls like 1/sqrt(r - 1). A
-   rule that stopped at a precise estimate would favour early failures.
+1. Fix the number r of failures from the target: the error is proportional to
+   1/sqrt(r - 1). A rule that stopped when the estimate looks precise would favour
+   early failures.
 2. Draw samples until there are r failures, within the limits on samples.
 3. If the last failure ended the count, the unbiased estimate is (r - 1)/(n - 1) for n
    samples up to this failure. Otherwise it is the share of failures.
@@ -33,7 +34,7 @@ COUNT_BATCH = 1024
 
 
 class Counted(NamedTuple):
-    """Failures among samples. If the last failure ended the count, it does not enter."""
+    """Failures among samples. If the last failure ended the count, it is not included."""
 
     failures: int
     samples: int
@@ -47,7 +48,7 @@ class Counted(NamedTuple):
 
     @property
     def cv(self) -> float:
-        """Standard error of the estimate over the estimate."""
+        """Standard error of the estimate, divided by the estimate."""
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
@@ -77,7 +78,7 @@ def count_failures(
 ) -> tuple[Counted, Descent]:
     """Count until there are enough failures, and at least `least` samples from `start` on.
 
-    Samples beyond the last counted failure are returned, too.
+    Samples after the last counted failure are also returned.
     """
     # 1.
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)

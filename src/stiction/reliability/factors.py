@@ -1,28 +1,29 @@
-"""Counting with many specimens for each solved field.
+"""Count failures with many specimens for each solved field.
 
-Problem. Estimate the lower tail of the onset T of specimens whose strength is m b
-f(x): a mean m, a factor b between specimens and a field f within. A handful of
-parameters (m and the law of b) differs between equally likely interfaces of one
-field, and T is m b R(f) if the onset is in proportion to the strength. The solver
-is needed for R only.
+Problem. Estimate the lower tail of the onset T for specimens with strength m b
+f(x). Here m is the mean, b the factor between specimens, and f the field within a
+specimen. Only m and the distribution of b differ between equally likely interfaces
+with the same field. If the onset is proportional to the strength, T is m b R(f),
+and the solver is needed only for R.
 
-Source. Conditional Monte Carlo (Hammersley, 1956, Journal of the ACM 3, 73;
-Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
+Source. The method is conditional Monte Carlo (Hammersley, 1956, Journal of the ACM
+3, 73; Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
 
 Steps:
 
 1. Draw plain samples, as `stiction.monte_carlo` does, and solve them.
-2. Divide each onset by the factor and the mean of its own sample.
-3. Multiply it by the means of other interfaces of the same field, evenly spread over
-   these, and by factors at stratified shares of their laws: `SPECIMENS_PER_SAMPLE`
-   specimens in all.
-4. Specimens of one solved sample are one family. The error follows from the shares of
-   families among the failures (`uncertainty.ancestral_variance`), as in subset
-   simulation.
+2. Divide each onset by the factor and the mean in its sample.
+3. Multiply it by means of other interfaces with the same field, evenly spread over
+   these interfaces, and by factors at stratified quantiles of their distributions.
+   This gives `SPECIMENS_PER_SAMPLE` specimens for each solved sample.
+4. The specimens from one solved sample form a family. The error follows from the
+   share of each family among the failures (`uncertainty.ancestral_variance`), as in
+   subset simulation.
 5. Solve more samples until the error is small enough.
 
-Departures. Stratified sampling replaces the integral over b. If the onset is not in
-proportion to the strength, each sample has one specimen, and this is plain counting.
+Departures. Stratified sampling replaces the integral over b. If the onset is not
+proportional to the strength, each sample has one specimen, and the method reduces
+to plain counting.
 """
 
 import math
@@ -56,7 +57,7 @@ over a long list, over the cost of an evaluation in counting."""
 
 
 class Counts(NamedTuple):
-    """Specimens by solved sample: onsets, interfaces and shares of the law of their factor."""
+    """Specimens by solved sample: onsets, interfaces and quantile levels of their factors."""
 
     state: LimitState
     values: Array  # (samples, specimens), Pa
@@ -65,7 +66,7 @@ class Counts(NamedTuple):
 
     @property
     def tail(self) -> Tail:
-        """The lower tail. Each solved sample is one ancestor."""
+        """The lower tail. Each solved sample counts as one ancestor."""
         samples, specimens = self.values.shape
         ancestors = np.repeat(np.arange(samples), specimens)
         values, members = self.values.ravel(), self.members.ravel()
@@ -75,7 +76,7 @@ class Counts(NamedTuple):
         return Tail([descent], "plain", reason, samples)
 
     def draws(self, picks: NDArray[np.int64]) -> Array:
-        """Return the draws of some specimens by their numbers."""
+        """Return the draws of specimens with the given numbers."""
         state, specimens = self.state, self.values.shape[1]
         random, seed = state.experiment.random, state.experiment.seed
         rows = [state.draws(seed, int(pick) // specimens, 1) for pick in picks]
@@ -89,10 +90,11 @@ class Counts(NamedTuple):
         return draws
 
     def characteristic(self, confidence: float) -> float:
-        """Return the 5 % quantile that a share `confidence` of the interfaces exceeds, Pa.
+        """Return the 5 % quantile, Pa, that a share `confidence` of the interfaces exceeds.
 
-        Onsets of an interface are onsets at a mean and a factor of 1 in its group, times
-        its mean and factors at equal shares of its law.
+        The onsets of an interface are computed from the onsets in its group at a mean
+        and a factor of 1. These are multiplied by its mean, and by factors at equal
+        steps of probability.
         """
         random = self.state.experiment.random
         if not np.isfinite(self.shares).any():
@@ -114,7 +116,7 @@ class Counts(NamedTuple):
         return float(np.quantile(quantiles, 1.0 - confidence))
 
     def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
-        """Return draws and onsets of the lowest specimens, half of them below a stress."""
+        """Return the draws and onsets of the lowest specimens. Half of them are below a stress."""
         values = self.values.ravel()
         below = int(np.sum(values < stress))
         order = np.argpartition(values, min(2 * below, values.size - 1))[: 2 * below]
@@ -137,7 +139,7 @@ def _expands(state: LimitState) -> bool:
 
 
 def solve(state: LimitState, first: int, samples: int) -> Counts:
-    """Solve samples `first`, ... and return the specimens of each (steps 1 to 3)."""
+    """Solve samples `first`, ... and return the specimens from each sample (steps 1 to 3)."""
     experiment = state.experiment
     random, interface = experiment.random, experiment.problem.interface
     draws = state.draws(experiment.seed, first, samples)
@@ -174,7 +176,7 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
 
 
 def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
-    """Count until the goal is reached (steps 4 and 5), or return None if chains cost less."""
+    """Count until the goal is reached (steps 4 and 5). Return None if chains cost less."""
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
         return None

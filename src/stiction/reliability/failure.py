@@ -1,8 +1,8 @@
-"""Failure probability, design stress and the curve of both, by counting or by the tail.
+"""Failure probability, design stress and failure curve, estimated by counting or from the tail.
 
 Problem. The onset T of a random interface has the distribution P(T < s). Estimate
-it at a stress s, or the stress of a probability, with a given coefficient of
-variation.
+the probability at a stress s, or the stress at a probability, with a given
+coefficient of variation.
 
 Sources. Each algorithm has its own file: `counting`, `factors`, `subset`,
 `two_level`, `tail`.
@@ -10,13 +10,13 @@ Sources. Each algorithm has its own file: `counting`, `factors`, `subset`,
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
-2. Count with many specimens for each solved field, if this costs less (`factors`).
+2. Count many specimens for each solved field, if this costs less (`factors`).
 3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the
    method is too slow for chains (`counting`). Sample the tail if they are rare
    (`tail`).
-4. If interfaces are drawn from a fit or a posterior, draw more of them until the error by
-   their number is small enough, and repeat steps 1 to 3.
-5. Solve some samples near the stress exactly, if the method is approximate, and warn if
+4. If interfaces are drawn from a fit or a posterior, draw more interfaces until the
+   error due to their number is small enough. Repeat steps 1 to 3.
+5. If the method is approximate, solve some samples near the stress exactly. Warn if
    more or fewer of them fail (`answer.exact_doubts`).
 """
 
@@ -133,20 +133,22 @@ def failure_probability(
     Parameters
     ----------
     problem, seed, workers, progress
-        As in `monte_carlo`. The total number of samples is an estimate.
+        As in `monte_carlo`. The total number of samples that `progress` shows is an
+        estimate.
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The members of a list are equally likely. From a fit, a posterior, or any
-        object with a method ``interfaces(count, seed)``, as many interfaces are
-        drawn as the target needs, from 1,000 up to 8,000. The answer is then
-        their mean, the predictive probability, and has a `band`.
+        The members of a list are equally likely. A fit, a posterior, or any object
+        with a method ``interfaces(count, seed)`` provides as many interfaces as the
+        target needs, from 1,000 to 8,000. The answer is then their mean, the
+        predictive probability, and has a `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
         `Rupture` and other methods that are too slow for subset simulation use
         plain Monte Carlo, unless `max_evaluations` is 20,000 or more.
     friction_coefficient : float, optional
-        Instead of `stress`: ratio of mean shear stress to mean normal pressure to
-        carry. If the pressure is random, each sample's own pressure counts.
+        Instead of `stress`: ratio of the mean shear stress to carry to the mean
+        normal pressure. If the pressure is random, the pressure of each sample is
+        used.
     force : float, optional
         Instead of `stress`: shear force to carry, N. The area of the interface
         must be known.
@@ -156,19 +158,19 @@ def failure_probability(
         probability' of the documentation. `reason` in the result explains the
         choice of 'auto'.
     target_cv : float
-        Coefficient of variation to reach, including the part by the list of
+        Coefficient of variation to reach, including the part due to the list of
         interfaces.
     max_evaluations : int, optional
-        Largest number of samples to solve. By default a quarter of an hour on one
-        core, at most 2,000,000 samples, and 1,000 for ruptures.
+        Largest number of samples to solve. The default takes about a quarter of an
+        hour on one core, but is at most 2,000,000 samples. For ruptures it is 1,000.
     event : {"critical_stress", "first_instability"}
-        Whether the interface as a whole has to slide, or the first patch to become
-        unstable, arrested or not. By the local criterion they are the same.
+        Whether failure is sliding of the whole interface, or the first instability of
+        a patch, which may be arrested. By the local criterion both are the same.
     mixture : bool
-        Whether a list of interfaces is complete, such as three equally common
-        batches. The interval then contains the sampling error only. By default
-        the list is a sample of the interfaces that may be true, and a short list
-        makes the interval wide.
+        Whether a list of interfaces is complete, for example three equally common
+        batches. The interval then contains only the sampling error. By default the
+        list is a sample of the interfaces that may be true, and a short list makes
+        the interval wide.
 
     Returns
     -------
@@ -183,12 +185,12 @@ def failure_probability(
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable. `warnings` in the result has the same
-        texts. If the method is the local criterion, equilibrium solves some
-        samples near the stress, too.
+        If the estimate is unreliable. The result has the same text in `warnings`. If
+        the method is the local criterion, equilibrium also solves some samples near
+        the stress.
     UnitWarning
-        If the stress is below a fiftieth or above fifty times the mean strength.
-        A factor of a thousand is an `InputError`.
+        If the stress is below a fiftieth of the mean strength, or above fifty times
+        the mean strength. A factor of a thousand raises an `InputError`.
 
     Examples
     --------
@@ -234,7 +236,7 @@ def _answered(
     progress: Show,
     solve: Callable[[Experiment, Meter], Answer],
 ) -> Answer:
-    """Return an answer from as many members as the target needs, with its warnings."""
+    """Return an answer, and its warnings, from as many members as the target needs."""
     with Meter(name, show=progress) as meter, merge_warnings() as warned:
         experiment, answer = _of_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(experiment.random, answer, target_cv):
@@ -249,7 +251,7 @@ def _of_enough_members(
     warned: list[Warned],
     solve: Callable[[Experiment, Meter], F],
 ) -> tuple[Experiment, F]:
-    """Return a solution with as many members as the error by the list needs (step 4)."""
+    """Return a solution with enough members for the error due to the list (step 4)."""
     while True:
         solution, known = solve(experiment, meter), experiment.random
         if not (count := wanted_members(known, solution.members_cv, target_cv)):
@@ -264,7 +266,7 @@ def _of_enough_members(
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
-    """Warn of a demand far from the mean strength, and refuse it a thousand times away."""
+    """Warn about a stress far from the mean strength. Refuse it if the ratio is a thousand."""
     ratio = stress / state.experiment.mean_strength
     unit = f" {CURVE[name].units}".removesuffix(" 1")
     possible = 1.0 / THOUSAND, THOUSAND
@@ -281,7 +283,7 @@ def _probability(
     state: LimitState, stress: float, algorithm: str, target_cv: float, budget: int,
     allowed: int | None,
 ) -> Answer:  # fmt: skip
-    """Return the answer by the chosen algorithm (steps 1 to 3)."""
+    """Return the answer from the chosen algorithm (steps 1 to 3)."""
     # 1.
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
@@ -315,7 +317,7 @@ def _probability(
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> Answer:
-    """Return the answer without samples (step 1)."""
+    """Return an answer that needs no samples (step 1)."""
     certain = not state.bounds[0] < stress < state.bounds[1]
     low, high = state.bounds if certain else likely
     doubt = 0.0 if certain else NEGLIGIBLE_PROBABILITY
@@ -340,9 +342,9 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
 def _by_counting(
     state: LimitState, goal: Goal, budget: int, least: int, start: int, reason: str
 ) -> Answer:
-    """Return the answer by plain Monte Carlo from sample `start` on.
+    """Return the answer from plain Monte Carlo that begins with sample `start`.
 
-    Samples of a pilot do not enter, because counting is chosen if they have many failures.
+    Samples of a pilot are not used, because their failures decide whether to count.
     """
     seed, stress = state.experiment.seed, goal.stress
 
@@ -408,7 +410,7 @@ def _by_tail(estimate: Estimate, target_cv: float, counts: Counts | None = None)
 
 
 def _profiles(state: LimitState, draws: Array) -> xr.Dataset:
-    """Return the profiles of draws with their onsets, labelled."""
+    """Return labelled profiles and onsets for draws."""
     if not draws.shape[0]:
         return xr.Dataset()
     problem, method = state.experiment.problem, state.experiment.method
@@ -439,8 +441,8 @@ def design_stress(
 ) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
-    It is a quantile of the onset stress, from one set of repetitions of subset
-    simulation.
+    The design stress is a quantile of the onset stress. It is computed from one set
+    of repetitions of subset simulation.
 
     Parameters
     ----------
@@ -450,23 +452,24 @@ def design_stress(
         `Rupture`, or a method that would take more than a quarter of an hour on
         one core, is refused unless `max_evaluations` is 20,000 or more.
     target_cv : float
-        Coefficient of variation to reach for the failure probability at the stress.
+        Coefficient of variation to reach for the failure probability at the design
+        stress.
     confidence : float
         Confidence of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
-        Whether to compute the effects of families and constants on the design. By
-        default they are computed if `random` is a fit, a posterior or
-        `uncertain`. A mapping from dotted keys of the problem to ranges, such as
-        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10
-        % on either side.
+        Whether to compute how families and constants affect the design. By default
+        this is done if `random` is a fit, a posterior or `uncertain`. A mapping from
+        dotted keys in the problem to ranges, such as
+        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 %
+        on either side.
     problem, random, seed, max_evaluations, event, mixture, workers, progress
         As in `failure_probability`.
 
     Returns
     -------
     Answer
-        With `stress`, its 95 % `interval` by the error of the computation (Pa), and
-        `sensitivities`.
+        With `stress`, its 95 % `interval` due to the error of the computation (Pa),
+        and `sensitivities`.
 
     Raises
     ------
@@ -476,7 +479,7 @@ def design_stress(
     Warns
     -----
     AccuracyWarning
-        As `failure_probability`, and if onsets accumulate at the bound.
+        As in `failure_probability`, and if onsets accumulate at the bound.
 
     Examples
     --------
@@ -507,7 +510,7 @@ def design_stress(
 def _quantile(
     state: LimitState, probability: float, target_cv: float, budget: int, confidence: float
 ) -> Answer:
-    """Return the design stress by counting or by the tail."""
+    """Return the design stress, by counting or from the tail."""
     lowest = state.bounds[0]
     target_cv = sampling_target(state, target_cv)
     goal = Goal(target_cv, probability=probability)
@@ -571,16 +574,16 @@ def failure_curve(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate P(onset < s) from one half down to a smallest probability, thrice a decade.
+    """Estimate P(onset < s) from 0.5 down to a smallest probability, with three points per decade.
 
     Parameters
     ----------
     smallest : float
         Smallest probability of the curve.
     target_cv : float
-        Coefficient of variation to reach at the smallest probability. It is lower
-        elsewhere. Repetitions are added until it is reached. They equal the
-        repetitions of `Study.failure_curve` with the same numbers.
+        Coefficient of variation to reach at the smallest probability. It is lower at
+        other points. Repetitions are added until it is reached. They are the same as
+        in `Study.failure_curve` with the same numbers.
     problem, random, method, seed, max_evaluations, event, mixture, workers, progress
         As in `design_stress`.
 
@@ -589,12 +592,13 @@ def failure_curve(
     xarray.Dataset
         Over 'point': `stress` and `stress_above_bound` (Pa), `probability` with
         `probability_low`, `probability_high` and `cv`, and `stress_low` and
-        `stress_high` (Pa). With a normal pressure also `friction_coefficient`,
-        the stress over its mean, and with an area `force` (N).
-        `stress_above_bound` has no meaning if the attribute `lower_bound` is zero
-        or less. For a list of interfaces, `probability` is their mean. `members`,
-        over 'point' and 'member', has the curve of each interface, and 5 and 95 %
-        of the interfaces have at most `band_low` and `band_high`.
+        `stress_high` (Pa). If there is a normal pressure, `friction_coefficient` is
+        the stress over the mean pressure. If the area is known, there is `force` (N).
+        `stress_above_bound` has no meaning if the attribute `lower_bound` is zero or
+        less. For a list of interfaces, `probability` is their mean, and `members`,
+        over 'point' and 'member', holds the curve of each interface. The
+        probabilities of 5 % and 95 % of the interfaces are at most `band_low` and
+        `band_high`.
 
     Raises
     ------
@@ -604,7 +608,7 @@ def failure_curve(
     Warns
     -----
     AccuracyWarning
-        As `failure_probability`, at the end of the curve.
+        As in `failure_probability`, for the end of the curve.
 
     Examples
     --------
@@ -645,7 +649,7 @@ def curve_doubts(end: Estimate, smallest: float, target_cv: float = CURVE_CV) ->
 
 
 def chances(smallest: float) -> Array:
-    """Return the probabilities of a curve, (points,)."""
+    """Return the probabilities of the points on a curve."""
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
     probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
@@ -655,7 +659,7 @@ def chances(smallest: float) -> Array:
 def curve_of(
     tail: Tail, state: LimitState, wanted: Array, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the curve of a tail at these probabilities, labelled."""
+    """Return the labelled curve of a tail at given probabilities."""
     lowest, pressure = state.bounds[0], state.experiment.pressure
     area = state.experiment.problem.area or np.nan
     rows, members = [], []

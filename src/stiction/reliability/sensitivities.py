@@ -1,22 +1,23 @@
-"""How a design changes with the family of the factor and with assumed constants.
+"""Change of a design with the family of the factor and with assumed constants.
 
-Problem. The interval of a design contains the error of the computation.
-Assumptions move the design more: constants of the problem that were not measured,
-and the family of the factor. How much?
+Problem. The interval of a design contains the error of the computation. Assumptions
+have a larger effect: constants in the problem that were not measured, and the
+family of the factor. How large is this effect?
 
-Source. Local sensitivities with common random numbers, as in Asmussen and Glynn,
-Stochastic Simulation (2007), chapter VII.
+Source. The method is local sensitivities with common random numbers, as in Asmussen
+and Glynn, Stochastic Simulation (2007), chapter VII.
 
-Steps, with the same draws everywhere, so that differences are accurate:
+All steps use the same draws, so that differences are accurate:
 
-1. Solve `SAMPLES_PER_END` samples, and take the quantile at the probability of the design
+1. Solve `SAMPLES_PER_END` samples, and take the quantile at the design probability
    (`factors.solve`).
-2. For each family take the quantile over the interfaces with this family. They are draws
-   from the posterior given the family.
+2. For each family, take the quantile over the interfaces with this family. These
+   interfaces are draws from the posterior given the family.
 3. For each constant solve the same samples at both ends of its range: a stated range, the
    5 and 95 % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its
    value.
-4. Multiply the design by the ratios of these quantiles to the first.
+4. Multiply the design by the ratios of the quantiles from steps 2 and 3 to the
+   quantile from step 1.
 """
 
 from collections.abc import Mapping
@@ -77,7 +78,7 @@ def ranges_of(problem: Any, random: Any, stated: Mapping[str, Any]) -> dict[str,
 def sensitivities(
     state: LimitState, probability: float, stress: float, stated: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the stress of a probability at both ends of each source, the largest effect first."""
+    """Return the design stress at both ends of each source, with the largest effect first."""
     experiment = state.experiment
     problem, random = experiment.problem, experiment.random
     # Constants are all at their values, because their ranges are sources.
@@ -129,13 +130,13 @@ def sensitivities(
 
 
 def _at(state: LimitState, key: str, value: float) -> LimitState:
-    """Return the limit state with another value of a constant."""
+    """Return the limit state with a different value of a constant."""
     problem = with_values(state.experiment.problem, {key: value}, "problem")
     return replace(state, experiment=replace(state.experiment, problem=problem))
 
 
 def _by_family(counts: Counts, probability: float) -> dict[str, float]:
-    """Return the quantile by each family of the factor with enough specimens (step 2)."""
+    """Return the quantile for each family of the factor that has enough specimens (step 2)."""
     random = counts.state.experiment.random
     laws, law = random.factor_laws
     names = {family: name for name, family in FACTOR_FAMILIES.items()}

@@ -1,39 +1,40 @@
-"""Subset simulation of any function of standard normal draws.
+"""Subset simulation for any function of standard normal draws.
 
 Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z,
 where the probability is so small that nearly no plain sample is below y.
 
-Source. Au and Beck (2001), Probabilistic Engineering Mechanics 16, 263, with the
-conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub (2015), a
-preconditioned Crank-Nicolson walk whose acceptance does not fall with the
-dimension.
+Source. The method follows Au and Beck (2001), Probabilistic Engineering Mechanics
+16, 263, with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
+(2015). This is a preconditioned Crank-Nicolson walk, whose acceptance does not fall
+with the dimension.
 
 Steps. A level is the set of z with g(z) below its ceiling.
 
-1. Draw N samples and evaluate them: the first level, whose ceiling is infinite.
-2. The next ceiling is the lowest value that does not go on, if a tenth of N goes on. If
-   this is below the requested threshold, take the threshold. If it is at the
-   floor of g, take the number just above the floor.
+1. Draw N samples and evaluate them. They form the first level, whose ceiling is
+   infinite.
+2. A tenth of N samples, with the lowest values, goes on. The next ceiling is the
+   lowest value that does not go on. If this value is below the requested threshold,
+   take the threshold. If it is at the floor of g, take the number just above the
+   floor.
 3. The probability of the next level is the probability of this level times the share of
    its samples strictly below the ceiling.
-4. Stop if the threshold, the floor or the requested probability is reached. Stop without
-   having reached it if no sample goes on, after `MOST_LEVELS`, or if evaluations
-   do not suffice.
-5. Each sample that goes on begins a chain, about N states in all. A step takes z to z' =
-   sqrt(1 - b^2) z + b w, with w standard normal, which leaves the normal
-   distribution as it is. The chain stays at z where g(z') is not below the
-   ceiling. After step t, b is multiplied by exp((share of accepted steps -
-   `ACCEPTANCE`) / sqrt(t)), up to b = 1. The states are the samples of the next
-   level: go on with 2.
+4. Stop if the threshold, the floor or the requested probability is reached. The
+   walk is incomplete if it stops because no sample goes on, after `MOST_LEVELS`
+   levels, or because the evaluations are used up.
+5. Each sample that goes on begins a chain, about N states in all. A step moves z to
+   z' = sqrt(1 - b^2) z + b w, with a standard normal w. This preserves the normal
+   distribution. The chain stays at z if g(z') is not below the ceiling. After step
+   t, b is multiplied by exp((share of accepted steps - `ACCEPTANCE`) / sqrt(t)), up
+   to b = 1. The states are the samples of the next level. Continue with step 2.
 6. P(g < y) is the probability of the rarest level whose ceiling is at least y, times the
    share of its samples below y. The error follows from their first ancestors
    (`uncertainty.ancestral_variance`).
 
-Departures. Only samples strictly below the ceiling go on: then the product of the shares
-is unbiased although the levels are chosen from the samples (Brehier, Gazeau, Goudenege,
-Lelievre and Rousset, 2016). If the lowest values are all equal, the next higher value is
-the ceiling. All chains move together, and the step size follows their acceptance at every
-step.
+Departures. Only samples strictly below the ceiling go on. The product of the shares is
+then unbiased, although the levels are chosen from the samples (Brehier, Gazeau,
+Goudenege, Lelievre and Rousset, 2016). If the lowest values are all equal, the next
+higher value is the ceiling. All chains move together, and the step size is adapted to
+their acceptance at every step.
 """
 
 import math
@@ -63,7 +64,7 @@ ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='pla
 
 
 class Population(NamedTuple):
-    """Samples of one level: standard normal, given that the value is below `ceiling`."""
+    """Samples at one level: standard normal draws, given that the value is below `ceiling`."""
 
     ceiling: float
     log_probability: float  # of the level
@@ -80,7 +81,7 @@ class Population(NamedTuple):
 
 
 class Below(NamedTuple):
-    """Samples below a value: the probability of each, their members and ancestors."""
+    """Samples below a value: the probability that each represents, their members and ancestors."""
 
     probability: float  # of each sample
     members: NDArray[np.int64]
@@ -89,11 +90,11 @@ class Below(NamedTuple):
 
 
 class Descent(NamedTuple):
-    """A finished repetition: populations from all samples down to the rarest.
+    """A finished repetition: populations, from all samples down to the rarest level.
 
-    It is complete if it reached the threshold or the requested probability. By two levels
-    it has one population, the samples to which the guide leads with their exact values.
-    `last` and `walked` belong to walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested probability. With two
+    levels, it has one population: the samples to which the guide leads, with their
+    exact values. `last` and `walked` describe walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -108,7 +109,7 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest finite value. Plus and minus infinity if there is no such value."""
+        """Lowest and highest finite value. If there is no finite value, plus and minus infinity."""
         lowest, plain = self.populations[-1].values, self.populations[0].values
         low = float(lowest.min(initial=math.inf))
         return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
@@ -123,7 +124,7 @@ class Descent(NamedTuple):
         return self._replace(populations=[one.light() for one in self.populations])
 
     def _holders(self, value: float) -> list[Population]:
-        """Return the populations that hold a value, the rarest last."""
+        """Return the populations that contain a value. The rarest is last."""
         return [one for one in self.populations if one.ceiling >= value]
 
     def probability(self, value: float) -> float:
@@ -146,16 +147,17 @@ class Descent(NamedTuple):
         return ancestral_variance(family, self.samples) + self.last_variance
 
     def failing(self, value: float) -> tuple[Array, Array]:
-        """Return draws and values of samples of the last population below a value."""
+        """Return draws and values of the samples in the last population that are below a value."""
         last = self.populations[-1]
         below = last.values < value
         return self.walked or (last.draws[below], last.values[below])
 
     def around(self, value: float) -> tuple[Array, Array]:
-        """Return draws and values on both sides of a value, in their true shares.
+        """Return draws and values on both sides of a value, in the correct proportions.
 
-        They are the lowest of a population, twice as many as lie below the value. Take a
-        less rare population if more than half of it lies below.
+        They are the lowest samples of a population, twice as many as lie below the
+        value. If more than half of a population lies below the value, a less rare
+        population is used.
         """
         holders = self._holders(value)
         while True:
@@ -180,10 +182,10 @@ def grow(
     step: float,
     rng: np.random.Generator,
 ) -> tuple[Array, Array, float, float]:
-    """Return states and values of chains, the given states first, acceptance and last step size.
+    """Return states and values of chains (given states first), acceptance and last step size.
 
-    All chains move together (step 5). The step size follows their acceptance, ever more
-    slowly.
+    All chains move together (step 5). The step size is adapted to their acceptance,
+    with smaller and smaller changes.
     """
     chains, dimension = draws.shape
     states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
@@ -218,10 +220,10 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` takes draws (k, dimension) to values (k,), where low values are rare and at
-    least `floor`. Each level has `samples`. It begins only if it does not exceed
-    `max_evaluations`. `label` returns the number of the equally likely interface of each
-    sample.
+    `function` maps draws (k, dimension) to values (k,). Low values are rare, and no
+    value is below `floor`. Each level has `samples` samples. A level begins only if
+    it does not exceed `max_evaluations`. `label` returns, for each sample, the number
+    of its equally likely interface.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))

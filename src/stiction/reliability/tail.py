@@ -1,29 +1,30 @@
-"""The lower tail of the onset: independent repetitions, pooled until precise enough.
+"""The lower tail of the onset, from independent repetitions that are pooled until precise enough.
 
-Problem. Estimate p(s) = P(T < s) of the onset T below a stress s, or the stress of a
-probability, with a coefficient of variation that is at most a target.
+Problem. Estimate p(s) = P(T < s) for the onset T and a stress s, or the stress at a
+probability. The coefficient of variation must not exceed a target.
 
-Source. Independent repetitions of subset simulation (`subset`) or of two levels
+Source. The repetitions follow subset simulation (`subset`) or use two levels
 (`two_level`).
 
 Steps:
 
-1. If the algorithm is 'auto' and two levels are possible, solve a pilot of plain samples
-   by the method and by its less expensive first stage, the guide. Take two levels
-   if the weakest tenth by the guide contains at least `LEAST_SHARE_PICKED` of the
-   weakest fiftieth of the samples.
-2. Make a repetition of moderate size. It depends on the seed and its number only.
-3. Pool repetitions: p = sum of w_r p_r, with shares w_r in proportion to their numbers of
-   samples, which do not depend on the outcome. The squared coefficient of
-   variation is the sum of (w_r p_r)^2 v_r over p^2, with the relative variances
+1. If the algorithm is 'auto' and two levels are possible, solve a pilot of plain
+   samples by the method and by its less expensive first stage, which is called the
+   guide. Use two levels if the weakest tenth according to the guide contains at
+   least `LEAST_SHARE_PICKED` of the weakest fiftieth of the samples.
+2. Make a repetition of moderate size. It depends only on the seed and its number.
+3. Pool repetitions: p = sum of w_r p_r. The weights w_r are proportional to the
+   numbers of samples, which do not depend on the outcome. The squared coefficient
+   of variation is the sum of (w_r p_r)^2 v_r over p^2, with the relative variances
    v_r.
-4. If it is above the target, make the next repetition (2) and pool again (3). Its size
-   would reach the target, within the limits of size and evaluations.
-5. If fewer than a share `POOR` of the samples of a guide that 'auto' chose are failures,
-   sample again by subset simulation.
-6. The stress at a probability follows from p(s) by bisection. Its interval ends at the two
-   stresses that belong to the interval of p. The lower end is the least possible stress
-   if no sample is so low.
+4. If the coefficient of variation is above the target, make the next repetition
+   (step 2) and pool again (step 3). Choose the size that should reach the target,
+   within the limits on size and evaluations.
+5. Suppose that 'auto' chose the guide. If less than a share `POOR` of the samples
+   that the guide selects are failures, sample again by subset simulation.
+6. The stress at a probability follows from p(s) by bisection. The interval of the
+   stress ends at the two stresses that belong to the ends of the interval of p. If
+   no sample is so low, the lower end is the least possible stress.
 """
 
 import math
@@ -57,7 +58,7 @@ POOR = 0.02
 
 
 class Sizes(NamedTuple):
-    """Sizes of repetitions: samples per level, or exact samples of two levels."""
+    """Sizes of repetitions: samples per level, or exact samples with two levels."""
 
     key: int  # first key of the generators, so that each kind has draws of its own
     first: int
@@ -70,9 +71,9 @@ OF_CURVES = Sizes(4, 2_000, 2_000)
 
 
 class Goal(NamedTuple):
-    """What to find in a tail: the probability below a stress, or the stress at a probability.
+    """Quantity to find in a tail: the probability below a stress, or the stress at a probability.
 
-    The default of the other number is out of reach: no level stops the sampling there.
+    The default of the other number cannot be reached, so it never stops the sampling.
     """
 
     cv: float  # coefficient of variation to reach
@@ -81,7 +82,7 @@ class Goal(NamedTuple):
 
 
 class Tail(NamedTuple):
-    """The lower tail of the stress at onset from pooled repetitions."""
+    """The lower tail of the onset stress, from pooled repetitions."""
 
     repetitions: Sequence[Descent]
     algorithm: str = "subset"  # or 'two_level'
@@ -95,11 +96,11 @@ class Tail(NamedTuple):
 
     @property
     def reached(self) -> float:
-        """Stress of the last level of a subset simulation that is not complete, Pa."""
+        """Stress, Pa, at the last level of an incomplete subset simulation."""
         return float(np.nextafter(self.repetitions[0].threshold, math.inf))
 
     def short_of(self, goal: str) -> str:
-        """Return a message that the tail does not reach the requested level."""
+        """Return a message which says that the tail does not reach the requested level."""
         if self.survived == 1.0:
             return f"the event happens in none of {self.spent} samples"
         text = f"{self.spent} evaluations do not reach {goal}"
@@ -110,7 +111,7 @@ class Tail(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest stress of the samples, Pa."""
+        """Lowest and highest stress among the samples, Pa."""
         lowest, highest = zip(*(descent.extent for descent in self.repetitions), strict=True)
         return min(lowest), max(highest)
 
@@ -121,12 +122,12 @@ class Tail(NamedTuple):
 
     @property
     def _shares(self) -> Array:
-        """Share of each repetition by its size, which does not depend on its outcome."""
+        """Weight of each repetition, from its size, which does not depend on the outcome."""
         sizes = np.array([descent.samples for descent in self.repetitions])
         return sizes / sizes.sum()
 
     def _parts(self, stress: float) -> Array:
-        """Part of each repetition in the probability."""
+        """Contribution of each repetition to the probability."""
         return self._shares * [descent.probability(stress) for descent in self.repetitions]
 
     def probability(self, stress: float) -> float:
@@ -145,12 +146,12 @@ class Tail(NamedTuple):
         return float(math.sqrt(sum(variances)) / sum(parts))
 
     def of_members(self, stress: float, count: int) -> Array:
-        """Return the probability of each of the equally likely interfaces, (members,).
+        """Return the probability for each of the equally likely interfaces.
 
-        It is NaN if fewer than `RESOLVED` samples of an interface are so low. For plain
-        samples it is the share among the samples of that interface, because their number
-        is random and makes most of the error near P = 1. Repetitions are added up, since
-        some have few samples of an interface.
+        The probability is NaN if fewer than `RESOLVED` samples of an interface are so
+        low. For plain samples, it is the share among the samples of the interface,
+        because their number is random and causes most of the error near P = 1.
+        Repetitions are added up, because some have few samples of an interface.
         """
         chances, seen, low, plain = np.zeros((4, count))
         weight = 0.0
@@ -168,13 +169,14 @@ class Tail(NamedTuple):
         return np.where(seen >= RESOLVED, np.minimum(chances, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
-        """Return the coefficient of variation because the list of interfaces is a sample.
+        """Return the coefficient of variation due to the list, which is a sample of interfaces.
 
-        Its square is the sum of (p - w)^2 over entries with a share w of the list and a
-        share p of the failures, as in importance sampling. The sum of p^2 is the chance
-        that two failures belong to one entry. It is taken from pairs of different
-        ancestors, which are independent, so that few samples per entry do not make it too
-        large. Members with the same number in `kinds` are one entry.
+        As in importance sampling, its square is the sum of (p - w)^2 over the entries
+        of the list. An entry has the share w of the list and the share p of the
+        failures. The sum of p^2 is the chance that two failures belong to one entry.
+        This chance is estimated from pairs with different ancestors, which are
+        independent, so that it is not too large if entries have few samples. Members
+        with the same number in `kinds` are one entry.
         """
         entries = np.bincount(kinds)
         total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -197,7 +199,7 @@ class Tail(NamedTuple):
     def quantile(self, probability: float) -> float:
         """Return the stress below which the onset lies with this probability (step 6).
 
-        It is infinite if the event is not so frequent.
+        The stress is infinite if the event is less frequent.
         """
         if probability > 1.0 - self.survived:
             return math.inf
@@ -225,7 +227,7 @@ class Tail(NamedTuple):
 
 
 def _squares(*labels: Array) -> float:
-    """Return the sum of the squared numbers of samples with equal labels."""
+    """Count the samples with each label, and return the sum of the squared counts."""
     _, sizes = np.unique(np.stack(labels), axis=1, return_counts=True)
     return float(np.sum(sizes.astype(np.float64) ** 2))
 
@@ -242,10 +244,10 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    Either all of them are complete, or there is a single incomplete repetition. `make`
-    takes (samples, number, evaluations left). `judge` returns the coefficient of
-    variation, or zero to stop. Many repetitions of moderate size, `first` to `largest`,
-    bound the memory.
+    Either all repetitions are complete, or there is a single incomplete repetition.
+    `make` takes (samples, number, remaining evaluations). `judge` returns the
+    coefficient of variation, or zero to stop. Repetitions of moderate size, from
+    `first` to `largest`, limit the memory.
     """
     repetitions: list[Any] = []
     spent, size = 0, first
@@ -281,7 +283,7 @@ def two_levels_refused(state: LimitState) -> str | None:
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return the share of the weakest fiftieth of samples in the weakest tenth by the guide."""
+    """Return how much of the weakest fiftieth of samples is in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())
@@ -296,10 +298,11 @@ def sample_tail(
     reason: str = "as requested",
     pilot: tuple[Array, Array] | None = None,
 ) -> Tail:
-    """Sample the lower tail down to a goal.
+    """Sample the lower tail until the goal is reached.
 
-    `algorithm` 'auto' takes two levels if the guide passes steps 1 and 5. `budget`
-    includes the pilot, (draws, stresses) of plain samples that are there already.
+    With 'auto', two levels are used if the guide passes steps 1 and 5. `budget`
+    includes the pilot, which holds (draws, stresses) of plain samples that are solved
+    already.
     """
     # 1.
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
@@ -327,7 +330,7 @@ def sample_tail(
 
 
 def sample_curve(state: LimitState, goal: Goal, budget: int) -> Tail:
-    """Sample the lower tail by the repetitions of curves."""
+    """Sample the lower tail with the repetitions that failure curves use."""
     repetitions = _repetitions(state, goal, budget, sizes=OF_CURVES)
     return Tail(repetitions, spent=sum(descent.evaluations for descent in repetitions))
 
@@ -370,7 +373,7 @@ def repetition(
     number: int,
     max_evaluations: int = UNLIMITED_EVALUATIONS,
 ) -> Descent:
-    """Return a repetition down to the goal. It depends on seed, key and number only (step 2)."""
+    """Return a repetition down to the goal. It depends only on seed, key and number (step 2)."""
     options: dict[str, Any] = {
         "samples": samples,
         "max_evaluations": max_evaluations,
@@ -387,6 +390,6 @@ def repetition(
 
 
 def _share_failing(descent: Descent) -> float:
-    """Return the share of failures among the samples of a guide, or 1 without samples."""
+    """Return the share of failures among samples that the guide selects, or 1 without samples."""
     values = descent.populations[-1].values
     return float(np.mean(values < descent.threshold)) if descent.complete else 1.0

@@ -1,7 +1,7 @@
-"""Two levels: an inexpensive limit state guides down the tail, and the exact limit state ends it.
+"""Two levels: an inexpensive limit state leads into the tail, and the exact limit state follows.
 
-Problem. Estimate P(E < s) for an exact stress E that is expensive, with the help
-of the guide's stress L, which is not. By the definition of conditional
+Problem. Estimate P(E < s) for an exact stress E, which is expensive, with the help
+of a guide, whose stress L is inexpensive. By the definition of conditional
 probabilities, for any ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
@@ -16,19 +16,20 @@ of b and the walks that measure the last factor are our own.
 Steps:
 
 1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times as many samples per
-   level. Its levels are candidates for L < b, each with its P(L < b).
-2. From the rarest level on, solve some of its samples exactly. The share with E < s is the
-   middle factor. If a probability is requested, s is the quantile of these that
-   meets it.
-3. From failures among these, walk among the failures E < s (`subset.grow`), and forget
-   the first `FORGOTTEN_STEPS` steps. The share of the later states with L < b is
-   the last factor. `_covered` estimates its error, with one observation for each
-   family of walkers.
-4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise go on with 2 at
-   the next less rare level, as far as evaluations and levels with draws allow.
+   level. Each level is a candidate for L < b, and its probability P(L < b) is known.
+2. Begin with the rarest level, and solve some of its samples exactly. The share
+   with E < s is the middle factor. If a probability is requested, s is the quantile
+   of E that gives this probability.
+3. Start from failures among these samples, walk among the failures E < s
+   (`subset.grow`), and discard the first `FORGOTTEN_STEPS` steps. The share of the
+   later states with L < b is the last factor. `_covered` estimates its error, with
+   one observation for each family of walkers.
+4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise repeat
+   from step 2 at the next, less rare level, as far as evaluations and levels with
+   draws allow.
 
-Failures that L misses and that no short walk reaches are never found:
-`stiction.reliability.tail` compares beforehand how L and E rank samples.
+Failures that L misses, and that no short walk reaches, are never found. Therefore
+`stiction.reliability.tail` first compares how L and E rank samples.
 """
 
 import math
@@ -84,11 +85,12 @@ def bridge(
     floor: float = -math.inf,
     label: Label = lambda draws: np.zeros(len(draws), np.int64),
 ) -> Descent:
-    """Sample the exact lower tail near a threshold, or else near a probability.
+    """Sample the exact lower tail near a threshold, or near a probability.
 
-    `samples` are exact evaluations for the middle factor. As many again walk in the
-    failure set, and `max_evaluations` limits both. Without a failure the estimate is
-    zero, because leaving it out would favour repetitions with a failure.
+    `samples` is the number of exact evaluations for the middle factor. The walk among
+    failures takes the same number again, and `max_evaluations` limits their sum.
+    Without a failure the estimate is zero, because omitting this repetition would
+    favour repetitions with a failure.
     """
     # 1. levels of the guide
     descent = descend(

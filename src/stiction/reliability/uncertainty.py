@@ -1,8 +1,8 @@
-"""Errors of estimated probabilities: intervals, and the variance of correlated chains.
+"""Errors of estimated probabilities: intervals and the variance of correlated chains.
 
-Sources. Intervals of a count: Clopper and Pearson (1934), Biometrika 26, 404. Variance of
-chains by their genealogy: Chan and Lai (2013), Annals of Statistics 41, 2877; Lee and
-Whiteley (2018), Biometrika 105, 609.
+Sources. Intervals for a count follow Clopper and Pearson (1934), Biometrika 26,
+404. The variance of chains from their genealogy follows Chan and Lai (2013), Annals
+of Statistics 41, 2877, and Lee and Whiteley (2018), Biometrika 105, 609.
 """
 
 import math
@@ -16,10 +16,10 @@ CONFIDENCE = 0.95
 
 
 def log_width(cv: float) -> float:
-    """Return half the width of the interval for the logarithm of an estimate.
+    """Return half the width of the interval for log(estimate).
 
-    It follows Student's distribution, because the coefficient of variation is itself
-    estimated, from about 1/cv^2 independent families.
+    The width uses Student's distribution, because the coefficient of variation is
+    itself estimated from about 1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0
@@ -28,7 +28,7 @@ def log_width(cv: float) -> float:
 
 
 def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
-    """Return the interval of an estimate whose logarithm is about normal, within [0, 1]."""
+    """Return an interval within [0, 1] for an estimate whose logarithm is about normal."""
     if not math.isfinite(cv):
         return 0.0, 1.0
     width = log_width(cv)
@@ -37,7 +37,7 @@ def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
 
 
 def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
-    """Return the interval of a probability from independent samples (Clopper and Pearson)."""
+    """Return the interval for a probability from independent samples (Clopper and Pearson)."""
     tail, held = 0.5 * (1.0 - CONFIDENCE), samples - failures
     low = betaincinv(failures, held + 1, tail) if failures else 0.0
     high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
@@ -45,17 +45,17 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 
 
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
-    """Return the squared c.o.v. of a subset estimate, from the ancestors of failures.
+    """Return the squared cv of an estimate by subset simulation, from the ancestors of failures.
 
-    Families that descend from different first samples, N = `samples` in all, evolve
-    independently. Their shares w_i among the failures then measure the error, v = sum
-    (w_i - 1/N)^2, in three steps:
+    Families that descend from different first samples evolve independently. There are
+    N = `samples` first samples. The shares w_i of the families among the failures
+    therefore measure the error, v = sum (w_i - 1/N)^2. It is computed in three steps:
 
     1. Sum the squared shares, and subtract 1/N.
-    2. If all samples fail, v is zero. Take (2/N)^2 at least, as if two more had not
-       failed, which bounds the error as their binomial distribution does.
-    3. With k families of equal size v is 1/k, but the variance of a mean of k values needs
-       1/(k - 1). Return v/(1 - v).
+    2. If all samples fail, v is zero. Use at least (2/N)^2, as if two more samples
+       had not failed. This bounds the error as the binomial distribution does.
+    3. With k families of equal size, v is 1/k, but the variance of a mean of k values
+       needs 1/(k - 1). Therefore return v/(1 - v).
     """
     if ancestors.size == 0:
         return math.inf
@@ -68,7 +68,8 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
 def generator(seed: int, *key: int) -> np.random.Generator:
     """Return an independent generator for each key under one seed.
 
-    The first number of the spawn key keeps it apart from the streams of random fields.
+    The first number of the spawn key separates this generator from the streams of
+    random fields.
     """
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
     return np.random.Generator(np.random.PCG64DXSM(sequence))
