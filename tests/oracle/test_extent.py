@@ -79,6 +79,7 @@ def test_the_part_that_can_break_follows_its_rows_and_columns_of_the_stiffness(
 
 @pytest.mark.parametrize("method", [LOCAL, st.Equilibrium(), st.Rupture(loading_rate=3e8)])
 def test_an_extent_of_everything_is_none(method):
+    assert LINE.interface.breakable.sum() == 96
     strength = FIELD.sample(LINE.interface, seed=5)
     whole, given = (
         st.onset(problem, strength, method=method, progress=False)

@@ -43,6 +43,31 @@ test_more_memory_than_there_is = refusals({
 })  # fmt: skip
 
 
+FAULT = make_problem(residual_strength=2e5)
+FAULT = dataclasses.replace(FAULT, interface=dataclasses.replace(LINE, extent=(0.02, 0.08)))
+test_what_to_do_about_a_unit_or_a_kind = refusals({
+    "length: must be a number in SI units ... got '4 km'": lambda: st.Interface("4 km", 512),
+    "critical_slip: must be a number in SI units ... got '4 cm'":
+        lambda: st.LinearWeakening(critical_slip="4 cm"),
+    "extent: must be a number, or text such as": lambda: st.Interface(
+        4e3, 512, extent=("1km", "3 km")
+    ),
+    "extent: must hold ... check its unit": lambda: st.Interface(4e3, 512, extent=(1.0, 3.0)),
+    "extent: must be two ends ... True and False": lambda: st.Interface(
+        0.1, 256, extent=np.ones(256, dtype=int)
+    ),
+    "the ellipse must lie on ... semi_axes": lambda: st.Interface(
+        (0.5, 0.5), (64, 64), extent=st.Ellipse(centre=(0.2, 0.2), semi_axes=(0.3, 0.1))
+    ),
+    "load at ... Pa/s or slower": lambda: st.onset(
+        PROBLEM, ONE, method=st.Rupture(loading_rate=1e13)
+    ),
+    "strength: must be positive ... check its sign":
+        lambda: FAULT.own_sample({"strength": -ONE[None]}),
+    "strength is 22 to 22 Pa": lambda: FAULT.own_sample({"strength": 22e-6 * ONE[None]}),
+})  # fmt: skip
+
+
 def test_a_refusal_is_short_pickles_and_is_a_value_error():
     with pytest.raises(ValueError, match="workers") as caught:
         st.monte_carlo(PROBLEM, FIELD, method=LOCAL, samples=1, workers="x" * 10_000)

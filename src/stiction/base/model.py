@@ -37,7 +37,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
 from stiction.base.representation import brief, equal, hash_of, html_of
-from stiction.base.units import is_quantity, magnitude_in_one_of, units_of_argument
+from stiction.base.units import is_quantity, magnitude_in_one_of, states_unit, units_of_argument
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -45,11 +45,16 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 # -- kinds of values -----------------------------------------------------------------------------
 
+NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or astropy"
+"""What replaces a text such as '4 km'."""
+
 
 def as_number(value: Any) -> float:
     """Return a number of any library as a float. Texts and truth values are refused."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
+    if isinstance(value, str):
+        raise ValueError(NUMBER)
     if not isinstance(value, numbers.Real) or isinstance(value, bool):
         raise ValueError("must be a number")
     try:
@@ -131,6 +136,8 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     A study file may also give a path, or a table {file, ...} with options of the reader.
     """
     read = (info.context or {}).get("read")
+    if isinstance(value, str) and states_unit(value):
+        raise ValueError(NUMBER)
     if isinstance(value, str | Path | dict) and read is not None:
         value = read(value, str(info.field_name))
     if isinstance(value, str | Path | dict):

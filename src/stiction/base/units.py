@@ -111,6 +111,14 @@ def is_in(text: str | None, si: str) -> bool:
     return given is not None and wanted is not None and given.powers == wanted.powers
 
 
+def states_unit(text: str) -> bool:
+    """Return whether a text is a number, with a known unit or without, such as '4 cm'."""
+    number, _, unit = text.strip().partition(" ")
+    with suppress(ValueError):
+        return math.isfinite(float(number)) and (not unit or parse(unit) is not None)
+    return False
+
+
 def factor_to(si: str, text: str) -> float:
     """Return the factor from the unit `text` to the SI unit `si`."""
     wanted, given = parse(si), parse(text)

@@ -58,7 +58,10 @@ def _place(value: Any) -> float:
     """Return a length in m from a number, a quantity, or text such as "0.5 km"."""
     if isinstance(value, str):
         number, _, unit = value.strip().partition(" ")
-        value = float(number) * factor_to("m", unit or "m")
+        try:
+            value = float(number) * factor_to("m", unit or "m")
+        except ValueError:
+            raise ValueError("must be a number, or text such as '0.5 km'") from None
     place = as_number(in_si(value, "length"))
     if not math.isfinite(place):
         raise ValueError("must be finite")
@@ -119,6 +122,11 @@ def _extent(value: Any, info: ValidationInfo) -> Any:
         mask = given.copy()
         mask.flags.writeable = False
         return mask
+    if given.dtype.kind in "iuf" and given.shape not in ((2,), (2, 2)):
+        raise ValueError(
+            "must be two ends, two pairs of ends, an Ellipse or a mask of True and False (numbers"
+            " become a mask by mask != 0)"
+        )
     if given.ndim == 2:
         return tuple(map(_two_places, value))
     return _two_places(value)
@@ -165,7 +173,8 @@ class Interface:
         give its two ends (m, or text such as "0.5 km"). For a plane, give two pairs
         of ends (along x and y) or an `Ellipse`. For a line or a plane you may also
         give a mask: a boolean array with shape (*shape), or in a study file the path
-        of a ``.npy`` file. Nodes at the ends can break.
+        of a ``.npy`` file. Nodes at the ends can break. An extent of all nodes is
+        the same as no extent.
 
     Notes
     -----
@@ -230,7 +239,13 @@ class Interface:
             valid = "two pairs of ends, an Ellipse" if self.is_plane else "two ends"
             return f"must be {valid} or a mask of shape {self.shape}, got {extent}"
         for dim, (low, high), length in zip(self.dims, ends or (), self.lengths, strict=False):
-            if not -1e-9 * length <= low < high <= (1.0 + 1e-9) * length:
+            fits = -1e-9 * length <= low < high <= (1.0 + 1e-9) * length
+            if not fits and isinstance(extent, Ellipse):
+                return (
+                    f"the ellipse must lie on the interface, from 0 to {length:g} m along {dim},"
+                    f" but reaches from {low:g} to {high:g} m. Change its centre or its semi_axes"
+                )
+            if not fits:
                 return (
                     f"must rise and lie on the interface, from 0 to {length:g} m along {dim}, got"
                     f" {low:g} to {high:g} m"
@@ -239,7 +254,7 @@ class Interface:
         if np.count_nonzero(inside) < 2:
             return (
                 f"must hold two nodes or more, which are {self.spacing:.3g} m apart, holds"
-                f" {np.count_nonzero(inside)}: nothing could become unstable"
+                f" {np.count_nonzero(inside)}: nothing could become unstable. Check its unit (m)"
             )
         return None
 
@@ -274,26 +289,28 @@ class Interface:
         return inside
 
     @cached_property
-    def breakable(self) -> Mask | None:
-        """Read-only mask of the nodes that can break, with shape (*shape), unless all can break."""
-        inside = np.ones(1, dtype=bool) if self.extent is None else self._inside
+    def breakable(self) -> Mask:
+        """Read-only mask of the nodes that can break, (*shape)."""
+        inside = np.ones(self.shape, dtype=bool) if self.extent is None else self._inside
         inside.flags.writeable = False
-        return None if inside.all() else inside
+        return inside
+
+    @cached_property
+    def is_held(self) -> bool:
+        """Whether some nodes cannot break. An extent of all nodes is the same as no extent."""
+        return self.extent is not None and not self.breakable.all()
 
     def mean(self, profiles: Array) -> Array:
         """Return means of profiles (..., *shape) over the nodes that can break."""
-        mask = self.breakable
         means: Array = (
-            profiles.mean(self.axes) if mask is None else profiles[..., mask].mean(-1)
+            profiles[..., self.breakable].mean(-1) if self.is_held else profiles.mean(self.axes)
         )
         return means
 
     @property
     def breakable_measure(self) -> float:
         """Length (m), or area on a plane (m²), of the nodes that can break."""
-
-        mask = self.breakable
-        return self.measure if mask is None else np.count_nonzero(mask) * self.cell
+        return np.count_nonzero(self.breakable) * self.cell if self.is_held else self.measure
 
     @property
     def is_free(self) -> bool:

@@ -137,7 +137,8 @@ class Load:
     profile : float, (nodes,) array, GradientLoad, EdgeLoad or another LoadShape
         p, dimensionless, positive.
     initial_stress : float or (nodes,) array
-        tau_i, Pa, below the peak strength everywhere.
+        tau_i, Pa, below the peak strength everywhere. `Rupture` also takes nodes
+        at which it is higher, which break at once.
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a `friction_coefficient`.
     pressing_force : float, optional

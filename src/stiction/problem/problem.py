@@ -349,7 +349,7 @@ class Problem:
         beyond the extent take over stress. The mean covers the nodes that can break,
         and is divided by the mean of their load profile.
         """
-        if self.interface.breakable is None:
+        if not self.interface.is_held:
             return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
         return float(self.relief_of_nodes @ slip)
 
@@ -361,7 +361,6 @@ class Problem:
         number, where b is 1 at these nodes and 0 beyond.
         """
         interface, can_break = self.interface, self.interface.breakable
-        assert can_break is not None
         profile = np.broadcast_to(self.load_profile, interface.shape)[can_break].sum()
         relief: Array = self.released_stress(1.0 * can_break).reshape(-1) / profile
         return relief
@@ -491,7 +490,7 @@ class Problem:
     def _check_extent(self, resolution: tuple[float, ...]) -> None:
         """Refuse an extent narrower than the nucleation length, which is given in nodes."""
         interface, breakable = self.interface, self.interface.breakable
-        if breakable is None or self.specimen is not None:  # blocks have no single length
+        if not interface.is_held or self.specimen is not None:  # blocks have no single length
             return
         for axis, dim in enumerate(interface.dims):
             across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
@@ -662,9 +661,8 @@ class Problem:
         pressure: Array, accept: Collection[str],
     ) -> Sample:  # fmt: skip
         """Return a sample made from rows with valid values, if the rows fit together."""
-        breakable = self.interface.breakable
-        if breakable is not None:
-            strength = np.where(breakable, strength, np.inf)
+        if self.interface.is_held:
+            strength = np.where(self.interface.breakable, strength, np.inf)
         if problems := self._impossible(strength, residual, initial, accept):
             raise InputError(problems)
         rates = self._rates(strength, residual, scale, value)
@@ -751,7 +749,12 @@ class Problem:
         ):
             middle = np.median(strength, axis=along, keepdims=True)
             huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
-            if huge.any():
+            if middle.min() <= 0.0:
+                problems.append(
+                    f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
+                    f" {middle.min():g} Pa: check its sign"
+                )
+            elif huge.any():
                 number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
                 problems.append(
                     f"strength: {strength[number].flat[node]:g} Pa at"
@@ -763,10 +766,11 @@ class Problem:
         nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
         if nowhere.any():
             number = int(np.argmax(nowhere))
-            least, most = strength[number].min(), strength[number].max()
+            known = strength[number][np.isfinite(strength[number])]
             problems.append(
                 "strength: must be finite and above residual_strength at one node or more. In"
-                f" sample {number} strength is {least:g} to {most:g} Pa and residual_strength"
+                f" sample {number} strength is {known.min():g} to {known.max():g} Pa and"
+                " residual_strength"
                 f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
             )
         return problems

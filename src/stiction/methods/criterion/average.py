@@ -58,7 +58,7 @@ def averages(
     """
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
-    if interface.breakable is not None:
+    if interface.is_held:
         # Any finite value will do: the local criterion leaves these nodes out.
         excess = np.where(interface.breakable, excess, 0.0)
         places = (places_of(interface, y) for y in windows)
@@ -86,7 +86,7 @@ def least_average(
     """
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
-    if not interface.is_plane and interface.breakable is None:
+    if not interface.is_plane and not interface.is_held:
         transform, multiplier = make_transform(interface.shape), np.array(windows[0].spectrum)
         reach = int(np.ceil(0.5 * windows[0].extents[0] / interface.spacing)) + 2
         _minimum_of_rows(transform, excess, profile, multiplier, reach, load, place)

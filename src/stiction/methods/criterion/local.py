@@ -128,7 +128,7 @@ class LocalCriterion:
         over all places between half-spaces is load <p> <= <tau_p - tau_i>. An interface that ends
         has no bounds.
         """
-        everywhere = problem.interface.breakable is None
+        everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
@@ -138,7 +138,7 @@ class LocalCriterion:
         """
         interface = problem.interface
         half_spaces = problem.specimen is None and not interface.is_plane
-        if not (half_spaces and problem.friction.linear and interface.breakable is None):
+        if not (half_spaces and problem.friction.linear and not interface.is_held):
             return True
         return rms_difference(problem, sample, stress) > MAX_RMS_DIFFERENCE
 
@@ -221,7 +221,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                     " criterion does not hold; use st.Equilibrium()"
                 )
             width[i] = windows.widths[c]
-            if blocks.relief > 0.0 or problem.interface.breakable is not None:  # 3.
+            if blocks.relief > 0.0 or problem.interface.is_held:  # 3.
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
                 relief[i] = _relief_of_patch(problem, rate, run, drive)

@@ -105,7 +105,7 @@ def windows_of(
 
 def places_of(interface: Interface, window: Window) -> Any:
     """Return the nodes at which a window lies within the extent of an interface, (*shape)."""
-    if interface.breakable is None:
+    if not interface.is_held:
         return True
     beyond = interface.transform(1.0 * ~interface.breakable)
     under = interface.transform(1.0 * (window.weight > 0.0)).conj()

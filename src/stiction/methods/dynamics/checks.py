@@ -73,11 +73,10 @@ def at_first_slip(run: Run) -> RuptureState | None:
         )
     rise = run.slope(time) * step / scale
     if rise > _COARSE_RISE:
-        courant = step / run.medium.largest_step * _COARSE_RISE / rise
+        slower = run.slope(time) * _COARSE_RISE / rise
         text = (
             f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa. Use courant={courant:.2g} or less, or load more"
-            " slowly"
+            f"the stress scale, {scale:.3g} Pa. Load at {slower:.1g} Pa/s or slower"
         )
         if rise > _MAX_RISE:
             raise InputError(text)

@@ -169,9 +169,6 @@ class Save:
         Places that are nearly zero, and stations where nothing can break, are doubted.
         """
         lengths, numbers = interface.lengths, []
-        breakable = (
-            np.ones(1, dtype=bool) if interface.breakable is None else interface.breakable
-        )
         for name, place in self.stations.items():
             x = np.array(place)
             if x.size != len(lengths) or not np.all((x >= 0.0) & (x <= lengths)):
@@ -184,7 +181,7 @@ class Save:
             index = tuple(np.round(nodes).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
             text = ""
-            if not np.broadcast_to(breakable, interface.shape)[index]:
+            if not interface.breakable[index]:
                 text = "lies beyond the extent of the interface, where nothing slips"
             elif np.any((nodes > NEARLY_ZERO) & (nodes < 0.5)):
                 text = "is nearer to the first node than to any other"

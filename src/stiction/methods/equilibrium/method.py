@@ -137,7 +137,7 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
-        ends = problem.interface.breakable is not None
+        ends = problem.interface.is_held
         if self.sensitivity and ends and problem.interface.is_plane:
             reasons.append(
                 "sensitivity: is not known on planes that end. Leave it out, and take differences"
@@ -158,7 +158,7 @@ class Equilibrium:
         strength. Behind a machine the first instability need not happen, and has no bound. If
         the interface ends, slip lowers the mean stress of the part that can break.
         """
-        if problem.interface.breakable is not None:
+        if problem.interface.is_held:
             return False, False
         certain = not (problem.has_machine and event == "first_instability")
         return certain, certain

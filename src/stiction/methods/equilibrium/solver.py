@@ -223,7 +223,7 @@ class OnsetSolver:
 
         If the interface ends, it is the largest at an instability.
         """
-        if self.problem.interface.breakable is None:
+        if not self.problem.interface.is_held:
             return path.peak
         states = [event.before for event in path.events] + [path.last]
         return max(state.load - self.problem.relief(state.slip) for state in states)

@@ -83,9 +83,8 @@ class DenseProgram:
             self.runs = runs_of(problem.half_spaces, self.nodes)
         else:
             self.elastic = problem.blocks
-        breakable = problem.interface.breakable
-        self.ends = breakable is not None
-        if breakable is not None and count_patches(1.0 * breakable) > 1:
+        self.ends = problem.interface.is_held
+        if self.ends and count_patches(1.0 * problem.interface.breakable) > 1:
             self.runs = None  # a run of nodes stops at the end of its part
         self.driven = self.elastic.relief > 0.0
         self.may_stop = self.elastic.positive > 0.0  # slip may unload a node that slips
