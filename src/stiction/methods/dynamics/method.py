@@ -158,6 +158,10 @@ class Rupture:
     radiate. Events that did not happen have the value NaN, with a warning. An
     overstressed start has no `critical_load`.
 
+    **Speeds.** `median_rupture_speed` is the speed of a rupture. `rupture_speed`,
+    the largest apparent speed, exceeds all wave speeds where a part as long as
+    twice the nucleation length breaks almost at once.
+
     **Arrested events.** `arrested_events` counts instabilities in which Z V at a
     node exceeds 7.5 % of the median tau_p - tau_r before the mean stress is as
     high again or all is calm. `Equilibrium` also counts smaller jumps. If the

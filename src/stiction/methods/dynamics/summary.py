@@ -15,7 +15,10 @@ from stiction.problem.problem import Problem
 from stiction.problem.results import per_area, position
 
 SPEEDS: dict[str, Variable] = {
-    "rupture_speed": Variable("m/s", "largest apparent speed of the front over 2 h_n"),
+    "rupture_speed": Variable(
+        "m/s",
+        "largest apparent speed of the front over 2 h_n, beyond waves if a part breaks at once",
+    ),
     "median_rupture_speed": Variable("m/s", "median apparent speed of the front over h_n/2"),
 }
 SPECTRUM = Variable("N", "amplitude spectrum of the moment rate per length", ("frequency",))
@@ -48,7 +51,8 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run.
 
     Planes have median speeds along x and y, and no largest speed: the apparent speed of a front
-    that arrives at an angle can exceed all wave speeds.
+    that arrives at an angle can exceed all wave speeds. On a line it can where a long part breaks
+    almost at once.
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
