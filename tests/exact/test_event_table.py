@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ import stiction as st
 from stiction.methods.dynamics.summary import rate_spectrum
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.sample import EquilibriumState
+from stiction.plot.axes import new_figure, space_numbers
 from stiction.plot.ruptures import _line_film, crack_moment
+from stiction.plot.style import paper_style
 
 DROP = 2e5
 
@@ -143,6 +146,29 @@ def test_films_scale_to_what_breaks_and_files_name_their_problem(run, tmp_path):
         run, tmp_path, origin=0.02, normal_stress=-5e6, benchmark="ends"
     )
     assert all(path.read_text().startswith("# problem=ends\n") for path in paths)
+
+
+def test_pictures_name_their_parts_and_leave_room(run):
+    right = st.plot.events({"a": run, "b": run})[1]
+    texts = [text.get_text() for text in right.get_legend().get_texts()]
+    assert texts[:2] == ["a", "b"]
+    assert texts[2].startswith("cracks, area stress drop ")
+    later = np.append(run.time, run.time[-1] + 1.0)  # slip that follows the load
+    rate = np.append(run.moment_rate, 0.02 * run.moment_rate.max())
+    longer = run.drop_dims("time").assign_coords(time=later)
+    left = st.plot.moment_rate(longer.assign(moment_rate=("time", rate, {"units": "N/s"})))[0]
+    assert left.lines[0].get_xdata().size < rate.size
+    for span in ((1.86e6, 1.88e6), (2.0, 60.0), (3.0, 9.0)):
+        with paper_style():
+            axes = new_figure(2.6, 2.0).subplots()
+            axes.set(xscale="log", xlim=span)
+            space_numbers(axes)
+            axes.figure.draw_without_rendering()
+            numbers = [one for one in axes.get_xticklabels(which="both") if one.get_text()]
+            boxes = [one.get_window_extent() for one in numbers]
+            ends = sorted((box.x0, box.x1) for box in boxes)
+        assert len(ends) >= 2
+        assert all(high < low for (_, high), (low, _) in pairwise(ends))
 
 
 def test_fast_loading_of_arrested_events_is_warned_of():

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LogNorm
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -25,6 +25,7 @@ from stiction.plot.axes import (
     new_figure,
     on_axes,
     problem_of,
+    space_numbers,
     with_unit,
 )
 from stiction.plot.fields import draw_map, map_height, name_line
@@ -51,10 +52,13 @@ DECADES = 7.0
 """Drawn decades of slip rate below the largest."""
 BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
-SHOWN_RATE = 0.01
-"""Moment rate from which on a rupture is drawn, as a share of its largest."""
+SHOWN_RATE, BESIDE_PULSE = 0.05, 0.25
+"""Moment rate from which on a rupture is drawn, as a share of its largest, and the time before and
+after, as a share of its duration. Slip that follows the load reaches a hundredth."""
 FRONT_SHARE = 0.9
 """Share of the nodes that the front has reached at the last of its contours."""
+STRENGTH = LinearSegmentedColormap.from_list("strength", ["0.85", "0.25"])
+"""Greys of strength. White is where nothing breaks."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
@@ -110,7 +114,7 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Left the moment rate, until it stays below a hundredth of its largest
+        Left the moment rate, until it stays below a twentieth of its largest
         value; right its spectrum, which tends to the moment at low frequencies.
 
     Examples
@@ -128,7 +132,7 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
     fast = since[rate.values > SHOWN_RATE * rate.values.max()]
     ends = (fast[0], fast[-1]) if fast.size else (since[0], since[-1])
-    beside = 0.1 * (ends[1] - ends[0])
+    beside = BESIDE_PULSE * (ends[1] - ends[0])
     shown = (since >= ends[0] - beside) & (since <= ends[1] + beside)
     factor, unit = unit_for("s", since[shown])
     figure = new_figure(PAGE, 2.6)
@@ -143,6 +147,7 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
         if spectrum.size:
             right.loglog(run["frequency"], spectrum, color=INK)
         right.set(xlabel="frequency (Hz)", ylabel=f"spectrum ({spectrum.attrs['units']})")
+        space_numbers(right)
     return np.array([left, right])
 
 
@@ -166,7 +171,7 @@ def events(
     (2,) array of matplotlib.axes.Axes
         Left the number of events per sample whose moment is at least so large;
         right moment over area, on lines over length. Between half-spaces a line
-        shows cracks with the median stress drop: Eshelby's circular crack on
+        shows cracks with the median `event_area_stress_drop`: Eshelby's circular crack on
         planes, Starr's on lines.
 
     Examples
@@ -199,7 +204,10 @@ def events(
             left.plot(
                 ordered, np.arange(1, ordered.size + 1) / samples, **series(number), label=name
             )
-            right.plot(sizes[number], moments[number], ".", color=color(number), markersize=3.0)
+            right.plot(
+                sizes[number], moments[number], ".", color=color(number), markersize=3.0,
+                label=name if len(results) > 1 else None,
+            )  # fmt: skip
         known = np.concatenate(sizes)
         known = known[np.isfinite(known)]
         if system.specimen is None and known.size:
@@ -208,8 +216,9 @@ def events(
             factor, stress_unit = unit_for("Pa", np.array([drop]))
             right.plot(
                 span, crack_moment(system, drop, span), color=QUIET, linewidth=0.8,
-                label=f"cracks, {drop * factor:.2g} {stress_unit}",
+                label=f"cracks, area stress drop {drop * factor:.2g} {stress_unit}",
             )  # fmt: skip
+        if right.get_legend_handles_labels()[0]:
             right.legend()
         if len(results) > 1:
             left.legend()
@@ -221,6 +230,8 @@ def events(
         )
         text = "area (m²)" if plane else "length (m)"
         right.set(xscale="log", yscale="log", xlabel=text, ylabel=f"moment ({unit})")
+        space_numbers(left)
+        space_numbers(right)
     return np.array([left, right])
 
 
@@ -348,7 +359,7 @@ def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface, (strength, factor, unit) = problem.interface, _strength(run)
     text = rf"strength $\tau_p$ ({unit})"
-    draw_map(axes, interface, strength * factor, text, cmap="Greys")
+    draw_map(axes, interface, strength * factor, text, cmap=STRENGTH)
     since, begin = _since_onset(run, "arrival_time")
     scale, time_unit = unit_for("s", since)
     # Beside the ends of an interface, nodes creep long after the front has passed.
@@ -368,8 +379,8 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     axes.plot(*place, "o", color=ACCENT, markersize=4.0, markeredgecolor="white")
 
 
-def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
-    """Return a line of text above axes, with time and mean stress."""
+def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
+    """Return a line of text at the top of a figure, with time and mean stress."""
     since, begin = _since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)
@@ -379,7 +390,9 @@ def _clock(axes: Axes, run: xr.Dataset) -> tuple[Any, str, list[str]]:
         f"{time:,.1f} {unit}{begin},  mean stress {stress:.3f} {stress_unit}"
         for time, stress in zip(factor * since, mean, strict=True)
     ]
-    return axes.text(0.0, 1.04, " ", transform=axes.transAxes, color=QUIET), "text", texts
+    # The layout leaves room for the text that is there when a film begins.
+    title = figure.suptitle(texts[0], x=0.07, ha="left", color=QUIET, fontsize="medium")
+    return title, "text", texts
 
 
 def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
@@ -405,7 +418,7 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     below.set_xlim(first - beside, last + beside)
     below.set_xlabel(f"position $x$ ({length_unit})")
     below.set_ylabel("slip rate (m/s)")
-    return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(above, run)]
+    return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(figure, run)]
 
 
 def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
@@ -422,4 +435,4 @@ def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     load = draw_map(right, interface, stress[0], text, cmap="cividis", **ends)
     right.label_outer()
     moving = [(slip, "data", rate.swapaxes(1, 2)), (load, "data", stress.swapaxes(1, 2))]
-    return figure, [*moving, _clock(left, run)]
+    return figure, [*moving, _clock(figure, run)]
