@@ -47,7 +47,9 @@ def summary(problem, strength, **options):
     """The numbers of a run without its fields."""
     found = run(problem, strength, st.Save([], every=500), **options)
     # Without residual strength the kinetic stress is zero, or a round-off error of about 1e-10 Pa.
-    return found.drop_dims(["step", "time"]).assign(kinetic_stress=found.kinetic_stress.round(3))
+    return found.drop_dims(["step", "time"]).assign(
+        kinetic_stress=found.kinetic_stress.round(3)
+    )
 
 
 @calls(WAVES, close=CLOSE)
