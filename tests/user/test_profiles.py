@@ -201,6 +201,13 @@ def test_profiles_in_a_study_file(tmp_path):
     assert st.Study.from_dict(loaded.to_dict()) == loaded
 
 
+def test_rows_of_a_table_are_nodes_for_every_property():
+    for name in ("strength", "residual_strength"):
+        given = {"strength": STRENGTH, "residual_strength": 0.1 * STRENGTH}
+        rows = given | {name: xr.DataArray(given[name], dims="row")}
+        assert onset(rows).critical_stress.item() == onset(given).critical_stress.item()
+
+
 @pytest.mark.parametrize("kind", np.typecodes["AllInteger"] + "fd")
 def test_a_netcdf_file_holds_numbers_of_any_type(kind, tmp_path):
     values = (1 + np.arange(NODES) % 100).astype(kind)

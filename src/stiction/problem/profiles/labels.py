@@ -284,7 +284,9 @@ def _as_map(data: Any, dims: Any, rows: str | None, spacing: Any, value: Column)
     """
     import xarray as xr
 
-    if "row" not in data.dims or data.attrs.get("headed") or len(data.data_vars) < 2:
+    if not isinstance(data, xr.Dataset) or "row" not in data.dims:
+        return data
+    if data.attrs.get("headed") or len(data.data_vars) < 2:
         return data
     sizes = sizes_of(data.attrs["comments"])
     if rows is None and not {"width", "height"} <= sizes.keys():
