@@ -1,8 +1,9 @@
-"""Many samples of random interfaces: how they are computed and kept.
+"""Compute and keep many samples of random interfaces.
 
-Begin with `experiment`: it joins problem, random fields and method, and sample i follows
-from (seed, i). `batches` solves spans of samples by threads or any executor, `store`
-keeps them in chunks, and `dataset` labels them. `monte_carlo` has the public call and the
-loop over missing samples. `pilot` compares with the exact onset. `limit_state` is the
-onset as a function of draws.
+Begin with `experiment`, which joins the problem, the random fields and the method.
+Sample i follows from (seed, i). `batches` solves spans of samples in threads or any
+executor, `store` keeps the samples in chunks, and `dataset` labels them.
+`monte_carlo` holds the public function and the loop over missing samples. `pilot`
+compares approximate with exact onsets. `limit_state` returns the onset as a
+function of draws.
 """

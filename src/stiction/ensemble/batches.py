@@ -1,16 +1,16 @@
-"""Samples computed in batches by threads or any executor, with the same numbers from each.
+"""Compute samples in batches, in threads or any executor, with the same results.
 
-Problem. Solve spans of samples on workers that come and go, in bounded memory, so
-that results do not depend on the workers.
+Problem. Solve spans of samples in bounded memory, on workers that come and go.
+Results must not depend on the workers.
 
 Steps:
 
-1. While a worker is free, cut a piece off the first waiting span: about half a second of
-   work at the pace of the latest piece (`piece_size`).
-2. Submit the piece. An executor that runs it at once returns a finished future. Hand its
-   table over before the next piece begins.
-3. Wait for the first futures, at most a second, because workers come and go.
-4. Yield each table, and take its pace.
+1. While a worker is free, cut a piece from the first waiting span. It should take
+   about half a second at the pace of the latest piece (`piece_size`).
+2. Submit the piece. An executor that runs it at once returns a finished future. In
+   this case, yield its table before the next piece begins.
+3. Wait for the first futures, but at most a second, because workers come and go.
+4. Yield each table, and measure its pace.
 """
 
 import os
@@ -54,7 +54,7 @@ WORKER_COUNT_SECONDS = 1.0
 
 
 class Span(NamedTuple):
-    """Samples first .. first + samples - 1 of one point."""
+    """Samples first to first + samples - 1 at one point."""
 
     point: int
     first: int
@@ -81,9 +81,9 @@ class Failure(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Samples of any points of a sweep, and the failures among them.
+    """Samples at any points of a sweep, and the failures among them.
 
-    A solved sample is a row of `POINT`, `NUMBER` and the variables of the method.
+    A row holds `POINT`, `NUMBER` and the variables of the method for a solved sample.
     """
 
     rows: NDArray[Any]
@@ -94,7 +94,7 @@ class Table(NamedTuple):
 
 
 def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return the values of consecutive samples of a point as rows."""
+    """Return as rows the values of consecutive samples at a point."""
     count = len(next(iter(values.values()), ()))
     columns = {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
     types = [(name, array.dtype, array.shape[1:]) for name, array in columns.items()]
@@ -112,7 +112,7 @@ def usable_cores() -> int:
 
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
-    """Return results for all jobs. Warnings are issued once, at the line of the caller."""
+    """Return the results of all jobs. Each warning is issued once, at the line of the caller."""
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         results = list(pool.map(Context.run, contexts, repeat(function), jobs))
@@ -122,7 +122,7 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 
 @cache
 def versions() -> str:
-    """Return the versions on which the last digits of a result depend."""
+    """Return the versions of software on which the last digits of a result depend."""
     return f"stiction {__version__}, numpy {version('numpy')}, numba {version('numba')}"
 
 
@@ -156,7 +156,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
 def piece_size(
     experiment: Experiment, span: Span, pace: float | None, left: int, workers: int
 ) -> int:
-    """Return the number of samples of the next piece, at a pace in s per sample."""
+    """Return the number of samples for the next piece, from the pace in s per sample."""
     block = block_of(len(experiment.problem.interface.shape))
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
     if pace:
@@ -172,7 +172,7 @@ def piece_size(
 
 
 def _workers_of(executor: Executor, workers: int) -> int:
-    """Return the present number of workers of an executor. Workers of Dask come and go."""
+    """Return the current number of workers in an executor. Workers of Dask come and go."""
     client = getattr(executor, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))
@@ -197,12 +197,12 @@ def solve_spans(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Generator[tuple[Span, Table], None, None]:
-    """Solve spans of items, and yield pieces of them with their tables (steps 1 to 4).
+    """Solve spans of items. Yield their pieces with their tables (steps 1 to 4).
 
-    At most two pieces per worker are under way, so that memory stays bounded. Closing the
-    generator cancels the pieces that have not begun. A worker that is lost or has other
-    versions raises a `WorkerError`. Only experiments can have spans of more than one
-    item.
+    At most two pieces per worker are in progress, so that memory stays bounded.
+    Closing the generator cancels the pieces that have not begun. A lost worker, or a
+    worker with different versions, raises a `WorkerError`. Only experiments can have
+    spans with more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -271,7 +271,7 @@ def _result(future: Future[Table], span: Span) -> Table:
 
 
 def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
-    """Return the spans of missing samples, (points, samples)."""
+    """Return spans of missing samples, given a mask (points, samples)."""
     spans = []
     for point, row in enumerate(missing):
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)

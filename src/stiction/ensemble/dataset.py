@@ -1,4 +1,4 @@
-"""Tables of samples in any order, gathered into one dataset over sweep, sample and x."""
+"""Gather tables of samples, in any order, into a dataset over sweep, sample and x."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ GridAxes: TypeAlias = Mapping[str, Coordinates]
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
-    """Return one experiment for each combination of these parts."""
+    """Return one experiment for each distinct combination of the named parts."""
     first: dict[Any, Experiment] = {}
     for point in points:
         first.setdefault(tuple(id(getattr(point, part)) for part in parts), point)
@@ -34,7 +34,7 @@ def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
 
 
 def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
-    """Return all variables of any point, in the order of the methods."""
+    """Return all variables that any point has, in the order of the methods."""
     some = distinct(points, "problem", "random", "method")
     return {name: variable for point in some for name, variable in point.variables.items()}
 
@@ -42,7 +42,7 @@ def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
 def over_axes(
     values: Mapping[str, NDArray[Any]], variables: Mapping[str, Variable], axes: GridAxes
 ) -> tuple[dict[str, NDArray[Any]], dict[str, Variable], Coordinates]:
-    """Return values of all points, (points, ...), over the axes of a sweep instead."""
+    """Return values (points, ...) reshaped to the axes of a sweep."""
     dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
     arrays = {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()}
     swept = {
@@ -56,15 +56,15 @@ def over_axes(
 
 
 def within(numbers: NDArray[Any], ends: Any) -> bool:
-    """Return whether whole numbers lie from 0 to below their ends."""
+    """Return whether values are whole numbers, at least 0 and below their ends."""
     return bool(np.all((numbers >= 0) & (numbers < ends)))
 
 
 class Gathered:
-    """The results of all samples of one or several experiments, in memory.
+    """The results of all samples in one or more experiments, in memory.
 
-    `only` names the variables to gather. `done`, (points, samples), marks the samples
-    that are there.
+    `only` names the variables to gather. `done`, with shape (points, samples), marks
+    the gathered samples.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Gathered:
         self._types: dict[str, np.dtype[Any]] = {}
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot contain samples of these points, or '' if it can."""
+        """Return why a table cannot belong to these points, or '' if it can."""
         pairs = [failure[:2] for failure in table.failures]
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
         for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
@@ -102,7 +102,7 @@ class Gathered:
         return ""
 
     def add(self, table: Table) -> None:
-        """Put the rows of a table in their places, and leave out other samples."""
+        """Put the rows of a table in their places. Ignore other samples."""
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure
@@ -120,16 +120,16 @@ class Gathered:
 
     @property
     def failed(self) -> list[Failure]:
-        """Failed samples that are missing, in the order of points and samples."""
+        """Missing samples that failed, in the order of points and samples."""
         return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]
 
     def dataset(
         self, attributes: Mapping[str, Any], axes: GridAxes = MappingProxyType({})
     ) -> xr.Dataset:
-        """Return a dataset over the axes of a sweep, the samples and the nodes.
+        """Return a dataset over the axes of the sweep, the samples and the nodes.
 
-        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' give the
-        cause.
+        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' state
+        the cause.
         """
         variables, values = variables_in(self.points), {}
         for name in variables:

@@ -1,4 +1,4 @@
-"""An experiment: a problem, its random properties, and the method that computes its onset."""
+"""An experiment: a problem, its random properties, and the method that computes onsets."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ MOST_NUMBERS = 1 << 20
 
 @dataclass(frozen=True)
 class Experiment:
-    """A problem, its random properties and a method, checked together once.
+    """A problem, its random properties and a method, which are checked together once.
 
-    Sample i follows from the experiment and i alone, in any batch. An `InputError` lists
-    all mistakes.
+    Sample i depends only on the experiment and i, not on the batch. An `InputError`
+    lists all mistakes.
     """
 
     problem: Problem
@@ -85,24 +85,24 @@ class Experiment:
         object.__setattr__(self, "random", random)
 
     def by(self, method: Any) -> Experiment:
-        """Return the same experiment by another method."""
+        """Return the same experiment with a different method."""
         return dataclasses.replace(self, method=method)
 
     def with_seed(self, seed: int) -> Experiment:
-        """Return the same experiment with another seed, without new checks."""
+        """Return the same experiment with a different seed. Checks are not repeated."""
         copied = copy.copy(self)
         object.__setattr__(copied, "seed", seed)
         return copied
 
     @property
     def given(self) -> Any:
-        """The random interface, or the list of equally likely interfaces."""
+        """The random interface, or a list of equally likely interfaces."""
         members = self.random.members
         return list(members) if len(members) > 1 else members[0]
 
     @property
     def dimension(self) -> int:
-        """Number of standard normal draws of a sample."""
+        """Number of standard normal draws in a sample."""
         return self.random.dimension(self.problem.interface)
 
     @property
@@ -114,13 +114,13 @@ class Experiment:
 
     @property
     def sample_bytes(self) -> float:
-        """Size of `results` for one sample, in bytes."""
+        """Size of the `results` for one sample, in bytes."""
         nodes = self.problem.interface.size
         return 8.0 * sum(nodes if variable.wide else 1 for variable in self.variables.values())
 
     @property
     def seconds(self) -> float:
-        """Approximate time of a sample on one core, s."""
+        """Approximate time for a sample on one core, s."""
         return seconds_per_sample(self.problem, self.method)
 
     @property
@@ -143,7 +143,7 @@ class Experiment:
         )
 
     def check_fields(self) -> None:
-        """Warn of fields that do not suit the grid, the interface, or their units."""
+        """Warn about fields that do not suit the grid, the interface or their units."""
         for member in self.random.members:
             member.warn_if_inaccurate(self.problem.interface)
             for name, field in member.properties.items():
@@ -165,27 +165,28 @@ class Experiment:
             )  # fmt: skip
 
     def draws(self, first: int, count: int) -> Array:
-        """Return standard normal draws (count, dimension) of samples from `first` on."""
+        """Return standard normal draws (count, dimension), beginning with sample `first`."""
         return self.random.draws(self.problem.interface, count, self.seed, first)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
-        """Return the profiles of draws by name, (samples, *shape) each, in SI."""
+        """Return the profiles (samples, *shape) of draws by name, in SI."""
         profiles = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, profiles)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
-        """Solve profiles by name, (samples, *shape) each."""
+        """Solve profiles (samples, *shape), given by name."""
         return dict(self.prepare()(self.sample(profiles)))
 
     def sample(self, profiles: Mapping[str, Array]) -> Sample:
         """Return profiles by name as a sample, or raise an `InputError` if it does not fit.
 
-        `check_fields` has checked the resolution and nodes that do not weaken.
+        The resolution, and nodes that do not weaken, are checked before, by
+        `check_fields`.
         """
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
-        """Return profiles and results of draws, each draw with the constants of its interface."""
+        """Return profiles and results of draws. Each draw uses the constants of its interface."""
         constants = getattr(self.random, "constants", ())
         if not constants:
             profiles = self.profiles(draws)
@@ -208,17 +209,17 @@ class Experiment:
         return profiles, values
 
     def prepare(self) -> Solver:
-        """Return the prepared solver of the method. The next call uses it again."""
+        """Return the prepared solver of the method. The next call reuses the solver."""
         return _solver(self.problem, self.method)
 
     def results(self, first: int, count: int) -> Values:
-        """Return all `variables` of samples from `first` on, solved without threads."""
+        """Return all `variables` for samples that begin with `first`, solved without threads."""
         profiles, values = self.solve(self.draws(first, count))
         return values | {name: profiles[name] for name in self.keep}
 
     @property
     def batch(self) -> int:
-        """Number of samples to solve at once, by the method, and on planes by memory."""
+        """Number of samples to solve at once. The method sets it. On planes, memory limits it."""
         interface, size = self.problem.interface, batch_size(self.problem, self.method)
         if not interface.is_plane:  # a part of a block of draws costs as much as the block
             return size
@@ -226,7 +227,7 @@ class Experiment:
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
-        """Cut samples from `first` on into (first, count) at multiples of a size."""
+        """Divide samples, beginning with `first`, into (first, count) at multiples of a size."""
         size, end = size or self.batch, first + count
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))
@@ -237,7 +238,7 @@ _solver = lru_cache(maxsize=8)(prepared)
 
 @model(kw_only=True)
 class Ensemble:
-    """Number of samples, seed, and profiles to keep.
+    """The number of samples, the seed, and the profiles to keep.
 
     Parameters
     ----------
@@ -248,8 +249,8 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        Random fields whose profiles are kept, such as ``"strength"``. Options of the
-        method keep others, such as ``slip=True`` of `Equilibrium`.
+        Random fields whose profiles are kept, such as ``"strength"``. Other profiles
+        are kept by options of the method, such as ``slip=True`` in `Equilibrium`.
 
     Examples
     --------

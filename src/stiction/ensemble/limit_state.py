@@ -39,11 +39,11 @@ MIN_THREAD_SECONDS = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LimitState:
-    """Stress at onset as a function of draws, see `stiction.external.limit_state`.
+    """Stress at onset as a function of draws. See `stiction.external.limit_state`.
 
-    Stresses may be taken per normal pressure. If the pressure is random, each stress is
-    multiplied by the mean pressure over the pressure of its sample, so that one number
-    stands for a friction coefficient.
+    Stresses may be taken relative to the normal pressure. If the pressure is random,
+    each stress is multiplied by the mean pressure over the pressure of its sample. A
+    given stress then corresponds to a given friction coefficient.
     """
 
     experiment: Experiment
@@ -58,7 +58,7 @@ class LimitState:
 
     @property
     def dimension(self) -> int:
-        """Number of draws of a sample."""
+        """Number of draws in a sample."""
         return self.experiment.dimension
 
     @property
@@ -67,27 +67,27 @@ class LimitState:
         return self.per_pressure and "normal_pressure" in self.experiment.random.varying
 
     def by(self, method: Any) -> Self:
-        """Return the same limit state by another method."""
+        """Return the same limit state with a different method."""
         return replace(self, experiment=self.experiment.by(method))
 
     def draws(self, seed: int, first: int, samples: int) -> Array:
-        """Return the draws of `stiction.monte_carlo`, (samples, dimension)."""
+        """Return the draws (samples, dimension) that `stiction.monte_carlo` uses."""
         return self.experiment.with_seed(seed).draws(first, samples)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the equally likely interface of each sample, (samples,)."""
+        """Return, for each sample, the number of its equally likely interface."""
         members: NDArray[np.int64] = self.experiment.random.member(draws)
         return members
 
     def profiles(self, draws: Array) -> dict[str, Array]:
-        """Return sampled profiles by name, each of shape (samples, *shape)."""
+        """Return sampled profiles by name, each with shape (samples, *shape)."""
         return self.experiment.profiles(draws)
 
     def __call__(self, draws: Array) -> Array:
-        """Return the stress at onset, Pa, of draws (samples, dimension) or (dimension,).
+        """Return the stress at onset, Pa, for draws (samples, dimension) or (dimension,).
 
-        It is infinite if the event does not happen, because such a sample survives any
-        stress.
+        The stress is infinite if the event does not happen, because such a sample
+        survives any stress.
         """
         given, experiment = check("draws", draws, Numbers), self.experiment
         if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
@@ -129,7 +129,7 @@ class LimitState:
 
     @property
     def is_sample(self) -> bool:
-        """Whether these interfaces are a sample of all interfaces that may be true."""
+        """Whether these interfaces are only a sample of the interfaces that may be true."""
         return self.several and not self.experiment.random.complete
 
     @property
@@ -139,11 +139,11 @@ class LimitState:
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Stresses below and above which no sample slides, Pa. Infinite if unknown."""
+        """Bounds, Pa, of the stress at which any sample slides. Infinite if unknown."""
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
-        """Return bounds for all samples but a negligible share."""
+        """Return bounds that hold for all samples except a negligible share."""
         lows, highs = zip(*self.bounds_of_members(negligible), strict=True)
         return min(lows), max(highs)
 
@@ -157,9 +157,9 @@ class LimitState:
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
         """Return bounds for one interface.
 
-        With p the load profile, tau_p the strength and tau_0 the initial stress, the
-        first node fails at the load min((tau_p - tau_0)/p). The lower bound is its mean
-        stress.
+        With the load profile p, the strength tau_p and the initial stress tau_0, the
+        first node fails at the load min((tau_p - tau_0)/p). The lower bound is the
+        mean stress at this load.
         """
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
@@ -185,11 +185,11 @@ class LimitState:
 
 
 def weakest_first(state: LimitState) -> LimitState:
-    """Return the same limit state with equally likely interfaces in order, the weakest first.
+    """Return the same limit state, with equally likely interfaces sorted, the weakest first.
 
-    Neighbours are then alike, and a chain that goes down moves from one to the next. The
-    order follows a low quantile of the same few samples of each interface, by the first
-    stage if it applies.
+    Neighbours are then alike, and a chain moves from one interface to the next as it
+    goes down. The order is the order of a low quantile of a few samples, which are
+    the same for each interface. The first stage solves them if it applies.
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
@@ -210,7 +210,7 @@ def weakest_first(state: LimitState) -> LimitState:
 
 
 def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
-    """Return whether the onset is proportional to the strength, see `inference.scaling`."""
+    """Return whether the onset is proportional to the strength. See `inference.scaling`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales
@@ -225,7 +225,7 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
 
 
 def no_single_length(problem: Problem, random: Any) -> str | None:
-    """Return the reason why the local criterion does not hold, or None."""
+    """Return the reason why the local criterion cannot be used, or None."""
     rate = problem.uniform_rate
     if not problem.friction.linear:
         return "strength does not fall linearly with slip"
@@ -250,7 +250,7 @@ def limit_state(
     event: StressName = "critical_stress",
     workers: Count | None = None,
 ) -> LimitState:
-    """Return the stress at onset as a function of standard normal draws.
+    """Make a function that maps standard normal draws to the stress at onset.
 
     External reliability codes can call it. Failure below a stress s is
     ``limit_state(draws) < s``.
@@ -265,10 +265,10 @@ def limit_state(
     Returns
     -------
     LimitState
-        A callable that maps independent standard normal draws, of shape (samples,
-        `dimension`), to stresses, Pa, of shape (samples,). `draws(seed, first,
-        samples)` returns the draws of `monte_carlo`, and `profiles(draws)` their
-        profiles.
+        A callable that maps independent standard normal draws with shape (samples,
+        `dimension`) to stresses, Pa, with shape (samples,). `draws(seed, first,
+        samples)` returns the draws that `monte_carlo` uses. `profiles(draws)` returns
+        their profiles.
 
     Raises
     ------

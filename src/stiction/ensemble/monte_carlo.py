@@ -1,4 +1,4 @@
-"""An ensemble of random interfaces: the public function, and the loop over its samples."""
+"""An ensemble of random interfaces: the public function and the loop over samples."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ MAX_FAILED_FROM_START = 16
 
 
 def check_fields(points: Sequence[Experiment]) -> None:
-    """Warn once of each field that does not suit the grid, the interface or its unit."""
+    """Warn once about each field that does not suit the grid, the interface or its unit."""
     with merge_warnings():
         for point in distinct(points, "random", "problem"):
             point.check_fields()
 
 
 def check_run(points: Sequence[Experiment]) -> None:
-    """Check a run before its first sample: fields, and the preparation of the method."""
+    """Check the fields, and prepare the method, before the first sample of a run."""
     check_fields(points)
     points[0].prepare()  # in this thread, so that it warns at the line of the caller
 
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
-    """Warn of an ensemble that takes hours before it begins."""
+    """Warn, before it begins, about an ensemble that takes hours."""
     counts = missing.sum(axis=1)
     seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
     if seconds > LONG_RUN_SECONDS:
@@ -84,10 +84,11 @@ def complete(
     executor: Executor | None,
     workers: int,
 ) -> None:
-    """Compute spans of items, and hand each table to memory and to the store when it is done.
+    """Compute spans of items, and pass each finished table to memory and to the store.
 
-    `items` takes tables (`add`), and marks what is `done`, (points, items). `solve` returns
-    the table of a span of a point. Equal warnings of several tables are issued once.
+    `items` accepts tables (`add`) and marks finished items in `done`, with shape
+    (points, items). `solve` returns the table for a span at a point. Warnings that
+    several tables share are issued once.
     """
     lost, total = 0, sum(span.samples for span in spans)
     with ExitStack() as stack:
@@ -122,10 +123,11 @@ def gather(
     progress: Show = True,
     pilot: bool = True,
 ) -> xr.Dataset:
-    """Compute an ensemble at every point of a sweep, or the part of it that is not stored.
+    """Compute an ensemble at every point of a sweep. Stored samples are not computed again.
 
-    Samples go to the `store` when they are done. `elsewhere`, (points, samples), marks
-    samples that another job computes. See `monte_carlo` for the other arguments.
+    Finished samples go to the `store`. `elsewhere`, with shape (points, samples),
+    marks samples that a different job computes. See `monte_carlo` for the other
+    arguments.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     if store:
@@ -178,45 +180,45 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
 
-    Sample i depends on (seed, i) only, not on the number of samples, the workers
-    or the executor.
+    Sample i depends only on (seed, i), not on the number of samples, the workers or
+    the executor.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties. A field alone is the peak strength, Pa. The members
-        of a list are equally likely, and every sample has one of them.
+        The random properties. A field alone is the peak strength, Pa. The members of
+        a list are equally likely, and every sample uses one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
         As in `Ensemble`. To see the profiles of a few samples, repeat them: a
         call with the same seed and fewer samples gives the same samples.
     workers : int, optional
-        Threads, by default all cores. The compiled kernels release the
-        interpreter lock.
+        Number of threads, by default one for each core. The compiled kernels release
+        the interpreter lock.
     executor : concurrent.futures.Executor, optional
-        Any object with `submit` instead of threads, such as a process pool or a Dask
-        executor.
+        Any object with a method `submit`, such as a process pool or a Dask executor.
+        It replaces the threads.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable gets
+        True shows progress on standard error after a second. A callable receives
         (done, total).
     pilot : bool
         Whether to check an approximate method with the first samples (32 on a
         line, 8 on a plane) and the weakest of the first thousand. If a quick test
-        leaves a doubt, they are also solved by `Equilibrium`, and the difference
-        is reported. The ensemble stays the same.
+        leaves a doubt, `Equilibrium` also solves these samples, and the difference is
+        reported. The ensemble does not change.
 
     Returns
     -------
     xarray.Dataset
         Results of `onset` over 'sample'. The attributes contain the version, the
-        study as JSON and the seed, so that it can be run again. Samples that
-        could not be solved are NaN. The attribute 'failed_samples' lists them
-        (point, sample, seed, message, whether the sample itself does not fit). If
-        the pilot compared, 'pilot_bias' and 'pilot_scatter' are mean and standard
-        deviation of the difference in `critical_stress`, relative to the mean by
-        `Equilibrium`, and 'pilot_weakest_bias' and 'pilot_weakest_scatter' of the
-        weakest samples.
+        study as JSON and the seed, so that the ensemble can be computed again.
+        Samples that could not be solved are NaN. The attribute 'failed_samples' lists
+        them (point, sample, seed, message, whether the sample does not fit the
+        problem). If the pilot solved samples with `Equilibrium`, 'pilot_bias' and
+        'pilot_scatter' are the mean and the standard deviation of the difference in
+        `critical_stress`, relative to the mean from `Equilibrium`. For the weakest
+        samples, these values are 'pilot_weakest_bias' and 'pilot_weakest_scatter'.
 
     Raises
     ------
@@ -242,8 +244,8 @@ def monte_carlo(
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
 
-    A table for pandas has a row for each sample. Kept profiles have a table of
-    their own, ``found[["strength"]].to_dataframe()``, with a row for each node.
+    A table for pandas has a row for each sample. Kept profiles have a separate table,
+    ``found[["strength"]].to_dataframe()``, with a row for each node.
 
     >>> len(found.drop_dims("x", errors="ignore").to_dataframe())
     50

@@ -1,15 +1,16 @@
-"""A pilot: some samples of an approximate method solved by its exact counterpart, too.
+"""A pilot: solve some samples of an approximate method also with its exact counterpart.
 
-Problem. How far are onsets by an approximate method, such as the local criterion,
-from the exact onsets of the same samples?
+Problem. How much do the onsets from an approximate method, such as the local
+criterion, differ from the exact onsets of the same samples?
 
 Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
 
-1. Take the first samples, and the weakest among the first `MAX_RANKED_SAMPLES`.
-2. Ask the method by a quick test whether they may differ from the exact onset. If not,
-   stop.
-3. Solve them exactly. The difference, over the mean of the exact onset, has a mean (bias)
-   and a standard deviation (scatter). Take the largest values of all points.
+1. Select the first samples, and the weakest among the first `MAX_RANKED_SAMPLES`.
+2. Test quickly, with the method, whether their onsets may differ from the exact
+   onsets. If not, stop.
+3. Solve these samples exactly. The difference divided by the mean exact onset has a
+   mean (bias) and a standard deviation (scatter). Report the largest values over
+   all points.
 """
 
 from collections.abc import Mapping, Sequence
@@ -42,9 +43,10 @@ def compare(
     show: bool = False,
     workers: int | None = None,
 ) -> dict[str, Any]:
-    """Return bias and scatter of an approximate method for the first and the weakest samples.
+    """Return the bias and scatter of an approximate method for the first and weakest samples.
 
-    The result is empty if there is no exact counterpart, or no doubt at any point.
+    The result is empty if there is no exact counterpart, or if no point leaves a
+    doubt.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
@@ -66,7 +68,7 @@ def compare(
 def _differences(
     experiment: Experiment, first: int, most: int, workers: int
 ) -> dict[str, Array]:
-    """Return the differences to the exact onset over its mean, by kind of samples.
+    """Return differences from the exact onset over its mean, for the first and weakest samples.
 
     The result is empty without an exact counterpart, or if the quick test leaves no doubt.
     """
@@ -101,7 +103,7 @@ def _differences(
 
 
 def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> Array:
-    """Return the stress at onset of each row of draws, NaN if it cannot be solved."""
+    """Return the stress at onset for each row of draws, or NaN if it cannot be solved."""
 
     def solve(rows: Array) -> Array:
         try:
@@ -118,7 +120,7 @@ def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> A
 def pilot_doubt(
     experiment: Experiment, comparison: Mapping[str, Any], where: str = ""
 ) -> str | None:
-    """Return the text of a warning if a difference is beyond 1 %."""
+    """Return a warning if a difference exceeds 1 %."""
     differences = {
         f"the {comparison[f'{name}_samples']} {text}{where}": (
             comparison[f"{name}_bias"], comparison[f"{name}_scatter"]

@@ -1,17 +1,18 @@
 """The store: a folder of self-describing chunks.
 
-Problem. Many processes write samples to a folder, and any of them may be killed
-at any moment. No sample may be lost once it is written, and damage must be found.
+Problem. Many processes write samples to a folder, and any process may be killed at
+any moment. A written sample must not be lost, and damage must be detected.
 
 Solution. ``study.json`` identifies the study, and ``chunks/`` holds the samples.
-A chunk is a table of samples with a mark of its study, and its name is a digest
-of its content. Chunks are written whole or not at all, they never change, and no
-file lists them.
+A chunk is a table of samples with a mark that identifies its study. The name of a
+chunk is a digest of its content. A chunk is written completely or not at all.
+Chunks never change, and no file lists them.
 
-Limits. A digest finds damage, but not forgery, because whoever can write to a folder can
-write other numbers with a new digest. A folder may come from a stranger. Links, pipes,
-devices and folders in place of its files are an `InputError`. Content that does not fit
-the study counts as damage, with any digest.
+Limits. A digest reveals damage, but not forgery, because anyone who can write to
+the folder can write other numbers with a new digest. A folder may come from a
+stranger. If a link, a pipe, a device or a folder stands in place of a file, an
+`InputError` is raised. Content that does not fit the study counts as damage, even
+if the digest fits.
 """
 
 from __future__ import annotations
@@ -56,24 +57,24 @@ MAX_JSON_BYTES = 64 * 2**20
 
 
 class Damaged(StoreError):
-    """A stored file is missing or damaged. The message says how."""
+    """Error for a stored file that is missing or damaged. The message describes the damage."""
 
 
 class Rows(Protocol):
     """Samples in memory that a store fills."""
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot belong to this study, or '' if it can."""
+        """Return the reason why a table cannot belong to this study, or ''."""
 
     def add(self, table: Table) -> None:
-        """Take a table that fits."""
+        """Add a table that fits."""
 
 
 class Store:
-    """The folder of a run with the samples of a study, which is given in plain form.
+    """The folder of a run. It holds the samples of a study, which is given in plain form.
 
-    After reading, `damage` has the defects of damaged chunks by name. `seconds` (of one
-    core) and `versions` belong to the intact chunks.
+    After reading, `damage` holds the defects of damaged chunks by name. `seconds` (on
+    one core) and `versions` describe the intact chunks.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
@@ -87,7 +88,7 @@ class Store:
 
     @classmethod
     def open(cls, path: Path, study: dict[str, Any]) -> Store:
-        """Open a folder for writing. It is new, or holds the same study."""
+        """Open a folder for writing. The folder is new or holds the same study."""
         try:
             path.mkdir(parents=True, exist_ok=True)
             names = {name for name in os.listdir(path) if not name.endswith(PART)}
@@ -114,9 +115,10 @@ class Store:
         return store
 
     def read_into(self, rows: Rows) -> None:
-        """Hand over the intact chunks, and put the defects of the others into `damage`.
+        """Pass on the intact chunks, and record the defects of damaged chunks in `damage`.
 
-        A file that exists but cannot be read may be intact. It raises a `StoreError`.
+        A file that exists but cannot be read may be intact. Such a file raises a
+        `StoreError`.
         """
         self.damage, self.seconds, self.versions = {}, [], {}
         for name, table in self._tables():
@@ -153,7 +155,7 @@ class Store:
             yield name, table
 
     def resume(self, rows: Rows) -> None:
-        """Hand over the stored samples, warn of other versions, and delete damaged chunks."""
+        """Pass on the stored samples, warn about different versions, and delete damaged chunks."""
         self.read_into(rows)
         for name, text in self.damage.items():
             self.warn(f"{CHUNKS}/{name}: {text}. Its samples are computed again")
@@ -177,14 +179,14 @@ class Store:
         _write_json(self.path / PILOT_FILE, attributes)
 
     def add(self, table: Table) -> None:
-        """Take a table, and store all taken tables if they are large or it is time."""
+        """Collect a table. Store the collected tables if they are large or it is time."""
         self._taken.append(table)
         size = sum(table.rows.nbytes for table in self._taken)
         if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
 
     def save(self) -> None:
-        """Store the taken tables as a chunk for each set of variables."""
+        """Store the collected tables, as a chunk for each set of variables."""
         _check_folder(self.path / CHUNKS)
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
@@ -201,7 +203,7 @@ class Store:
 
 
 def digest(data: bytes) -> str:
-    """Return the first half of the SHA-256 in hexadecimal."""
+    """Return the first half of the SHA-256 digest in hexadecimal."""
     return hashlib.sha256(data).hexdigest()[:32]
 
 
@@ -212,7 +214,7 @@ def _check_folder(folder: Path) -> None:
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:
-    """Return the mark and the table of a chunk. Other content raises one of several errors."""
+    """Return the mark and the table of a chunk. Raise one of several errors for other content."""
     arrays = arrays_in(data)
     mark, made_by, seconds, failed = json.loads(arrays["about"].tobytes())
     failures = tuple(Failure(*one) for one in failed)
@@ -248,7 +250,7 @@ def _read(file: Path, max_bytes: int) -> bytes:
 
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON with its format and a digest, whole or not at all."""
+    """Write JSON with its format and a digest, completely or not at all."""
     body = {"format": FORMAT, "content": content}
     sealed = body | {"digest": digest(json.dumps(body, sort_keys=True).encode())}
     write_whole(file, json.dumps(sealed, indent=1).encode())
@@ -282,14 +284,14 @@ def read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all of a study but its title and number of samples. It identifies a run."""
+    """Return a study without title and number of samples. The result identifies a run."""
     ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
     rest = {key: value for key, value in study.items() if key != "title"}
     return rest | {"ensemble": ensemble}
 
 
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
-    """Refuse a study that differs from the stored one in more than additional samples."""
+    """Refuse a study that differs from the stored study, except by additional samples."""
     now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
@@ -302,7 +304,7 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
 
 
 def _differences(here: Any, there: Any, path: str = "") -> list[str]:
-    """Return each difference of two studies with its key and both values."""
+    """Return the differences between two studies, each with its key and both values."""
     if isinstance(here, list) and isinstance(there, list):
         here, there = dict(enumerate(here)), dict(enumerate(there))
     if isinstance(here, Mapping) and isinstance(there, Mapping):

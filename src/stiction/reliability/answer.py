@@ -70,7 +70,7 @@ class Estimate:
 
     @cached_property
     def members_cv(self) -> float:
-        """Part of `cv` by the list of interfaces, 0 for a single interface and for a mixture."""
+        """Part of `cv` due to the list of interfaces. 0 for a single interface or a mixture."""
         if not self.state.is_sample:
             return 0.0
         return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
