@@ -79,7 +79,8 @@ class Solid:
         speed = self.shear_wave_speed
         dense, (slowest, fastest) = self.density > SOFT_DENSITY, POSSIBLE_SPEED
         text = (
-            f"solid: the shear wave speed is {speed:.4g} m/s, which no {'dense ' * dense}solid has;"
+            f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has"
+            f"{' at such a density' * dense};"
             f" check the units of shear_modulus = {self.shear_modulus:g} Pa and density ="
             f" {self.density:g} kg/m3"
         )

@@ -261,6 +261,17 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
         If the result has no events. An `AccuracyWarning` says if samples have
         more events than it keeps.
 
+    Notes
+    -----
+    Moment, fracture energy, and the stress drops by slip and by energy refer to all
+    slip that an event adds. Length or area, mean slip and the area stress drop refer
+    to the patch around the largest slip.
+
+    The event of a `Rupture` ends when the interface is calm. Slow slip after
+    `event_duration`, which the load drives, counts too: on a plane it was 8 % of a
+    moment. An instability in which no node reaches dynamic slip rates is no event. A
+    run at rest can therefore have a `critical_stress` and no row.
+
     Examples
     --------
     >>> import stiction as st
