@@ -1,4 +1,4 @@
-"""From measurements to random fields: fits of profiles, parameters from peaks, designs of tests.
+"""Fit random fields to profiles, infer parameters from peaks, and design tests.
 
 Profiles: begin with `fit` and `estimate`. Then read `records` and `window`
 (measured values), `whittle` (their likelihood), `marginal_fit`, `bootstrap`

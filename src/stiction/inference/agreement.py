@@ -1,16 +1,17 @@
-"""Whether measured peaks agree with a prediction: tests whose p-values hold for few peaks.
+"""Test whether measured peaks agree with a prediction. The p-values also hold for few peaks.
 
 Problem. n peaks have the empirical distribution F_n. The prediction has the
 distribution F, given by a sample or by a posterior. Find the probability that n
-peaks from F lie as far from F as the measured peaks, for two distances:
+peaks drawn from F are at least as far from F as the measured peaks, for two
+distances:
 
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
 
-Sources. Permutation tests and their p-value (1 + number as far)/(1 + replicates)
-are in Davison and Hinkley, Bootstrap Methods and their Application (1997),
-sections 4.2 and 4.3. The sum for W^2 is in Anderson and Darling (1952), Annals of
-Mathematical Statistics 23, 193.
+Sources. Permutation tests, and their p-value (1 + number as far)/(1 + replicates),
+are described by Davison and Hinkley, Bootstrap Methods and their Application
+(1997), sections 4.2 and 4.3. The sum for W^2 is given by Anderson and Darling
+(1952), Annals of Mathematical Statistics 23, 193.
 
 Steps for a predicted sample:
 
@@ -18,18 +19,19 @@ Steps for a predicted sample:
    together is equally likely. This is exact for any numbers of values, and for
    equal values. F is then the distribution of the remaining values, and the
    integral is over all values.
-2. Choose n values at random, and compute both distances between them and the remaining
-   values.
-3. The p-value is the share of choices that are at least as far apart as the measured
-   choice.
+2. Choose n values at random, and compute both distances between these and the
+   remaining values.
+3. The p-value is the share of choices whose distance is at least the distance of
+   the measured values.
 
 Steps for a posterior. The peaks of one campaign share the unknown parameters.
 
 4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of the posterior.
-5. Draw each simulated campaign from one of these distributions. Take distances from their
-   mean. Campaigns with several kinds of specimens add W^2 and take the largest D.
-6. The p-value is the share of campaigns that are at least as far away as the measured
-   campaign.
+5. Draw each simulated campaign from one of these distributions, and compute its
+   distances from their mean. If a campaign has several kinds of specimens, add W^2
+   over the kinds and take the largest D.
+6. The p-value is the share of campaigns whose distance is at least the distance of
+   the measured campaign.
 """
 
 from collections.abc import Mapping
@@ -64,7 +66,7 @@ PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the 
 
 
 class Predicted(NamedTuple):
-    """Predicted distribution function of the peaks, for one kind of specimen."""
+    """Predicted distribution function of peaks, for one kind of specimen."""
 
     values: Array  # rising, in the unit of the peaks
     share: Array  # share of peaks up to each value
@@ -72,28 +74,28 @@ class Predicted(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Agreement(Result):
-    """Distances between measured and predicted peaks, and how often chance exceeds them.
+    """Distances between measured and predicted peaks, with their p-values.
 
     Attributes
     ----------
     peaks : Peaks
         The measured peaks.
     cramer_von_mises, largest_deviation : float
-        Both distances. W^2 sums the squared differences between measured and
-        predicted shares over the tests. The largest difference is multiplied by
+        The two distances. W^2 is the sum over the tests of the squared differences
+        between measured and predicted shares. The largest difference is multiplied by
         the square root of the number of tests.
     p_values : dict of str to float
-        Probability of a distance at least as large if the prediction is right, by the
-        names of the two distances.
+        For each distance, by name: the probability of a distance at least as large if
+        the prediction is right.
     predicted : tuple of (values, share)
         Predicted distribution function for each kind of specimen.
     band : float
-        Largest deviation that 90 % of campaigns do not exceed.
+        The largest deviation stays below this value in 90 % of campaigns.
     precursors : dict of str to (measured, predicted) arrays
-        Given if curves were compared, one value for each test: ``number`` of
-        precursors, ``size`` (N or Pa) of the largest precursor or 0, and
-        ``first_load``, the force at the first precursor or else the peak.
-        `p_values` has these names too.
+        Given if curves were compared. For each test there is the ``number`` of
+        precursors, the ``size`` (N or Pa) of the largest precursor, or 0, and
+        ``first_load``, the force at the first precursor, or else the peak. `p_values`
+        also has these names.
     """
 
     peaks: Peaks
@@ -106,7 +108,7 @@ class Agreement(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Doubts: that the peaks contradict the prediction."""
+        """Doubts, if the peaks contradict the prediction."""
         p = min(self.p_values.values())
         text = (
             f"the peaks contradict the prediction, p = {p:.2g} of their agreement. Check units,"
@@ -141,23 +143,23 @@ def agreement(
     """Test whether measured peaks agree with a prediction.
 
     The test compares distributions, so the order of the tests does not count. If
-    peaks drift, remove the trend first, ``peaks - np.polyval(np.polyfit(time,
-    peaks, 1), time) + peaks.mean()``, and report that you did.
+    peaks drift, first remove the trend, ``peaks - np.polyval(np.polyfit(time, peaks,
+    1), time) + peaks.mean()``, and report this correction.
 
     Parameters
     ----------
     prediction : Dataset or Posterior
-        Result of `stiction.monte_carlo`, or of `stiction.infer`, whose
-        uncertainty then counts. It must not have been fitted to these peaks.
+        Result of `stiction.monte_carlo` or `stiction.infer`. The test includes the
+        uncertainty of a posterior. The prediction must not have been fitted to these
+        peaks.
     peaks : array, mapping of arrays, Peaks or Curves
-        As in `stiction.infer`. Precursors are compared too if curves are given
-        and the prediction has events, such as the events of
-        ``Equilibrium(events=20)``.
+        As in `stiction.infer`. If curves are given and the prediction has events, for
+        example from ``Equilibrium(events=20)``, precursors are also compared.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
-        Standard deviation of the error of a peak, for a dataset. A posterior has
-        its own.
+        Standard deviation of the error of a peak. Needed for a dataset only, because
+        a posterior contains its load-cell error.
     replicates : int
         Number of simulated campaigns. A p-value is at least 1/(replicates + 1).
     seed : int
@@ -171,10 +173,10 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the measured quantity, is a sweep, or has one kind
-        of specimen although several were tested. If peaks differ from the
-        prediction by a factor of fifty. If the posterior was fitted to these
-        peaks, because it then lies near them.
+        If the prediction lacks the measured quantity, is a sweep, or has one kind of
+        specimen although several kinds were tested. Also if peaks differ from the
+        prediction by a factor of fifty, or if the posterior was fitted to these
+        peaks.
 
     Warns
     -----
@@ -183,9 +185,9 @@ def agreement(
 
     Notes
     -----
-    A p-value of 0.3 means that three of ten campaigns with as many tests would lie as far
-    from a right prediction. It does not mean that the prediction is right. Few tests find
-    only gross errors.
+    A p-value of 0.3 means: if the prediction is right, three of ten campaigns with as
+    many tests differ from it at least as much. It does not mean that the prediction
+    is right. With few tests, only large errors are found.
 
     Examples
     --------
@@ -224,11 +226,11 @@ def agreement(
 
 
 def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
-    """Return number, largest size and first load of precursors, measured and predicted.
+    """Return the number, largest size and first load of precursors, measured and predicted.
 
-    Both follow from the force before and after each event, with the largest threshold of
-    the tests. A smaller drop does not count, because the load cell would not tell it from
-    noise.
+    Predicted drops follow from the force before and after each event. Drops below the
+    largest threshold of the tests do not count, because a load cell could not
+    distinguish them from noise.
     """
     names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
     event, peak = names.get(curves.unit, ("", ""))
@@ -280,7 +282,7 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
 
 
 def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
-    """Return both distances of the measured and of random choices, (1 + replicates, 2)."""
+    """Return both distances, for the measured choice and random choices (1 + replicates, 2)."""
     at, place, counts = np.unique(
         np.concatenate([peaks, values]), return_inverse=True, return_counts=True
     )
@@ -332,7 +334,7 @@ def _with_posterior(
 
 
 def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
-    """Return peaks, and the share of peaks up to each at parameters u, (points, LAW_VALUES)."""
+    """Return peaks (points, LAW_VALUES) at parameters u, and the share of peaks up to each."""
     ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
     margin = RANGE_MARGIN * (high - low)
@@ -344,7 +346,7 @@ def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array
 
 
 def _distances(share: Array) -> tuple[Array, Array]:
-    """Return W^2 and D of sorted uniform numbers, (campaigns, tests)."""
+    """Return W^2 and D for sorted uniform numbers (campaigns, tests)."""
     size = share.shape[1]
     steps = np.arange(size + 1) / size
     squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1 / (12 * size)
@@ -353,13 +355,13 @@ def _distances(share: Array) -> tuple[Array, Array]:
 
 
 def _p_values(distances: Array) -> list[float]:
-    """Return the share of rows whose distances are at least the distances of the first row."""
+    """Return the share of rows with distances that are at least the distances in the first row."""
     as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
     return ((1 + as_far) / len(distances)).tolist()
 
 
 def _summary(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
-    """Return the agreement from distances (1 + replicates, 2), the measured ones first."""
+    """Return the agreement from distances (1 + replicates, 2). Measured distances come first."""
     observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")
     return Agreement(

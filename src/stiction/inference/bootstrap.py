@@ -1,8 +1,8 @@
-"""Intervals of a fit, and fields as likely as the fit, from fits to simulated records.
+"""Intervals for a fit, and fields as likely as the fit, from fits to simulated records.
 
-Problem. A fit estimates parameters theta from records. Find intervals that
-contain the true theta with a given probability, and fields that are as likely as
-the estimate.
+Problem. A fit estimates parameters theta from records. Find intervals that contain
+the true theta with a given probability. Also find fields that are as likely as the
+estimate.
 
 Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their
 Application (1997), section 5.2. Ends by test inversion: Carpenter (1999), Journal
@@ -10,22 +10,24 @@ of the Royal Statistical Society B 61, 159.
 
 Steps:
 
-1. Simulate records from the estimate, and fit each of them from the estimate as a start.
-2. Bring each parameter to a scale on which its error is about normal (`Scale`).
-3. The error of a repetition is (estimate of the repetition - estimate)/width. The width
-   is in proportion to the square root of the correlation length, because a record
-   holds few of these.
+1. Simulate records from the estimate, and fit them. Each fit starts from the
+   estimate.
+2. Transform each parameter to a scale on which its error is about normal (`Scale`).
+3. The error of a repetition is (estimate of the repetition - estimate)/width. The
+   width is proportional to the square root of the correlation length, because a
+   record contains only few correlation lengths.
 4. Subtract the quantiles of the error, times the width, from the estimate: a first
    interval.
 5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its
    first interval. Take the upper end of each interval from the field with the longer
    length, and the lower end from the other field. Exchange them for parameters whose
    estimates fall with the correlation length.
-6. Bounds of the marginal end outside of the values, and other parameters at their ranges.
-7. A likely field is the estimate less the error of one repetition, times the width.
+6. Limit the intervals: bounds of the marginal lie outside the values, and other
+   parameters lie within their ranges.
+7. A likely field is the estimate minus the error of one repetition times the width.
 
-Departures. One step of the inversion is made, with the correlation length for all
-parameters.
+Departures. Only one step of the inversion is made, and the correlation length is
+varied for all parameters.
 """
 
 import math
@@ -63,7 +65,7 @@ class Repetitions(NamedTuple):
 
 
 class NotRepeated(InputError):
-    """A family that cannot be fitted to most of the records that are simulated from it."""
+    """Error for a family that cannot be fitted to most records simulated from the family itself."""
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
         super().__init__(
@@ -84,7 +86,7 @@ def bootstrapped(
 ) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
 
-    The second list holds the fits from `further` estimates, with their own numbers of
+    The second list holds fits from `further` estimates, with other numbers of
     repetitions. Records to which the family cannot be fitted are left out.
     """
 
@@ -128,11 +130,11 @@ def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
 
 
 class Scale(NamedTuple):
-    """Scale on which the error of a parameter is about normal: its logarithm, unless `linear`.
+    """Scale on which the error of a parameter is about normal: logarithmic unless `linear`.
 
-    A bound of a marginal is given by the logarithm of its distance from the mean. Noise
-    is given by its variance, which may be negative, because all estimates at zero would
-    have an error of zero.
+    For a bound of a marginal, the scale is the logarithm of the distance from the
+    mean. For noise, it is the variance. The variance may be negative, because
+    estimates cut off at zero would seem to have no error.
     """
 
     name: str
@@ -168,7 +170,7 @@ class Scale(NamedTuple):
         return self.to(fitted.parameters), width
 
     def less(self, fitted: Estimate, repeated: Repetitions) -> Array:
-        """Return an estimate less the error of each repetition (steps 3 and 7)."""
+        """Return the estimate minus the error of each repetition (steps 3 and 7)."""
         at, width = self.of(fitted)
         true = self.to(repeated.truth.parameters)
         refitted = np.array([self.of(fit) for fit in repeated.fits])
@@ -218,7 +220,7 @@ def intervals(
 
 
 def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
-    """Return limits for parameters. Bounds of the marginal lie outside all values."""
+    """Return limits for parameters. Bounds of the marginal must lie outside all values."""
     estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())

@@ -1,19 +1,20 @@
-"""Measured curves of force against travel or time: peak, precursors and plateau of each test.
+"""Measured curves of force against travel or time, with peak, precursors and plateau.
 
-Problem. Readings F_i carry white noise of standard deviation s. Find the peak,
-the drops before it (precursors: a part of the interface slips and comes to rest)
-and the plateau after it.
+Problem. Readings F_i contain white noise with standard deviation s. Find the peak,
+the drops before the peak and the plateau after the peak. The drops are called
+precursors: a part of the interface slips and comes to rest.
 
-Source. The range of white noise is in David and Nagaraja, Order Statistics (2003),
-section 10.5. The choice of thresholds and turning points is our own.
+Source. David and Nagaraja, Order Statistics (2003), section 10.5, give the range of
+white noise. The choice of thresholds and turning points is our own.
 
 Steps:
 
-1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line, and have
-   the variance 6 s^2. Their median gives s, because drops are too rare to change a
-   median. A load cell that reads in steps q has at least s = q/sqrt(12).
-2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n). Only
-   a larger fall is a drop.
+1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line,
+   and noise gives them the variance 6 s^2. Their median yields s, because drops are
+   too rare to change a median. If a load cell reads in steps of q, s is at least
+   q/sqrt(12).
+2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n).
+   Only a larger fall counts as a drop.
 3. Turning points. Keep the highest reading since the last drop. A drop begins at this
    reading when the force lies more than the threshold below it. Then keep the lowest
    reading. The drop ends at this reading when the force lies more than the threshold
@@ -61,7 +62,7 @@ MIN_DROP_SHARE = 1e-6
 
 
 class Drops(NamedTuple):
-    """Falls of the force: travel and force at the beginning, and size of each fall."""
+    """Drops of the force: travel and force at the beginning, and size of each drop."""
 
     travel: Array
     force: Array
@@ -70,7 +71,7 @@ class Drops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve(Result):
-    """The curve of one test with its peak, precursors and plateau.
+    """The curve of one test, with peak, precursors and plateau.
 
     Attributes
     ----------
@@ -133,7 +134,7 @@ class Curve(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curves(Result):
-    """Curves of repeated tests, for `read_peaks`, `infer` and figures."""
+    """Curves from repeated tests, for `read_peaks`, `infer` and figures."""
 
     tests: tuple[Curve, ...]
 
@@ -144,7 +145,7 @@ class Curves(Result):
 
     @property
     def peaks(self) -> Array:
-        """The peak of each test, in `unit`."""
+        """Peak of each test, in `unit`."""
         return np.array([curve.peak for curve in self.tests])
 
     def __len__(self) -> int:
@@ -179,7 +180,7 @@ def read_curve(
     skip: Number = 0,
     sheet: Number | str = 0,
 ) -> Curves:
-    """Read force against travel or time, and find peak, precursors and plateau of each test.
+    """Read force against travel or time. Find the peak, precursors and plateau of each test.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ def read_curve(
 
 
 class Columns(NamedTuple):
-    """Readings of a file in SI, their units, and their line numbers."""
+    """Readings from a file in SI, with units and line numbers."""
 
     travel: Array
     force: Array
@@ -261,7 +262,7 @@ class Columns(NamedTuple):
 
 
 def _tables(source: Any, options: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the name and the table of each file in a folder, or of the only source."""
+    """Yield the name and table of each file in a folder, or of a single source."""
     if isinstance(source, str | Path):
         path = Path(source)
         files = [path]
@@ -296,7 +297,7 @@ def _columns(
     travel_unit: str | None,
     speed: float | None,
 ) -> Columns:
-    """Return the force and the travel of a table, in SI."""
+    """Return force and travel from a table, in SI."""
     if isinstance(table, tuple | list):
         (at, at_unit), (values, value_unit) = (
             with_stated_unit(column, units)
@@ -333,7 +334,7 @@ def _columns(
 def _in_si(
     values: Any, stated: str | None, given: str | None, units: tuple[str, ...], quantity: str
 ) -> tuple[Array, str]:
-    """Return values in SI, and their SI unit, from the unit in the source or of the caller."""
+    """Return values in SI and their SI unit. The source or the caller states the original unit."""
     option = "unit" if quantity == "force" else "travel_unit"
     if stated and given and stated != given:
         raise InputError(f"{option}: is {given!r}, but the source states {stated!r}")

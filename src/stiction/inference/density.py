@@ -1,32 +1,34 @@
-"""Density of a measured peak: the density of the onset, blurred by the load cell.
+"""Density of a measured peak: the density of the onset, convolved with the load-cell error.
 
-Problem. Onsets T_1, ..., T_N were simulated, all of them above the bound b.
-Wanted is the density
+Problem. Onsets T_1, ..., T_N, all above the bound b, were simulated. Compute the
+density
 
     p(y) = int f(T) phi((y - T)/e)/e dT
 
-of a peak y = T + error, with the density f of onsets, the standard deviation e of the
-load cell and the standard normal density phi.
+of a peak y = T + error. Here f is the density of onsets, e the standard deviation
+of the load-cell error, and phi the standard normal density.
 
-Sources. Transformed kernels: Wand, Marron and Ruppert (1991), Journal of the American
-Statistical Association 86, 343. Kernel width: Silverman, Density Estimation (1986),
-section 3.4.2. Kernels that keep the variance: section 6.1.2.
+Sources. Wand, Marron and Ruppert (1991), Journal of the American Statistical
+Association 86, 343, introduced transformed kernels. Silverman, Density Estimation
+(1986), gives the kernel width in section 3.4.2, and kernels that keep the variance
+in section 6.1.2.
 
 Steps:
 
-1. Take v = log(T - b). Where the correlation length is long, many onsets lie just above
-   b, and kernels on T itself would leak below b. Without a bound, take one so far
-   below the onsets that the logarithm is straight.
-2. Standardise v to mean 0 and variance 1. Its density then hardly changes between nodes.
-3. Replace the sorted sample by means of at most `GROUPS` groups, which are smaller in the
-   tails.
-4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres drawn together
-   by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the logarithm in
-   steps of `STEP`.
-5. Interpolate this logarithm between steps and nodes. Beyond the table it falls like a
-   parabola.
-6. Integrate over v by the midpoint rule. It converges faster than any power of the step,
-   once the step is below the narrower of error and density.
+1. Use v = log(T - b). If the correlation length is long, many onsets lie just above
+   b, and kernels on T itself would leak below b. If there is no bound, choose b so
+   far below the onsets that the logarithm is nearly linear.
+2. Standardise v to mean 0 and variance 1. The density of v then hardly changes
+   between nodes.
+3. Replace the sorted sample by the means of at most `GROUPS` groups. Groups are
+   smaller in the tails.
+4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres
+   multiplied by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the
+   logarithm in steps of `STEP`.
+5. Interpolate this logarithm between steps and between nodes. Beyond the table it
+   falls like a parabola.
+6. Integrate over v with the midpoint rule. It converges faster than any power of
+   the step if the step is smaller than the widths of the error and the density.
 """
 
 import math
@@ -50,7 +52,7 @@ ERRORS, SPREADS = 4.0, 6.0
 
 
 class Densities(NamedTuple):
-    """Densities of standardised v at nodes."""
+    """Densities of the standardised v at nodes."""
 
     onsets: Array  # (nodes, samples), of the same samples at every node
     bound: Array  # least possible onset, (nodes,)
@@ -59,20 +61,21 @@ class Densities(NamedTuple):
     table: Array  # logarithms in steps of `STEP` from -`TABLE_REACH`, (nodes, steps)
 
     def standardised(self) -> Array:
-        """Return standardised v of the onsets, (nodes, samples)."""
+        """Return the standardised v for onsets (nodes, samples)."""
         return (to_v(self.onsets, self.bound) - self.mean[:, None]) / self.spread[:, None]
 
     def between(self, index: NDArray[np.int64], weight: Array) -> Array:
-        """Return bound, mean and spread at points, (3, points), by interpolation."""
+        """Return bound, mean and spread, interpolated at points, with shape (3, points)."""
         values = np.stack([self.bound, self.mean, self.spread])
         return np.ascontiguousarray(np.einsum("pc,kpc->kp", weight, values[:, index]))
 
 
 def grouped(ordered: Array) -> tuple[Array, Array]:
-    """Return means and shares of groups of neighbouring sorted values (step 3).
+    """Return the means and shares of groups of neighbouring values, which are sorted (step 3).
 
-    Groups end at equal steps of a normal variable, so that every group of a nearly normal
-    sample is narrow beside the kernel. A value at an end is shared between both groups.
+    Groups end at equal steps of a normal variable, so that every group in a nearly
+    normal sample is narrow compared with the kernel. A value at an end is divided
+    between both groups.
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -88,7 +91,7 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
 
 
 def to_v(onsets: Array, bound: Array) -> Array:
-    """Return v of onsets (nodes, samples) above the bounds (nodes,) (step 1)."""
+    """Return v for onsets (nodes, samples) above the bounds (nodes,) (step 1)."""
     above = onsets - bound[:, None]
     # Round-off may put an onset on its bound.
     return np.log(np.maximum(above, 1e-9 * above.mean(axis=1, keepdims=True)))
@@ -140,7 +143,7 @@ def _with_error(
     near: Any,
     share: Array,
 ) -> float:
-    """Return the logarithm of the density of onset plus error at y (step 6).
+    """Return the log density of onset plus error at y (step 6).
 
     `of_v` holds bound, mean and spread.
     """
@@ -176,10 +179,10 @@ def log_likelihoods(
     peaks: Array,
     out: Array,
 ) -> None:
-    """Write the logarithms of the densities of peaks at points to `out`, (points, peaks), 1/Pa.
+    """Write log densities (1/Pa) of peaks at points to `out`, with shape (points, peaks).
 
-    `of_v` comes from `Densities.between`. `scales` has shift and stretch at points, (2,
-    points).
+    `of_v` comes from `Densities.between`. `scales` holds shift and stretch, with
+    shape (2, points).
     """
     for i in range(index.shape[0]):
         bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]

@@ -1,22 +1,22 @@
-"""Designs of tests: the expected information before any test is made.
+"""Designs of tests: the expected information, before any test is made.
 
-Problem. Parameters theta have a prior. Compute how much a design, such as ten
-tests, is expected to tell about each parameter: the mean over campaigns of the
-divergence of posterior from prior,
+Problem. Parameters theta have a prior. Compute how much information about each
+parameter a design, such as ten tests, is expected to give. It is the mean over
+campaigns of the divergence of the posterior from the prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
-Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, by nested Monte
-Carlo.
+Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, defined this
+information. It is computed by nested Monte Carlo.
 
 Steps, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
-2. Draw the peaks from the same simulated onsets that give the likelihood.
+2. Draw the peaks from the simulated onsets that also give the likelihood.
 3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`).
-   Known parameters keep their drawn values. If the posterior lies between the
-   points of a coarse grid, draw the box closer around the true parameters.
-4. Take the divergence of each marginal posterior. I is the mean over campaigns.
+   Known parameters keep their drawn values. If the posterior lies between the points of
+   a coarse grid, make the box smaller around the true parameters.
+4. Compute the divergence of each marginal posterior. I is the mean over campaigns.
 
 `stiction.inference.widths` answers the same question for a fit or a posterior.
 """
@@ -71,10 +71,10 @@ def design_of_tests(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
-    """Estimate how much each design of tests will tell: narrower intervals, or information.
+    """Estimate how much each design of tests will tell, as information or as narrower intervals.
 
-    If `random` is a fit or a posterior of `infer`, the result holds the expected
-    widths of the intervals of mean and scatter between specimens, and the
+    If `random` is a fit or a posterior from `infer`, the result holds the expected
+    widths of the intervals for the mean and the scatter between specimens, and the
     expected design stress. If a `prior` of other parameters is given, the result
     holds the expected information about each parameter.
 
@@ -87,27 +87,27 @@ def design_of_tests(
         to numbers of tests, or a table ``{"tests": ..., "known": [...]}``, in
         which ``known`` lists parameters of the prior that are known from other
         measurements. For a fit or a posterior, a design is ``{"tests": ...,
-        "profiles": ...}``, with numbers of further tests and profiles. The
-        default is 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
+        "profiles": ...}``, with numbers of further tests and profiles. The default
+        designs are 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
     probability : float
-        Probability of the design stress for a fit or a posterior.
+        Probability for the design stress. Used for a fit or a posterior.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`.
     unit : str
-        Unit of the peaks, as in `infer`. Take "N" if the prior varies the area.
+        Unit of the peaks, as in `infer`. Use "N" if the prior varies the area.
     repetitions : int
-        Simulated campaigns for each design.
+        Number of simulated campaigns for each design.
 
     Returns
     -------
     xarray.Dataset
-        Over 'design' and 'parameter': `information`, the expected divergence of
-        the posterior of a parameter from its prior (nats, NaN if the parameter is
-        known), and its `standard_error`. For a fit or a posterior: `width`, the
-        expected width of the 90 % interval, with its `standard_error`. Then
-        `design_stress` over 'design' is the expected design stress, Pa, and 90 %
-        of the designs will lie between `design_low` and `design_high`. The first
-        design, 'now', stands for the present measurements.
+        Over 'design' and 'parameter': `information` is the expected divergence of the
+        posterior of a parameter from its prior (nats, NaN if the parameter is known),
+        with its `standard_error`. For a fit or a posterior, `width` is instead the
+        expected width of the 90 % interval, with its `standard_error`. Over 'design',
+        `design_stress` is then the expected design stress, Pa, and 90 % of the
+        designs lie between `design_low` and `design_high`. The first design, 'now',
+        stands for the present measurements.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def design_of_tests(
 def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
 ) -> list[tuple[dict[float | None, int], list[int]]]:
-    """Return the numbers of tests by length, m, and the places of the unknown parameters."""
+    """Return the numbers of tests by length (m), and the positions of the unknown parameters."""
     problems = [] if designs else ["designs: must not be empty"]
     plans = []
     for name, design in designs.items():
@@ -213,7 +213,7 @@ def _expected(
     seed: int,
     meter: Meter,
 ) -> Array:
-    """Return the expected information about each parameter and its standard error, (2, ...)."""
+    """Return the expected information about each parameter, and the standard error, as (2, ...)."""
     rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):

@@ -1,30 +1,30 @@
-"""One fit of a marginal, a spectrum and noise to records, and the comparison of families.
+"""Fit a marginal, a spectrum and noise to records, and compare families.
 
-Problem. Values y = v(z) + e were measured along records. z is a Gaussian field with a
-correlation, v a map to a marginal, and e white normal noise. Find the marginal, the
-spectrum and the noise.
+Problem. Values y = v(z) + e were measured along records. Here z is a correlated
+Gaussian field, v maps it to a marginal, and e is white normal noise. Find the
+marginal, the spectrum and the noise.
 
-Sources. Composite likelihood: Varin, Reid and Firth (2011), Statistica Sinica 21,
-5. The criterion of Akaike (1974), IEEE Transactions on Automatic Control 19, 716.
-Steps 3, 5 and 6 are our own.
+Sources. The composite likelihood follows Varin, Reid and Firth (2011), Statistica
+Sinica 21, 5. The criterion is due to Akaike (1974), IEEE Transactions on Automatic
+Control 19, 716. Steps 3, 5 and 6 are our own.
 
 Steps:
 
 1. Fit the marginal to the values, as if they were independent (`marginal_fit`).
 2. Fit spectrum and noise to the periodograms with the map of this marginal (`whittle`).
-   The noise widens the values, so repeat both steps once with the noise that was
-   found.
-3. Widen the marginal by the variance that mean and trend have taken from the values on
-   average.
-4. Score a family by its mean log likelihood times the number of independent values (step
-   5), less the number of estimated parameters.
-5. Families fitted to the same values agree in mean and variance. The logarithm of the
-   ratio of their densities then has Hermite orders of z from 3 on. Its sum over N
-   values with correlations rho_ij has mean and variance of a sum over N^2/sum
-   rho_ij^3 independent values.
-6. If records are of different specimens, scale them as if they came from one specimen
-   (`between`). This needs the field's own share in the scatter of means, so
-   repeat the fit `ROUNDS` times.
+   Noise increases the scatter of the values, so repeat both steps once with the
+   estimated noise.
+3. Increase the variance of the marginal by the amount that removal of the mean and
+   the trend takes from the values on average.
+4. The score of a family is its mean log likelihood times the number of independent
+   values (step 5), minus the number of estimated parameters.
+5. Families fitted to the same values have the same mean and variance. The log ratio
+   of their densities therefore begins with Hermite order 3 in z. For N values with
+   correlations rho_ij, the sum of the log ratios has the mean and variance of a sum
+   over N^2/sum rho_ij^3 independent values.
+6. If records come from different specimens, scale them as if they came from one
+   specimen (`between`). This requires the scatter of means that the field alone
+   causes, so repeat the fit `ROUNDS` times.
 """
 
 import math
@@ -70,7 +70,7 @@ DRAWN = 5.0
 
 @dataclass(frozen=True, eq=False)
 class FitSetting:
-    """Families to fit, and a window for each record. Records of equal geometry share a window."""
+    """Families to fit, and a window for each record, shared by records with the same geometry."""
 
     windows: tuple[RecordWindow, ...]
     marginal: Family
@@ -115,7 +115,7 @@ class Estimate:
         return values
 
     def field(self, quantity: str) -> RandomField:
-        """Return the field to simulate with."""
+        """Return the field for simulations."""
         anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
         of: Any = quantity if quantity == "friction_coefficient" else None
         return RandomField(
@@ -139,7 +139,7 @@ class Estimate:
 
     @property
     def of_means(self) -> Array:
-        """Variance that the field alone gives to the mean of each record."""
+        """Variance that the field alone causes in the mean of each record."""
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         deviation = self.parameters["standard_deviation"]
@@ -147,7 +147,7 @@ class Estimate:
 
     @cached_property
     def within(self) -> Array:
-        """Variance that the field alone gives to the log mean of each record."""
+        """Variance that the field alone causes in the log mean of each record."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     @property
@@ -163,7 +163,7 @@ class Estimate:
 
     @property
     def lengths_held(self) -> float:
-        """Number of correlation lengths, or areas on a plane, in all records together."""
+        """Number of correlation lengths (on planes, correlation areas) in all records together."""
         windows, length = self.setting.windows, self.model.spectrum.correlation_length
         area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
         if windows[0].measured.ndim == 1:
@@ -178,9 +178,9 @@ class Estimate:
 def estimate(
     rows: Sequence[Array], setting: FitSetting, start: Estimate | None = None
 ) -> Estimate:
-    """Fit measured values (points,) of each record without trend, from a start if it is given.
+    """Fit measured values (points,) without trend for each record, from a start if given.
 
-    Fitted numbers raise no doubts of units.
+    Fitted numbers do not cause warnings about units.
     """
     with collect_warnings() as caught:
         result = _estimate_in_rounds(rows, setting, start)
@@ -193,7 +193,7 @@ def estimate(
 def _estimate_in_rounds(
     rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 ) -> Estimate:
-    """Fit records of one or several specimens (step 6)."""
+    """Fit records from one or several specimens (step 6)."""
     if not setting.between:
         return _estimate(rows, setting, start)
     equal = as_of_one(rows, np.zeros(len(rows)))
@@ -205,7 +205,7 @@ def _estimate_in_rounds(
 
 
 def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
-    """Fit records of one field (steps 1 to 3)."""
+    """Fit records from one field (steps 1 to 3)."""
     family = setting.spectrum
     values = np.concatenate(rows)
     observed = observe(rows, setting.windows)
@@ -245,10 +245,10 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
 
 
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
-    """Return the share of its variance that a field is expected to show about mean and trend.
+    """Return the expected share of the field's variance that remains about mean and trend.
 
-    For N values with correlation R it is tr(M R)/N. The projection M takes the trend of
-    each record and the mean of all records from the values.
+    For N values with correlation R, the share is tr(M R)/N. The projection M removes
+    the trend of each record, and the mean of all records, from the values.
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -260,7 +260,7 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
 
 
 def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
-    """Return wavenumber (rad/m), periodogram and expectation averaged over bands, (bands, 3)."""
+    """Return band averages (bands, 3) of wavenumber (rad/m), periodogram and expectation."""
     weights = group.window.weights
     k = np.broadcast_to(np.sqrt(sum(v**2 for v in group.window.wave_vectors)), weights.shape)
     kept = weights > 0.0
@@ -271,14 +271,14 @@ def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
 
 
 class Goodness(NamedTuple):
-    """How well a family of marginals fits: its best member, and two measures.
+    """Quality of the fit of a family of marginals: its best member, and two measures.
 
-    `distance` is Kolmogorov's distance. `score` is the score of step 4 less the score of
-    the best family: 0 for the best family, negative for others. Differences below 2 do
-    not distinguish families. `weight` is the share of fields that `FieldFit.interfaces`
-    draws from the family. It is in proportion to the likelihood of its fields, whose
-    logarithm is on average half a unit for each parameter below the greatest value, because
-    the fields scatter about the estimate.
+    `distance` is Kolmogorov's distance. `score` is the score (step 4) minus the score of
+    the best family: 0 for the best family, negative for others. Differences below 2 do not
+    distinguish families. `weight` is the share of fields that `FieldFit.interfaces` draws
+    from the family. It is proportional to the likelihood of these fields. Because the
+    fields scatter about the estimate, their log likelihood is on average below the maximum
+    by half a unit for each parameter.
     """
 
     marginal: Any
@@ -290,7 +290,7 @@ class Goodness(NamedTuple):
 def windowed(
     records: Sequence[Record], degree: int
 ) -> tuple[tuple[RecordWindow, ...], list[Array]]:
-    """Return a window for each record, shared by equal geometries, and values without trend."""
+    """Return a window for each record, shared by equal geometries, and the values without trend."""
     made: dict[Any, RecordWindow] = {}
     windows, rows = [], []
     for values, spacings in records:
@@ -306,9 +306,10 @@ def windowed(
 def compare(
     settings: Sequence[FitSetting], rows: Sequence[Array]
 ) -> tuple[list[Estimate], dict[str, Goodness], float]:
-    """Return the estimates, best family first, their qualities, and the number of values (step 5).
+    """Return estimates (best family first), their qualities, and the number of values (step 5).
 
-    Families that cannot be fitted are left out. If all fail, an `InputError` says so.
+    Families that cannot be fitted are left out. If all families fail, an `InputError`
+    is raised.
     """
     fitted: list[tuple[float, Estimate]] = []
     problems: list[str] = []

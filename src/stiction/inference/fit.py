@@ -1,29 +1,29 @@
-"""A random field from measured profiles, with intervals and doubts.
+"""Fit a random field to measured profiles, with intervals and doubts.
 
-Problem. Records are samples of one random field with noise. Find the field, and
-how well the records determine it.
+Problem. Records are samples of one random field, with noise. Find the field, and
+how well the records determine the field.
 
-Sources. The parts are in `records`, `window`, `whittle`, `marginal_fit`, `estimate`,
-`bootstrap`, `between` and `specimens`, with their sources.
+Sources. The parts, and their sources, are described in `records`, `window`,
+`whittle`, `marginal_fit`, `estimate`, `bootstrap`, `between` and `specimens`.
 
 Steps:
 
 1. Turn profiles into records at equal distances, and refuse white noise (`records`,
    `window`).
-2. Fit each family of marginals together with the spectrum, and order them by their scores
-   (`estimate`).
-3. Fit records that are simulated from the best family, and from others that may be true
-   (`bootstrap`). Leave out a family that cannot be fitted to its own records, and
-   go on with 2.
-4. Take intervals from the repetitions. If records are of different specimens, take the
-   intervals of mean and scatter from the posterior by the levels of the records
-   (`specimens`).
-5. Compare the distances of the data from marginal and spectrum with the distances of the
-   repetitions. Logarithms of these distances are about normal, which gives
-   p-values by Student's distribution.
-6. Draw likely fields from the families in proportion to their weights, evenly by a
-   sequence of Niederreiter (Random Number Generation and Quasi-Monte Carlo
-   Methods, 1992, chapter 3).
+2. Fit each family of marginals together with the spectrum, and sort the families by
+   score (`estimate`).
+3. Fit records that are simulated from the best family, and from other families that
+   may be true (`bootstrap`). If a family cannot be fitted to records simulated from
+   it, leave the family out and repeat from step 2.
+4. Compute intervals from the repetitions. If records come from different specimens,
+   compute the intervals of mean and scatter from the posterior given the levels of
+   the records (`specimens`).
+5. Compare the distances of the data from marginal and spectrum with the distances
+   of the repetitions. The logarithms of these distances are about normal, so
+   p-values follow from Student's distribution.
+6. Draw likely fields from the families in proportion to their weights. The draws
+   follow a sequence of Niederreiter, which is evenly spread (Random Number
+   Generation and Quasi-Monte Carlo Methods, 1992, chapter 3).
 """
 
 import math
@@ -113,45 +113,45 @@ Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO, "str | list"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldFit(Result):
-    """Random field fitted to measured profiles, with intervals and doubts.
+    """A random field that is fitted to measured profiles, with intervals and doubts.
 
     Attributes
     ----------
     field : RandomField
-        The fitted field for simulation, without measurement noise and with the
-        mean mode.
+        The fitted field, for simulations, without measurement noise and with the mean
+        mode.
     parameters : dict of str to float
         Estimates in SI. ``efolding_length`` (m) is the lag at which the
-        correlation of z falls to 1/e. ``mean`` and ``standard_deviation`` belong
-        to the field. ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have their
-        names in study files. ``noise`` is the standard deviation of the
-        measurement noise, and ``between`` the coefficient of variation between
+        correlation of z falls to 1/e. ``mean`` and ``standard_deviation`` describe
+        the field. ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have the same
+        names as in study files. ``noise`` is the standard deviation of the
+        measurement noise, and ``between`` is the coefficient of variation between
         specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval of each parameter. The interval of the noise may begin
-        at zero. The bounds of the marginal have intervals that end outside the
-        values. Intervals of exponent and anisotropy end at the searched ranges,
-        0.65 to 16 and 0.05 to 20. With `between`, the intervals of ``mean`` and
-        ``between`` come from the posterior by the levels of the records.
+        Bootstrap interval for each parameter. The interval for the noise may begin at
+        zero. Intervals for bounds of the marginal end outside the values. Intervals
+        for exponent and anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to
+        20. With `between`, the intervals for ``mean`` and ``between`` come from the
+        posterior given the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
-        Fits to records simulated from `field`, as another measurement might have
-        given them.
+        Fits to records simulated from `field`, which a repeated measurement might
+        have given.
     families : dict of str to Goodness
-        Quality of the fit by each requested family, the best family first.
+        Quality of the fit for each requested family. The best family comes first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float
-        Probability that records of the fitted ``marginal`` and ``spectrum`` lie
-        as far from their fits as the data do. A small probability means that the
-        family does not fit. For several records without `between`, ``level`` is
-        the probability that their means scatter as much.
+        Probability that records with the fitted ``marginal`` and ``spectrum`` differ
+        from their fits as much as the data do. A small probability means that the
+        family does not fit. For several records without `between`, ``level`` is the
+        probability that their means scatter as much.
     missing : (int, int)
-        Number of points without a value, which are left out, and number of all
+        Number of points without a value, which are left out, and total number of
         points.
     doubts : tuple of str
-        Reasons not to trust the fit. Empty without doubts.
+        Reasons not to trust the fit. Empty if there are no such reasons.
     """
 
     field: RandomField
@@ -177,12 +177,12 @@ class FieldFit(Result):
 
     @property
     def lengths_held(self) -> float:
-        """Number of correlation lengths, or areas on a plane, in all records together."""
+        """Number of correlation lengths (on planes, correlation areas) in all records together."""
         return self._estimate.lengths_held
 
     @property
     def tied(self) -> tuple[str, ...]:
-        """Names of the families that the records do not distinguish from the best family."""
+        """Names of the families that the records cannot distinguish from the best family."""
         return tuple(name for name, one in self.families.items() if one.score > -TOLD)
 
     @cached_property
@@ -192,20 +192,20 @@ class FieldFit(Result):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces, for the failure probability under all of them.
+        """Return equally likely random interfaces, over which failure probabilities are averaged.
 
-        Each is the estimate less the error of a repetition, with the bias and
-        scatter of the intervals. Families of the marginal are drawn in proportion
-        to their `weight`. With `between`, each interface has a mean and a factor
-        between specimens, drawn from their posterior
-        (`stiction.inference.specimens`). A longer list begins with a shorter one
-        of the same seed.
+        Each interface is the estimate minus the error of a repetition, so the
+        interfaces have the bias and scatter of the intervals. Families of the
+        marginal are drawn in proportion to their `weight`. With `between`, each
+        interface has a mean and a factor between specimens, drawn from their
+        posterior (`stiction.inference.specimens`). With the same seed, a longer list
+        begins with the shorter list.
 
         Parameters
         ----------
         count : int
-            Number of interfaces. A family has at most as many different fields as
-            repetitions.
+            Number of interfaces. A family has at most one different field for each
+            repetition.
         seed : int
             Not negative.
 
@@ -249,20 +249,20 @@ class FieldFit(Result):
 
     @cached_property
     def _every(self) -> list[RandomField]:
-        """All likely fields. The posterior numbers them in this order."""
+        """All likely fields, in the order in which the posterior numbers the fields."""
         return list(dict.fromkeys(field for own in self._likely for field in own))
 
     @cached_property
     def _posterior(self) -> Grid:
-        """Posterior of mean and scatter between specimens by the levels of the profiles."""
+        """Posterior of mean and scatter between specimens, given the levels of the profiles."""
         return grid_of_profiles(self._with_levels(self._every))[0]
 
     def profiles(self, count: int, seed: int) -> Profiles:
-        """Return likely fields and the levels of the records for the posterior with peaks."""
+        """Return likely fields and the levels of the records, for the posterior with peaks."""
         return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
 
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
-        """Return fields with the levels of the records and their variances by each field."""
+        """Return fields with the levels of the records, and for each field their variances."""
         truth, levels = self._estimate, self._levels
         mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
         length = truth.field(self.quantity).spectrum.efolding_length
@@ -281,7 +281,7 @@ class FieldFit(Result):
         return Profiles(members, mean, levels, within, families, self._prior)
 
     def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
-        """Return a source with these uncertain parameters too, as `stiction.uncertain` does."""
+        """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 
     def _summary(self) -> Summary:
@@ -335,56 +335,59 @@ def fit_field(
     profiles : DataArray, array, or list of them
         Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points,
         such as `stiction.read_profile` returns. Missing values (NaN, missing
-        points, filled values) are left out. Plain arrays in SI have a value at
-        each node of `interface`, and shape (nodes,) or (samples, nodes), on a
-        plane (nx, ny) or (samples, nx, ny). Several profiles are samples of one
-        field and may differ in length.
+        points, filled values) are left out. Plain arrays in SI have a value at each
+        node of `interface`, with shape (nodes,) or (samples, nodes), or on a plane
+        (nx, ny) or (samples, nx, ny). Several profiles are samples of one field. They
+        may differ in length.
     interface : Interface, optional
         Needed for arrays without coordinates. A warning is issued if it is too
         short, or its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
         Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
-        continuous distribution of `scipy.stats`. The best of several is chosen,
-        and `families` in the result compares them. A table fixes parameters:
-        ``{"type": "beta", "low": 0, "high": 2e6}``. By default both bounds of
-        'beta' are estimated, and the lower bound of the others is 0.
+        continuous distribution of `scipy.stats`. If several families are given, the
+        best is chosen, and `families` in the result compares them. A table fixes
+        parameters: ``{"type": "beta", "low": 0, "high": 2e6}``. By default both
+        bounds of 'beta' are estimated, and other families have the lower bound 0.
     spectrum : str or dict
         'power_law', 'squared_exponential' or 'exponential'. A table fixes
-        parameters, such as ``{"type": "power_law", "exponent": 4.0}``. If it has
-        ``"truncation"`` or ``"power_kept"``, the spectrum of the record ends
-        there. Otherwise only the field has its usual end.
+        parameters, such as ``{"type": "power_law", "exponent": 4.0}``. If the table
+        has ``"truncation"`` or ``"power_kept"``, the spectrum of the record is
+        truncated there. Otherwise only the spectrum of the resulting field is
+        truncated, by default values.
     detrend : int
-        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The
-        scatter that mean and trend take from the values on average is added to
-        the estimate, except for families of `scipy.stats` with a fixed loc or
-        scale.
+        Degree of the removed polynomial trend, 0 to 3. The mean is kept. Removing
+        mean and trend reduces the scatter of the values. The average reduction is
+        added to the estimate, except for families of `scipy.stats` with a fixed loc
+        or scale.
     noise : bool or float
-        Whether to estimate white, normal measurement noise along with the field,
-        or its standard deviation (SI) if it is known.
+        Whether to estimate white, normal measurement noise together with the field.
+        If the standard deviation (SI) of the noise is known, pass it.
     anisotropy : bool or float
-        Ratio of the correlation lengths of maps along y and x. False stands for
-        1, and True estimates it.
+        For maps, the correlation length along y divided by the length along x. False
+        means 1, and True estimates the ratio.
     between : bool, str or sequence of str
-        Whether records come from different specimens, each with its own factor of
-        mean 1. The coefficient of variation ``between`` of this factor is then
-        estimated. Its family is one of 'lognormal', 'normal' (above zero) and
-        'weibull'. Several families, or True for all, are averaged. A warning
-        states that fewer than five specimens determine the scatter poorly.
+        Whether records come from different specimens, each of which has a factor. The
+        mean of the factor is 1, and its coefficient of variation ``between`` is
+        estimated. The family of the factor is 'lognormal', 'normal' (above zero) or
+        'weibull'. Several families, or all families if True, are averaged. With fewer
+        than five specimens, a warning states that they determine the scatter poorly.
     prior : mapping, optional
-        Priors of the mean, ``"strength.mean"``, and of the coefficient of variation,
-        ``"between.strength"``, as in `infer`. By default the first is flat in its
-        logarithm, and the second half-Cauchy of scale 0.1.
+        Priors for the mean, ``"strength.mean"``, and for the coefficient of
+        variation, ``"between.strength"``, as in `infer`. By default the prior for the
+        mean is flat in its logarithm, and the prior for the coefficient of variation
+        is half-Cauchy with scale 0.1.
     quantity : str
-        Measured quantity, for its unit: 'strength', 'normal_pressure',
+        Measured quantity, which sets the unit: 'strength', 'normal_pressure',
         'friction_coefficient', ... A fitted field of friction coefficients has
         ``of="friction_coefficient"``.
     bootstrap : int
-        Number of repetitions, at least 20, for the fitted field and for each of two
-        fields with the correlation lengths at the ends of a first interval.
+        Number of repetitions, at least 20, for each of three fields: the fitted
+        field, and two fields whose correlation lengths are the ends of a first
+        interval.
     confidence : float
         Confidence level of the intervals.
     seed : int
-        Seed of the repetitions.
+        Seed for the repetitions.
     workers : int, optional
         Number of threads, by default all cores. Results do not depend on it.
     progress : bool or callable
@@ -393,7 +396,7 @@ def fit_field(
     Returns
     -------
     FieldFit
-        With `field`, `parameters` and `interval`. `stiction.plot.fit` draws it.
+        With `field`, `parameters` and `interval`. `stiction.plot.fit` draws the fit.
 
     Raises
     ------
@@ -405,28 +408,28 @@ def fit_field(
     Warns
     -----
     AccuracyWarning
-        If values are outliers or dropouts, profiles repeat others, or a family is
-        left out because it cannot be fitted to records simulated from it. Also
-        for each of the `doubts`: records hold fewer than ten correlation lengths,
-        a p-value is below 1 % (of ``level`` if records of different specimens
-        lack `between`), the noise hides the cut-off of the spectrum, a parameter
-        lies at the end of the searched range, or fewer than five specimens shall
-        determine the scatter between them.
+        If there are outliers, dropouts or repeated profiles, or if a family is left
+        out because it cannot be fitted to records simulated from it. Also for each of
+        the `doubts`: records hold fewer than ten correlation lengths, a p-value is
+        below 1 % (for ``level``, this suggests different specimens without
+        `between`), the noise hides the cut-off of the spectrum, a parameter lies at
+        the end of the searched range, or there are fewer than five specimens for the
+        scatter between specimens.
 
     Notes
     -----
     The marginal maximises the likelihood of values with noise. The spectrum maximises a
-    Whittle likelihood with the exact expectation for the window, which contains taper,
-    gaps, detrending, aliasing, and a given truncation of the spectrum (Sykulski et al.,
-    2019; Guillaumin et al., 2022). Correlations of values follow from correlations of the
+    Whittle likelihood. Its expectation is exact for the window, and includes taper, gaps,
+    detrending, aliasing, and a given truncation of the spectrum (Sykulski et al., 2019;
+    Guillaumin et al., 2022). Correlations of values follow from correlations of the
     Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    Families are compared by Akaike's criterion for a number of independent values. N
-    values with correlations rho_ij count as N^2/sum rho_ij^3.
+    Families are compared with Akaike's criterion. N values with correlations rho_ij
+    count as N^2/sum rho_ij^3 independent values.
 
-    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997,
-    section 5.2), their upper and lower ends from fields of longer and shorter
-    correlation (Carpenter, 1999).
+    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section
+    5.2). Their upper and lower ends come from fields with longer and shorter
+    correlation lengths (Carpenter, 1999).
 
     Examples
     --------
@@ -511,7 +514,7 @@ def _judged(
     families: tuple[str, ...],
     prior: FactorPrior,
 ) -> dict[str, Any]:
-    """Return parameters, intervals, p-values and doubts, after `count` repetitions each."""
+    """Return parameters, intervals, p-values and doubts. Each field has `count` repetitions."""
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
     ends = intervals(repeated, confidence, np.concatenate(fitted.as_of_one(rows)))
@@ -547,7 +550,7 @@ def _judged(
 
 
 def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
-    """Return the p-value of a distance of the data, with the distances of repetitions (step 5)."""
+    """Return the p-value of a distance of the data, given the distances of repetitions (step 5)."""
     repeats = np.log([getattr(fit, name) for fit in fits])
     error = repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
     away = (math.log(getattr(truth, name)) - repeats.mean()) / error
@@ -583,7 +586,7 @@ def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
 
 
 def _power_at_cutoff(fitted: Estimate, window: RecordWindow) -> float:
-    """Return the power of the field at which it has fallen to a quarter, beside white noise."""
+    """Return the power of the field, relative to white noise, where it has fallen to a quarter."""
     model = fitted.model
     if model.noise_share <= 0.0:
         return math.inf

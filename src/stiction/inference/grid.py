@@ -1,20 +1,21 @@
-"""The posterior on a grid that closes in on its mass, and draws from it.
+"""Compute a posterior on a grid that closes in on the mass, and draw from it.
 
 Problem. The prior is uniform in the unit cube. Compute the posterior density
 L(u)/Z of the parameters u from the likelihood L, with the evidence Z = int L du.
 L may be narrow.
 
-Source. Posteriors on a grid: Gelman and others, Bayesian Data Analysis (2013),
-section 10.1. Closing in is our own.
+Source. Gelman and others, Bayesian Data Analysis (2013), section 10.1, describe
+posteriors on a grid. Closing in is our own.
 
 Steps:
 
-1. Divide a box into equal cells, and compute log L in the middle of each cell.
+1. Divide a box into equal cells, and compute log L at the centre of each cell.
 2. The mass of a cell is L over the sum of L. Z is the sum of L times the volume of a cell
-   (midpoint rule). The outside of the box is neglected.
-3. Close in on the cells that hold all but `OUTSIDE_MASS` on either side of each
-   parameter, and keep one more cell on either side.
-4. Repeat until no side of the box shrinks by a tenth, at most `MAX_GRID_ZOOMS` times.
+   (midpoint rule). The part outside the box is neglected.
+3. Shrink the box. For each parameter, cut off cells with a mass up to
+   `OUTSIDE_MASS` on either side, but keep one more cell on either side.
+4. Repeat, at most `MAX_GRID_ZOOMS` times, until no side of the box shrinks by a
+   tenth.
 """
 
 from collections.abc import Callable
@@ -45,17 +46,17 @@ class PosteriorGrid:
     log_evidence: float  # logarithm of the mean likelihood over the whole prior
 
     def marginal(self, axis: int) -> Array:
-        """Return the mass of the cells along one parameter."""
+        """Return the mass of cells along one parameter."""
         axes = tuple(i for i in range(self.mass.ndim) if i != axis)
         return self.mass.sum(axis=axes)
 
     def information(self, axis: int) -> float:
-        """Return the divergence of the marginal of one parameter from its prior, nats."""
+        """Return the divergence of one parameter's marginal posterior from its prior, nats."""
         mass = self.marginal(axis)
         return float(np.log(mass.size / np.ptp(self.box[:, axis])) - entropy(mass))
 
     def draws(self, count: int, seed: int) -> Array:
-        """Draw from the posterior as u, (count, parameters), uniform within the cells."""
+        """Draw u (count, parameters) from the posterior. Draws are uniform within cells."""
         rng = np.random.default_rng(seed)
         cells = rng.choice(self.mass.size, size=count, p=self.mass.ravel())
         places = np.stack(np.unravel_index(cells, self.mass.shape), axis=1)
@@ -68,10 +69,10 @@ def grid_of(
     box: Array,
     points: int = GRID_POINTS,
 ) -> PosteriorGrid | None:
-    """Return the density with this logarithm at points (points, parameters) in a box, or None.
+    """Return the posterior from a log density at points (points, parameters) in a box, or None.
 
-    The result is None if the density is zero at all points. The midpoint rule converges
-    faster than any power of the step once a cell is narrower than the density.
+    The result is None if the density is zero at all points. If a cell is narrower
+    than the density, the midpoint rule converges faster than any power of the step.
     """
     dimension = box.shape[1]
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))

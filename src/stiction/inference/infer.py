@@ -1,22 +1,22 @@
-"""Parameters of a random interface from the peaks of repeated tests.
+"""Infer parameters of a random interface from the peaks of repeated tests.
 
 Problem. Find the posterior p(theta | y) of parameters theta with a prior from
 measured peaks y.
 
-Source. Bayes' theorem on a grid, as in Gelman and others, Bayesian Data Analysis
-(2013), section 10.1. The choice of the box is our own.
+Source. Bayes' theorem is evaluated on a grid, as in Gelman and others, Bayesian
+Data Analysis (2013), section 10.1. The choice of the box is our own.
 
 Steps:
 
-1. If only mean and scatter between specimens are unknown, go to
+1. If only the mean and the scatter between specimens are unknown, use
    `stiction.inference.joined`.
 2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
-3. For an expensive method, find the posterior by the local criterion first, if it
-   applies. Its box, slightly widened, is the relevant part of the prior.
-   Otherwise take the whole prior.
+3. If the method is expensive and the local criterion applies, first find the
+   posterior by the local criterion. The box of this posterior, slightly widened, is
+   the relevant part of the prior. Otherwise use the whole prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on a grid (`grid`).
-5. If the posterior reaches an end of the box, widen the box on this side, and repeat step
-   4.
+5. If the posterior reaches an end of the box, widen the box on this side and repeat
+   step 4.
 """
 
 import itertools
@@ -76,7 +76,7 @@ UNFINISHED: dict[Any, Array] = {}
 def _simulating(
     method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
 ) -> Iterator[Simulation]:
-    """Give a simulation that keeps its onsets after Ctrl-C, and forgets them otherwise."""
+    """Provide a simulation. It keeps its onsets after Ctrl-C, and discards them otherwise."""
     with Meter("infer", show=progress) as meter:
         try:
             yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
@@ -113,43 +113,43 @@ def infer(
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        For mean and scatter: a fit, whose records are joined with the peaks, or
-        equally likely interfaces, whose fields within a specimen count. For other
-        parameters: one interface, in which the parameters of `prior` are
-        replaced.
+        For mean and scatter: a fit, whose records are combined with the peaks, or
+        equally likely interfaces, of which only the fields within a specimen are
+        used. For other parameters: one interface, in which the parameters in `prior`
+        are replaced.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress or force at which each specimen slid, in `unit`. For
         specimens of several lengths, map each length (m) to its peaks, ``{0.1:
         [...], 0.2: [...]}``. The node spacing is the spacing of the problem. The
-        result of `read_peaks` is accepted too.
+        result of `read_peaks` is also accepted.
     prior : mapping, optional
-        For mean and scatter: ``"strength.mean"``, by default flat in its
-        logarithm, and ``"between.strength"``, the coefficient of variation
-        between specimens, by default half-Cauchy of scale 0.1. For other
-        parameters, their independent priors: a frozen continuous `scipy.stats`
-        distribution, a range ``(low, high)``, or ``{"low": ..., "high": ...,
-        "spacing": "log"}``. Keys are the keys of a sweep, such as
-        ``"correlation_length"`` or ``"marginal.low"`` for the strength, and
-        ``"residual_strength.marginal.high"`` or
+        For mean and scatter: ``"strength.mean"``, by default flat in its logarithm,
+        and ``"between.strength"``, the coefficient of variation between specimens, by
+        default half-Cauchy with scale 0.1. For other parameters, independent priors:
+        a frozen continuous `scipy.stats` distribution, a range ``(low, high)``, or
+        ``{"low": ..., "high": ..., "spacing": "log"}``. The keys are the same as in a
+        sweep, such as ``"correlation_length"`` or ``"marginal.low"`` for the
+        strength, and ``"residual_strength.marginal.high"`` or
         ``"problem.friction.weakening_rate"``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`, with equal prior
-        weights. By default the families of the fit, or all families.
+        Families of the factor between specimens, as in `fit_field`. They have equal
+        prior weights. By default the families of the fit, or else all families.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. An expensive method is guided by the local
-        criterion, which first finds the relevant part of the prior. This part
-        grows until it contains the posterior.
+        Method that computes the onset. If it is expensive, the local criterion first
+        finds the relevant part of the prior. This part grows until it contains the
+        posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`. If `Peaks` are
-        given, it is in Pa, in N, or a friction coefficient.
+        Standard deviation of the error of a peak, in `unit`. If `Peaks` are given,
+        the unit is Pa or N, or 1 for friction coefficients.
     unit : str
         Unit of peaks and load-cell error. A unit of force needs the ``thickness``
         of a specimen, the ``width`` of a line, or a plane. The unit "1" stands
         for friction coefficients, which need ``Load(normal_pressure=...)``.
     samples : int, optional
-        Simulated specimens at each point, by default 2000 by the local criterion
-        and 500 by equilibrium. For mean and scatter, simulated specimens for each
-        field, by default 200 by the local criterion and 100 by other methods.
+        Number of simulated specimens at each point, by default 2000 with the local
+        criterion and 500 with equilibrium. For mean and scatter, number of simulated
+        specimens for each field, by default 200 with the local criterion and 100 with
+        other methods.
     seed : int
         Not negative. All points share the samples, so that the likelihood is smooth.
     workers, progress
@@ -158,36 +158,37 @@ def infer(
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats). ArviZ draws and
-        compares `to_arviz()`.
+        With `draws`, `mean`, `interval` and `information` (nats). Use `to_arviz()` to
+        plot and compare posteriors with ArviZ.
 
     Raises
     ------
     InputError
-        If any argument is invalid, or no parameters in the prior can produce the
-        peaks. The message then names the bound that must move.
+        If any argument is invalid, or if no parameters in the prior can produce the
+        peaks. In the latter case the message names the bound that must move.
 
     Warns
     -----
     AccuracyWarning
-        If the prior decides about the scatter between specimens, or the profiles come
-        from one specimen. If the posterior piles up at an end of the prior, the method is not
-        accurate there, or few samples are simulated for the number of peaks. If
-        profiles and peaks contradict each other, with the p-value of
-        `stiction.statistics.agreement`.
+        If the prior determines the scatter between specimens, or the profiles come
+        from one specimen. If the posterior piles up at an end of the prior, the
+        method is inaccurate there, or few samples are simulated for the number of
+        peaks. If profiles and peaks contradict each other: the message then gives the
+        p-value from `stiction.statistics.agreement`.
     UserWarning
-        Before a simulation of more than a minute, with its time and with faster
-        alternatives.
+        Before a simulation that takes more than a minute. The message gives the time
+        and faster alternatives.
 
     Notes
     -----
-    The likelihood is a kernel density of simulated onsets with the error of the load cell
-    (`stiction.inference.likelihood`). Parameters that only shift and stretch the strength
-    need no simulation (`stiction.inference.scaling`). At most four others are simulated
-    on a grid with the same draws everywhere, and interpolated. The posterior is summed on
-    a grid. For more parameters, give `log_likelihood` and `prior_transform` of the result
-    to emcee or dynesty. After an interruption by Ctrl-C, an equal call in the same
-    session goes on with the finished onsets.
+    The likelihood is a kernel density of simulated onsets, including the error of the
+    load cell (`stiction.inference.likelihood`). Parameters that only shift and stretch
+    the strength need no simulation (`stiction.inference.scaling`). At most four other
+    parameters are simulated on a grid, with the same draws at all points, and
+    interpolated. The posterior is summed on a grid. For more parameters, give
+    `log_likelihood` and `prior_transform` of the result to emcee or dynesty. After an
+    interruption with Ctrl-C, an identical call in the same session continues with the
+    finished onsets.
 
     Mean and scatter between specimens are integrated on a grid, with sixty fields
     within a specimen from the repetitions of the fit
@@ -291,7 +292,7 @@ def infer(
 
 
 def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:
-    """Refuse peaks that no point of the prior can produce, such as peaks in another unit (2.)."""
+    """Refuse peaks that no point of the prior can produce, such as a wrong unit (step 2)."""
     points = np.array(list(itertools.product(*prior.ends.T)))
     problems = []
     for length, peaks in zip(measured.lengths, measured.values, strict=True):
@@ -303,10 +304,11 @@ def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> No
 
 
 def _first_box(likelihood: Likelihood) -> Array:
-    """Return the box of the posterior by the local criterion, slightly widened (step 3).
+    """Return the slightly widened box of the posterior by the local criterion (step 3).
 
-    It is the whole prior if the local criterion cannot produce the peaks. Other methods
-    may, if nodes reach their residual strength before the onset.
+    The box is the whole prior if the local criterion cannot produce the peaks. Other
+    methods may still produce them, if nodes reach their residual strength before the
+    onset.
     """
     grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
     if grid is None:
@@ -316,7 +318,7 @@ def _first_box(likelihood: Likelihood) -> Array:
 
 
 def _grown(box: Array, u: Array | None) -> Array:
-    """Return the box, wider by its width at ends that draws (draws, parameters) reach (step 5)."""
+    """Return the box, widened at the ends that draws (draws, parameters) reach (step 5)."""
     width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
     if u is not None:
         low, high = box[0] + BOX_END_SHARE * width, box[1] - BOX_END_SHARE * width

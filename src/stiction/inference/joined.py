@@ -1,7 +1,7 @@
-"""Profiles and peaks joined: onsets of the fields within, their posterior, and its agreement.
+"""Combine profiles and peaks: onsets of the fields within, posterior and agreement.
 
-See `stiction.inference.specimens` for the model, its sources and the steps. This file has
-step 1, the simulation, and the result with its notes.
+See `stiction.inference.specimens` for the model, its sources and the steps. This
+file contains step 1, the simulation, and the result with its notes.
 """
 
 import math
@@ -71,8 +71,8 @@ class SpecimenPosterior(Posterior):
     families : dict of str to float
         Posterior probability of each family for the factor between specimens.
     agreement : Agreement or None
-        Agreement of the peaks with the prediction by the profiles alone. None without
-        profiles.
+        Agreement of the peaks with the prediction from the profiles alone. None
+        without profiles.
     """
 
     grid: Grid = field(repr=False, compare=False)
@@ -86,7 +86,7 @@ class SpecimenPosterior(Posterior):
 
     @cached_property
     def before(self) -> dict[str, Array]:
-        """Draws by the profiles alone, or from the prior without profiles."""
+        """Draws from the posterior given the profiles alone, or from the prior without profiles."""
         rng = np.random.default_rng([self.seed, 7])
         return self.by_profiles.described(self.by_profiles.draws(POSTERIOR_DRAWS, rng))
 
@@ -96,7 +96,7 @@ class SpecimenPosterior(Posterior):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces, which are draws from the posterior.
+        """Return equally likely random interfaces. They are draws from the posterior.
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class SpecimenPosterior(Posterior):
 
     @property
     def prior(self) -> Any:
-        """Raise an `InputError`, because fields within a specimen are not parameters."""
+        """Raise an `InputError`, because fields within a specimen have no prior of parameters."""
         raise InputError(
             "prior: `prior_transform` and `log_likelihood` need parameters with a prior of `infer`"
         )
@@ -126,7 +126,7 @@ class SpecimenPosterior(Posterior):
 
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
-    """Return the profiles of a fit, or the fields of any other source without levels."""
+    """Return the profiles of a fit, or the fields of any other source, which has no levels."""
     more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
     more |= {} if families is None else {"families": families_of(families)}
     if isinstance(random, FieldFit):
@@ -158,7 +158,7 @@ def join(
     between: Any,
     error: float,
 ) -> SpecimenPosterior:
-    """Return the posterior of mean and scatter between specimens from profiles and peaks."""
+    """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
     profiles = profiles_of(random, prior, between, simulation.seed)
     variable = variable_of(problem, profiles.fields[0], measured.unit)
     pairs = zip(measured.lengths, measured.values, strict=True)
@@ -209,7 +209,7 @@ def simulated_onsets(
     error: float,
     variable: str,
 ) -> Onsets:
-    """Return the onsets of all fields on one kind of specimen (step 1)."""
+    """Return the onsets of all fields for one kind of specimen (step 1)."""
     method, meter, workers = simulation.method, simulation.meter, simulation.workers
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
     simulation = simulation._replace(samples=samples, workers=1)  # fields run in threads
@@ -219,7 +219,7 @@ def simulated_onsets(
     of = "critical_stress" if forces else variable
 
     def onsets(place: int, at: Array) -> tuple[Array, Any]:
-        """Return onsets over c/reference, (steps, samples), and their densities."""
+        """Return onsets (steps, samples) divided by c/reference, and their densities."""
         strengths = np.exp(at)
         fields = [of_mean(profiles.fields[place], c * profiles.reference) for c in strengths]
         experiments = [experiment_on(problem, field, method, length) for field in fields]
@@ -249,7 +249,7 @@ def simulated_onsets(
 
 
 def _information(grid: Grid, before: Grid, proper: bool) -> dict[str, float]:
-    """Return the divergence of mean and scatter from their distribution without peaks, nats."""
+    """Return the divergence, nats, of mean and scatter from their distribution without peaks."""
     axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
     return {
         name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))

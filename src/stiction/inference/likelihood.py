@@ -1,9 +1,8 @@
-"""Likelihood of measured peaks: simulated onsets on a grid of parameters, and their densities.
+"""Likelihood of measured peaks, from densities of simulated onsets on a grid of parameters.
 
 Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error
 were measured on specimens with onset T. Compute the likelihood L(theta) = prod_j
-p(y_j | theta) for any theta, where each density p needs hundreds of simulated
-onsets.
+p(y_j | theta) for any theta. Each density p needs hundreds of simulated onsets.
 
 Sources. Steps 1 to 3 and 5 are our own. Step 4 is a control variate (Hammersley and
 Handscomb, Monte Carlo Methods, 1964, section 5.5), applied to quantiles in place of a
@@ -13,18 +12,18 @@ Steps:
 
 1. Find the parameters that only shift and stretch the onset
    (`stiction.inference.scaling`). They need no simulation.
-2. Place nodes along each other parameter, at most four, in the box of the prior that
-   matters.
-3. Simulate onsets at every node of the product grid with the same draws, so that L is
-   smooth.
-4. If the method is expensive and the local criterion applies, simulate by the method only
-   at the corners and few nodes between them (`COARSE`), and by the local
-   criterion at all nodes. Move onsets by the local criterion by the difference of
-   both quantile functions. Do so only if the onsets by both methods have a
-   correlation above `MIN_CORRELATION`.
-5. Tabulate the density at each node (`stiction.inference.density`). Between nodes the
-   logarithm of the standardised density, its bound, mean and spread are linear in
-   each parameter.
+2. Place nodes along each of the other parameters, at most four, in the relevant box
+   of the prior.
+3. Simulate onsets at every node of the product grid. Use the same draws, so that L
+   is smooth.
+4. If the method is expensive and the local criterion applies, use the method only
+   at the corners and at a few nodes between them (`COARSE`), and the local
+   criterion at all nodes. Shift the onsets from the local criterion by the
+   difference between both quantile functions. Do so only if the correlation between
+   the onsets from both methods is above `MIN_CORRELATION`.
+5. Tabulate the density at each node (`stiction.inference.density`). Between nodes,
+   the log of the standardised density, the bound, the mean and the spread are
+   linear in each parameter.
 """
 
 import itertools
@@ -99,8 +98,7 @@ def make_axes(
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
-    """Return the parameters at all nodes, (nodes, parameters). Scaling parameters are at
-    `reference`."""
+    """Return the parameters (nodes, parameters). Scaling parameters are at `reference`."""
     steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
     result[:, [axis.parameter for axis in axes]] = steps
@@ -123,7 +121,7 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
 def experiments_at(
     prior: Prior, thetas: Array, method: Any, length: float | None = None
 ) -> list[Experiment]:
-    """Return the experiments at points (points, parameters), on specimens of a length, m.
+    """Return the experiments at points (points, parameters), for specimens with a given length, m.
 
     The node spacing is the spacing of the problem.
     """
@@ -138,7 +136,7 @@ def experiments_at(
 def experiment_on(
     problem: Problem, random: Any, method: Any, length: float | None
 ) -> Experiment:
-    """Return an experiment on specimens of a length, m. None keeps the length of the problem."""
+    """Return an experiment for specimens with a given length, m, or as in the problem if None."""
     interface = problem.interface
     if length is not None and interface.is_plane:
         raise InputError(
@@ -156,10 +154,10 @@ def experiment_on(
 
 
 class Simulation(NamedTuple):
-    """How onsets are simulated.
+    """Settings for the simulation of onsets.
 
-    `done` holds the onsets of an interrupted call by experiment and samples. New onsets
-    are added.
+    `done` holds onsets from an interrupted call, by experiment and samples. New
+    onsets are added.
     """
 
     method: Any
@@ -173,7 +171,7 @@ class Simulation(NamedTuple):
 def simulate(
     experiments: Sequence[Experiment], simulation: Simulation, first: int, variable: str
 ) -> Array:
-    """Return onsets of samples first, first + 1, ... of experiments, (experiments, samples).
+    """Return onsets (experiments, samples) for samples first, first + 1, ... of experiments.
 
     Sample i has the same draws in each experiment (step 3).
     """
@@ -202,7 +200,7 @@ def simulate(
 
 
 class Area(NamedTuple):
-    """Area of one kind of specimen, m², in proportion to some parameters."""
+    """Area of one kind of specimen, m². It is proportional to some parameters."""
 
     unit: float  # area if these parameters are 1
     sides: list[int]  # places of these parameters in the prior
@@ -213,7 +211,7 @@ class Area(NamedTuple):
 
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
-    """Return the area of specimens with a length, m. None keeps the length in the problem."""
+    """Return the area of specimens with a given length, m, or as in the problem if None."""
 
     def areas(points: Array) -> list[Any]:
         return [own.problem.area for own in experiments_at(prior, points, method, length)]
@@ -229,7 +227,7 @@ def area_of(prior: Prior, method: Any, length: float | None) -> Area:
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
-    """Return the variable that tests measure in a unit, if the problem has all that it needs."""
+    """Return the variable that tests measure in a unit, if the problem defines this variable."""
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
         raise InputError(
@@ -246,7 +244,7 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Simulated onsets, and the likelihood of measured peaks. A force is an onset times an area."""
+    """Simulated onsets and the likelihood of measured peaks. A force is an onset times an area."""
 
     prior: Prior
     method: Any
@@ -260,17 +258,17 @@ class Likelihood:
     peaks: Sequence[Array] = ()
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
-        """Return the likelihood of other peaks, for all or some kinds of specimens."""
+        """Return the likelihood for other peaks, and for all or some kinds of specimens."""
         kinds = range(len(self.densities)) if kinds is None else kinds
         densities, areas = [self.densities[k] for k in kinds], [self.areas[k] for k in kinds]
         return replace(self, peaks=peaks, densities=densities, areas=areas)
 
     def scales(self, kind: int, theta: Array) -> Array:
-        """Return shift and stretch of the simulated onsets, (2, points)."""
+        """Return shift and stretch of the simulated onsets, with shape (2, points)."""
         return self.scaling.of(theta) * self.areas[kind].at(theta)
 
     def parts(self, u: Array) -> Array:
-        """Return logarithms of the likelihood of each test at points u, (points, tests)."""
+        """Return the log likelihood (points, tests) of each test at points u."""
         theta, parts = self.prior.theta(u), []
         index, weight = corners(self.axes, theta)
         for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
@@ -281,7 +279,7 @@ class Likelihood:
         return np.concatenate(parts, axis=1)
 
     def __call__(self, u: Array) -> Array:
-        """Return the logarithm of the likelihood at points u (points, parameters).
+        """Return the log likelihood at points u (points, parameters).
 
         It is -inf outside the simulated box.
         """
@@ -292,7 +290,7 @@ class Likelihood:
         return result
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak of a kind of specimen at each point u (points, parameters)."""
+        """Draw a peak for a kind of specimen at each point u (points, parameters)."""
         rng = np.random.default_rng([seed, 1, kind])
         theta = self.prior.theta(u)
         shift, stretch = self.scales(kind, theta)
@@ -306,7 +304,7 @@ class Likelihood:
         return shift + stretch * onset + self.error * rng.standard_normal(u.shape[0])
 
     def refusals(self) -> list[str]:
-        """Return messages on peaks that no parameters in the prior can produce."""
+        """Return messages about peaks that no parameters in the prior can produce."""
         ends = self.prior.theta(self.box).T
         scaled = [Axis(i, ends[i], np.positive) for i in self.scaling.keys]
         points = nodes_of([*self.axes, *scaled], self.scaling.reference)
@@ -324,7 +322,7 @@ class Likelihood:
 def out_of_reach(
     prior: Prior, points: Array, reach: Array, error: float, peaks: Array
 ) -> list[str]:
-    """Return a message on peaks outside the `reach` (2, points) of all points in the prior."""
+    """Return a message about peaks outside the `reach` (2, points) of all points in the prior."""
     low, high = reach[0].min() - ERRORS * error, reach[1].max() + ERRORS * error
     far = (peaks < low) | (peaks > high)
     if not far.any():
@@ -353,9 +351,9 @@ def make_likelihood(
     """Simulate the onsets that the likelihood needs (steps 1 to 5).
 
     `lengths` holds the length of each kind of specimen, m, or None for the length of the
-    problem. `variable` names the peaks among the results, and `error` is the standard
-    deviation of the load cell. `box` is the part of the prior that matters, (2,
-    parameters) as u, by default all of it.
+    problem. `variable` is the name of the peaks among the results, and `error` is the
+    standard deviation of the load-cell error. `box` is the relevant part of the prior,
+    in u with shape (2, parameters), and by default the whole prior.
     """
     box = prior.whole if box is None else box
     method, meter = simulation.method, simulation.meter
@@ -411,13 +409,14 @@ def make_likelihood(
 def moved(
     many: Array, few: Array, known: Array, index: NDArray[np.int64], weight: Array
 ) -> Array:
-    """Return onsets by an expensive method from many onsets by the local criterion (step 4).
+    """Estimate onsets by an expensive method from many onsets by the local criterion (step 4).
 
-    `many` are onsets by the local criterion, (points, many). At coarse nodes a `few`
-    onsets by the method are there, and `known` ones of the same samples by the local
-    criterion, (nodes, few). The difference of their quantiles, over the standard
-    deviation, changes little between nodes. It is interpolated between the nodes around
-    each point, `index`, with their `weight`.
+    `many` are onsets by the local criterion, with shape (points, many). At coarse
+    nodes, `few` are onsets by the method and `known` are onsets by the local
+    criterion for the same samples, both with shape (nodes, few). The difference
+    between their quantiles, divided by the standard deviation, changes little between
+    nodes. It is interpolated between the nodes `index` around each point, with
+    weights `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
     standardised = (np.sort(known) - mean) / spread
@@ -434,7 +433,7 @@ def moved(
 
 
 def effective_samples(alike: float, many: int, few: int) -> float:
-    """Return the number of independent samples with the information of moved onsets."""
+    """Return how many independent samples contain as much information as the moved onsets."""
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 
 
@@ -454,7 +453,7 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
 def bounds_of(
     experiment: Experiment, variable: str, negligible: float = 0.0
 ) -> tuple[float, float]:
-    """Return the least and greatest possible peak. A `negligible` share may lie outside."""
+    """Return the least and the greatest possible peak. A `negligible` share may lie outside."""
     low, high = LimitState(experiment).likely_bounds(negligible)
     if variable == "critical_force":
         area = experiment.problem.area or math.nan

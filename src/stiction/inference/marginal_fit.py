@@ -1,29 +1,30 @@
-"""Marginals by maximum likelihood, with the measurement noise of the values.
+"""Fit marginals by maximum likelihood to values with measurement noise.
 
-Problem. Values y = x + e carry normal noise e of standard deviation s. Find the
-parameters of the distribution F of x within a family that maximise the likelihood
-of y.
+Problem. Values y = x + e contain normal noise e with standard deviation s, and x
+has the distribution F from a family. Find the parameters of F that maximise the
+likelihood of y.
 
-Sources. The climb is Fisher's scoring with damping (Levenberg, 1944, Quarterly of
-Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are
-taken for independent, which leaves the estimate consistent (a composite
-likelihood: Varin, Reid and Firth, 2011, Statistica Sinica 21, 5). The bootstrap
-gives its error.
+Sources. The search uses Fisher's scoring with damping (Levenberg, 1944, Quarterly
+of Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are
+treated as independent, and the estimate remains consistent (a composite likelihood:
+Varin, Reid and Firth, 2011, Statistica Sinica 21, 5). The bootstrap gives the error
+of the estimate.
 
 Steps:
 
 1. If the noise is negligible, the likelihood is the density at the values. Otherwise
-   count the values in `BINS` bins. The probability of a bin comes from F
-   convolved with the noise, so that values may lie beyond a bound of F.
-2. Search scale and shape as logarithms. For 'beta' search both shapes, and the distances
-   of free bounds from the mean. A shape at a free bound is at least 1, because the
-   likelihood would grow without limit as the bound nears a value.
-3. Climb by steps (M + damping diag(M))^-1 g with score g and information M. Divide the
-   damping by 10 after a step that raises the likelihood, and multiply it by 10
-   otherwise. Hold parameters that push against their limits. Stop after a small
+   count the values in `BINS` bins. The probability of a bin follows from F convolved
+   with the noise, so that values may lie beyond a bound of F.
+2. Search over the logarithms of scale and shape. For 'beta', search over both
+   shapes and over the distances of free bounds from the mean. The shape at a free
+   bound is at least 1. Otherwise the likelihood would grow without limit as the
+   bound approaches a value.
+3. Take steps (M + damping diag(M))^-1 g, with the score g and the information M.
+   Divide the damping by 10 after a step that raises the likelihood, and multiply it
+   by 10 otherwise. Hold parameters that are at their limits. Stop after a small
    gain.
-4. Families of `scipy.stats` are fitted by scipy to the values, drawn together to the
-   variance that they would have without noise.
+4. scipy fits families of `scipy.stats`. The values are first shrunk to the variance
+   that they would have without noise.
 """
 
 import math
@@ -96,7 +97,7 @@ SCIPYS = {"normal": "norm"}
 
 
 class Search(NamedTuple):
-    """Start and limits of the search, and a function from its vector to parameters of scipy."""
+    """Start and limits of a search, and a function that maps its vector to parameters of scipy."""
 
     start: Array
     limits: Sequence[tuple[float, float]]
@@ -117,7 +118,7 @@ class Family:
         return ", ".join([self.name, *(f"{key} {value:g}" for key, value in fixed.items())])
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
-        """Return the marginal of values with noise of this standard deviation (steps 1 to 4)."""
+        """Fit the marginal to values with noise of this standard deviation (steps 1 to 4)."""
         quiet = self.quiet(values, noise)
         if self.name not in KINDS:
             return self._by_scipy(quiet)
@@ -165,7 +166,7 @@ class Family:
             raise InputError(f"marginal: scipy cannot fit {self.name!r}: {error}") from None
 
     def quiet(self, values: Array, noise: float) -> Array:
-        """Return values drawn together to their variance without noise, within the bounds."""
+        """Return values shrunk to their variance without noise, within the bounds."""
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
         low, high = self.bounds
@@ -181,8 +182,8 @@ class Family:
     def widened(self, marginal: Any, factor: float) -> Any:
         """Return the marginal with the same mean and `factor` times the standard deviation.
 
-        Fixed parameters stay. A distribution of scipy with a fixed loc or scale stays as
-        it is.
+        Fixed parameters do not change. A distribution of scipy with a fixed loc or
+        scale is returned unchanged.
         """
         free, mean = self.parameters(marginal), float(marginal.distribution.mean())
         moved: dict[str, Any] = {
@@ -218,7 +219,7 @@ class Family:
 
 
 def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
-    """Return the beta distribution of these moments, with as much scatter as its bounds allow."""
+    """Return the beta distribution with these moments. Bounds limit its scatter."""
     u, extent = (mean - low) / (high - low), high - low
     total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
     return Beta(alpha=total * u, beta=total * (1.0 - u), low=low, high=high)
@@ -231,7 +232,7 @@ def _all_parameters(marginal: Any) -> dict[str, float]:
 
 
 def multiplied(marginal: Any, factor: float) -> Any:
-    """Return the marginal of the values times a factor."""
+    """Return the marginal of values that are multiplied by a factor."""
     parameters = _all_parameters(marginal)
     larger = {name: factor * parameters[name] for name in parameters.keys() & SCALED}
     return marginal_of(with_values(marginal, larger))
@@ -249,7 +250,7 @@ def table_of(given: Any) -> dict[str, Any]:
 
 
 def family_of(given: Any) -> Family:
-    """Return the family that a name, or a table with some of its parameters, stands for."""
+    """Return the family for a name, or for a table with some parameters."""
     fixed = table_of(given)
     name = str(fixed.pop("type", None))
     if name in KINDS:
@@ -267,7 +268,7 @@ def family_of(given: Any) -> Family:
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search of scale and shape above a known lower bound (step 2)."""
+    """Return the search over scale and shape above a known lower bound (step 2)."""
     low, mean = family.fixed["low"], float(quiet.mean())
     first = start or MARGINALS[family.name](mean=mean, cv=float(quiet.std()) / mean, low=low)
     shape, _, scale = first.distribution.args
@@ -278,7 +279,7 @@ def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: 
 
 
 def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search of shapes and distances of free bounds from the mean (step 2)."""
+    """Return the search over shapes and distances of free bounds from the mean (step 2)."""
     fixed = family.fixed
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
@@ -308,7 +309,7 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
 
 
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
-    """Return counts of values in bins, points for F, and a function from F there to the bins.
+    """Return counts in bins, points, and a function that maps F at the points to probabilities.
 
     The convolution with the noise is a sum in steps of half a standard deviation or less
     (step 1).
@@ -331,10 +332,10 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 
 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
-    """Return the mean logarithm of the density of values that carry noise.
+    """Return the mean log density of values with noise.
 
-    With noise it is the probability of a bin over its width. It stays finite if a value
-    is all but impossible in the family.
+    With noise, the density is the probability of a bin over its width. The result
+    stays finite if a value is almost impossible in the family.
     """
     if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -345,7 +346,7 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
 
 
 def distance(marginal: Any, values: Array) -> float:
-    """Return Kolmogorov's distance: the largest difference of the distribution functions."""
+    """Return Kolmogorov's distance, the largest difference between the distribution functions."""
     below = marginal.distribution.cdf(np.sort(values))
     steps = np.arange(values.size + 1) / values.size
     return float(max((steps[1:] - below).max(), (below - steps[:-1]).max()))
@@ -360,7 +361,7 @@ def climb(
     longest: float,
     settled: float,
 ) -> tuple[Array, Any]:
-    """Return the parameters of the greatest likelihood, and the state there (step 3).
+    """Return the parameters with the greatest likelihood, and the state there (step 3).
 
     Steps are at most `longest`. `value_of` returns the log likelihood, and a state from which
     `derivatives` returns score and information. A gain below `settled` ends the search.

@@ -1,4 +1,4 @@
-"""Measured peaks: validated, in SI units, one array for each kind of specimen."""
+"""Measured peaks, validated and in SI units, with one array for each kind of specimen."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Peaks(Result, _Peaks):
     Attributes
     ----------
     lengths : tuple of float or None
-        Specimen length for each kind, m. None stands for the length of the problem.
+        Specimen length for each kind, m. None means the length of the problem.
     values : tuple of arrays
         Peaks of each kind, in `unit`.
     unit : str
@@ -87,7 +87,7 @@ class Peaks(Result, _Peaks):
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
-    """Return valid peaks from an array, a mapping of arrays by length, a table or curves."""
+    """Return valid peaks, given an array, a mapping from lengths to arrays, a table or curves."""
     if isinstance(peaks, Peaks):
         return peaks
     if isinstance(peaks, Curves):
@@ -121,12 +121,12 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
 
 
 def si_of(unit: str) -> str:
-    """Return the SI unit of a quantity by its unit: "1", "N", else "Pa"."""
+    """Return the SI unit that belongs to a unit: "1", "N", or else "Pa"."""
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
 def factor_of(unit: str) -> float:
-    """Return the factor to SI from a unit of stress, force or friction coefficient."""
+    """Return the factor that converts a unit of stress, force or friction coefficient to SI."""
     try:
         return factor_to(si_of(unit), unit)
     except InputError as error:
@@ -136,7 +136,7 @@ def factor_of(unit: str) -> float:
 
 
 def _values(given: Any, unit: str) -> Array:
-    """Return the peaks of one kind of specimen in SI. A unit of the values themselves counts."""
+    """Return peaks for one kind of specimen in SI. A unit that the values carry is used."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
     if si_of(stated or unit) != si_of(unit):
@@ -168,19 +168,19 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    Plot the peaks in the order of the tests first. Peaks that drift are not a
-    sample of one distribution.
+    First plot the peaks in the order of the tests. Peaks that drift are not a sample
+    from one distribution.
 
     Parameters
     ----------
     source : path or Curves
         Curves from `stiction.read_curve`, or a table with a heading and one test
-        in each line, separated by commas, semicolons, tabs or blanks. The peaks
-        are the column called peak, stress, strength, force or friction, with its
-        unit: ``peak [MPa]``. Forces have the unit N or kN, friction coefficients
-        the unit 1 or -. Without such a name, the peaks are the only column with a
-        suitable unit. A column ``length [mm]`` may hold the length of the
-        specimen. Other columns are not read.
+        in each line, separated by commas, semicolons, tabs or blanks. The peaks are
+        the column called peak, stress, strength, force or friction, with its unit:
+        ``peak [MPa]``. Forces have the unit N or kN. Friction coefficients have the
+        unit 1 or -. If no column has such a name, the peaks are the only column with
+        a suitable unit. A column ``length [mm]`` may hold the length of the specimen.
+        Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file does not state it.
     missing, decimal, skip, sheet
@@ -215,7 +215,7 @@ def read_peaks(
 
 
 def _refuse_curve(table: Any, read: set[str]) -> None:
-    """Refuse a long table whose time or travel only rises, because it is the curve of a test."""
+    """Refuse a long table in which time or travel only rises: it is the curve of a test."""
     for name, column in table.items():
         timed = any(is_in(column.attrs.get("units"), si) for si in ("m", "s"))
         long = name not in read and len(column) >= MIN_CURVE_LINES

@@ -1,4 +1,4 @@
-"""The posterior: draws, intervals, gained information, and accuracy."""
+"""The posterior: draws, intervals, information gain and accuracy."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,23 +27,24 @@ POSTERIOR_DRAWS, CHAINS = 4000, 4
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Posterior(Result):
-    """Posterior of the parameters, together with their prior.
+    """Posterior of the parameters, with their prior.
 
     Attributes
     ----------
     names : tuple of str
         Keys of the prior.
     draws : dict of (draws,) arrays
-        Draws of each parameter, in its own unit.
+        Draws of each parameter, in the unit of the parameter.
     information : dict of float
         Kullback-Leibler divergence between the marginal posterior of a parameter and
         its prior, nats. Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
-        Logarithm of the density of the peaks under the prior, to compare models.
+        Logarithm of the density of the peaks under the prior, for the comparison of
+        models.
     monte_carlo_error : float
-        Standard error of a posterior mean from the finite number of simulated
-        samples, over the posterior standard deviation. It is about the square
-        root of measured over simulated peaks.
+        Standard error of a posterior mean due to the finite number of simulated
+        samples, over the posterior standard deviation. It is about the square root of
+        the ratio of measured to simulated peaks.
     method : str
         Method that computed the onset.
     peaks : Peaks
@@ -109,19 +110,19 @@ class Posterior(Result):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces, for the failure probability under all of them.
+        """Return equally likely random interfaces, over which failure probabilities are averaged.
 
         Parameters
         ----------
         count : int
-            Number of interfaces. A 90 % band needs about 30.
+            Number of interfaces. A 90 % band needs about 30 interfaces.
         seed : int
             Not negative.
 
         Raises
         ------
         InputError
-            If a parameter belongs to the problem and not to the random interface.
+            If a parameter belongs to the problem, not to the random interface.
 
         Examples
         --------
@@ -146,11 +147,11 @@ class Posterior(Result):
         return [self.at(int(draw))[1] for draw in draws]
 
     def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
-        """Return a source with these uncertain parameters too, as `stiction.uncertain` does."""
+        """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 
     def prior_transform(self, u: Any) -> Array:
-        """Return the parameters at points u of the unit cube, where the prior is uniform.
+        """Return the parameters at points u in the unit cube, in which the prior is uniform.
 
         Parameters
         ----------
@@ -187,15 +188,15 @@ class Posterior(Result):
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
-        """Peaks of further tests: one for each draw, for each kind of specimen."""
+        """Peaks of further tests: for each kind of specimen, one peak for each draw."""
         kinds = range(len(self.peaks.values))
         return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
 
     def to_arviz(self) -> Any:
-        """Return posterior, prior, log-likelihood, prediction and data for ArviZ.
+        """Return the posterior, prior, log-likelihood, prediction and data for ArviZ.
 
         The result is an `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on.
-        The draws are independent. They are cut into four chains because ArviZ
+        The draws are independent. They are divided into four chains because ArviZ
         compares chains.
 
         Raises
@@ -224,7 +225,7 @@ class Posterior(Result):
         return arviz.from_dict(groups, **of)
 
     def _campaigns(self) -> Array:
-        """Draw a campaign with as many tests as measured for each draw, (draws, tests)."""
+        """For each draw, draw a campaign with the measured number of tests, as (draws, tests)."""
         parts = [
             self.likelihood.predicted(kind, np.repeat(self.u, peaks.size, axis=0), self.seed)
             for kind, peaks in enumerate(self.peaks.values)
@@ -247,5 +248,5 @@ class Posterior(Result):
 
 
 def _in_chains(values: Array) -> Array:
-    """Cut draws (draws, ...) into chains (chains, draws, ...)."""
+    """Divide draws (draws, ...) into chains (chains, draws, ...)."""
     return values.reshape(CHAINS, -1, *values.shape[1:])

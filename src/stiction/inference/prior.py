@@ -1,4 +1,4 @@
-"""The prior: unknown parameters, and their distributions before the tests."""
+"""The prior: unknown parameters and their distributions before the tests."""
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,12 +22,12 @@ TAIL_PROBABILITY = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Independent priors of some parameters of a problem and its random interface.
+    """Independent priors for some parameters of a problem and its random interface.
 
-    `distributions` are frozen distributions of `scipy.stats` by the keys of the user. A
-    point is given by `u` with a number in [0, 1] for each parameter, in which the prior
-    is uniform. Arrays have shape (points, parameters). These parameters replace the
-    values in `problem` and `random`.
+    `distributions` maps the user's keys to frozen distributions of `scipy.stats`. A
+    point is given by `u`, which holds a number in [0, 1] for each parameter. The
+    prior is uniform in `u`. Arrays have shape (points, parameters). The parameters
+    replace values in `problem` and `random`.
     """
 
     problem: Problem
@@ -46,21 +46,21 @@ class Prior:
 
     @property
     def middle(self) -> Array:
-        """Medians, (parameters,)."""
+        """Medians of the parameters."""
         return self.theta(np.full((1, self.dimension), 0.5))[0]
 
     @property
     def whole(self) -> Array:
-        """Lower and upper corner of the unit cube, (2, parameters)."""
+        """Lower and upper corner of the unit cube, with shape (2, parameters)."""
         return np.repeat([[0.0], [1.0]], self.dimension, axis=1)
 
     @property
     def ends(self) -> Array:
-        """Least and greatest values, (2, parameters)."""
+        """Least and greatest values, with shape (2, parameters)."""
         return self.theta(self.whole)
 
     def theta(self, u: Array) -> Array:
-        """Return the parameters at `u` by inverse distribution functions."""
+        """Return the parameters at `u`, from inverse distribution functions."""
         result = np.empty_like(u)
         for i, distribution in enumerate(self.distributions.values()):
             low, high = _tails(distribution)
@@ -83,7 +83,7 @@ class Prior:
 
     @contextmanager
     def named(self, theta: Array) -> Iterator[None]:
-        """Prefix errors that are raised meanwhile with the point (parameters,)."""
+        """Let messages of errors that are raised meanwhile begin with the point (parameters,)."""
         pairs = zip(self.names, theta, strict=True)
         with prefixed("prior: at " + ", ".join(f"{name} = {v:.4g}" for name, v in pairs)):
             yield
@@ -92,7 +92,7 @@ class Prior:
 def with_parameters(
     problem: Problem, random: RandomInterface, names: Sequence[str], values: Array
 ) -> tuple[Problem, RandomInterface]:
-    """Return both with some parameters replaced. Keys are the keys of a prior."""
+    """Return the problem and the random interface, with parameters replaced by keys of a prior."""
     keys = dict(zip(map(full_key, names), values.tolist(), strict=True))
     both = with_values({"problem": problem, "random": random}, keys)
     return both["problem"], both["random"]
@@ -119,7 +119,7 @@ def _tails(distribution: Any) -> tuple[float, float]:
 
 
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
-    """Return the prior of these arguments, or raise an `InputError` with all mistakes."""
+    """Return the prior for these arguments, or raise an `InputError` that lists all mistakes."""
     if not isinstance(given, Mapping) or not given:
         raise InputError(
             "prior: must map parameters to distributions or ranges, such as"

@@ -1,7 +1,7 @@
-"""Records: measured values at equal distances, on a line or a plane, with their gaps.
+"""Records: measured values with gaps, at equal distances on a line or a plane.
 
-A test for white noise is from Box and Pierce (1970), Journal of the American Statistical
-Association 65, 1509, see `refuse_uncorrelated`.
+The test for white noise in `refuse_uncorrelated` follows Box and Pierce (1970),
+Journal of the American Statistical Association 65, 1509.
 """
 
 from collections.abc import Sequence
@@ -32,14 +32,14 @@ JUMPING = 10.0
 
 
 class Record(NamedTuple):
-    """Values (SI) at points `spacings` (m) apart, (n,) or (nx, ny), with NaN at gaps."""
+    """Values (SI) with shape (n,) or (nx, ny), at points `spacings` (m) apart. Gaps are NaN."""
 
     values: Array
     spacings: tuple[float, ...]
 
 
 def records_of(profiles: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    """Return all profiles as records, see `stiction.fit_field`. Errors name the profile."""
+    """Return all profiles as records. See `stiction.fit_field`. Errors name the profile."""
     several = isinstance(profiles, list | tuple)
     several = several and not (profiles and all(map(_is_scalar, profiles)))
     records: list[Record] = []
@@ -66,7 +66,7 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
 
 
 def _is_scalar(value: Any) -> bool:
-    """Return whether a value is a number, None or a quantity of one number."""
+    """Return whether a value is a number, None, or a quantity with a single number."""
     return not isinstance(value, list | tuple | str) and getattr(value, "shape", ()) == ()
 
 
@@ -95,7 +95,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 
 
 def _of_array(values: Any, interface: Interface | None) -> list[Record]:
-    """Return records of values at the nodes of an interface, (*shape) or (samples, *shape)."""
+    """Return records from values (*shape) or (samples, *shape) at the nodes of an interface."""
     try:
         array = real_array(values)
     except TypeError as error:
@@ -112,7 +112,7 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
 
 
 def _spacing(x: Array, name: str) -> float:
-    """Return the distance (m) of equidistant points, given in order, or raise an error."""
+    """Return the distance (m) between equidistant points in order, or raise an error."""
     if not np.all(np.isfinite(x)) or x.size < 2:
         raise InputError(f"{name}: must be finite and have more than one point")
     steps = np.diff(x)
@@ -134,7 +134,7 @@ def _spacing(x: Array, name: str) -> float:
 
 
 def _checked(record: Record, quantity: str) -> Record:
-    """Refuse a record that cannot be fitted, and warn of outliers."""
+    """Refuse a record that cannot be fitted, and warn about outliers."""
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
@@ -165,11 +165,12 @@ def _checked(record: Record, quantity: str) -> Record:
 
 
 def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
-    """Refuse records of white noise, whose correlation length lies below their spacing.
+    """Refuse records of white noise: their correlation length is shorter than the spacing.
 
-    The sum of products v_i v_(i+j) over all lags j up to k, over the variance, has mean 0
-    for white noise, and a variance equal to the number of products (Box and Pierce, 1970,
-    who sum squares). The test takes k = 1, 2, 4, ..., and pools records and directions.
+    Take the sum of products v_i v_(i+j) over all lags j up to k, divided by the
+    variance. For white noise it has mean 0, and a variance equal to the number of
+    products. (Box and Pierce, 1970, sum squares instead.) The test takes k = 1, 2, 4,
+    ..., and pools records and directions.
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
@@ -190,7 +191,7 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
 
 
 def _doubt_jumps(record: Record) -> None:
-    """Warn of values that differ from both neighbours much more than usual.
+    """Warn about values that differ from both neighbours much more than usual.
 
     A dropout in a smooth record is far from its neighbours, but may be near the median.
     """

@@ -1,10 +1,11 @@
-"""Parameters that shift and stretch the strength, and so the onset, without simulation.
+"""Find parameters that shift and stretch the strength, and therefore the onset.
 
 Problem. The strength is tau_p = a + b s, with b > 0 and a profile s whose
 distribution does not depend on a and b. When is onset(a + b s) = a + b onset(s),
 sample by sample?
 
-Source. Duality of linear programmes (Farkas, 1902). The application is our own.
+Source. The derivation uses the duality of linear programmes (Farkas, 1902). The
+application is our own.
 
 Derivation:
 
@@ -19,15 +20,15 @@ Derivation:
 2. The local criterion is the same minimum with y restricted to one weight. It ignores the
    residual strength, so the equation always holds.
 3. In equilibrium, with slip in units of b, the strength is a + b max(s - W d, (tau_r -
-   a)/b). The problem is the same only if (tau_r - a)/b is: if a = 0 and tau_r is
-   zero or in proportion to tau_p.
+   a)/b). The problem is the same only if (tau_r - a)/b is the same: if a = 0, and
+   tau_r is zero or proportional to tau_p.
 4. A rupture also depends on the loading rate, which would have to scale with b.
 5. If W follows from a critical slip or a fracture energy, W and the nucleation length
    change with b. The equation does not hold.
-6. A friction coefficient mu = a + b s is a strength sigma_n (a + b s). The shift sigma_n
-   a is uniform only if the normal pressure is. Otherwise a must be zero. The same
-   holds if the load profile p varies without initial stress, as on specimens,
-   where <b s, y>/<p, y> only stretches.
+6. A friction coefficient mu = a + b s is a strength sigma_n (a + b s). The shift
+   sigma_n a is uniform only if the normal pressure is uniform. Otherwise a must be
+   zero. The parameter a must also be zero if the load profile p varies and there is
+   no initial stress, as on specimens: <b s, y>/<p, y> only stretches.
 """
 
 from typing import Any, NamedTuple
@@ -55,13 +56,13 @@ class Scaling(NamedTuple):
     slopes: Array  # derivatives of shift (unit of the peaks) and stretch, (keys, 2)
 
     def of(self, theta: Array) -> Array:
-        """Return shift (unit of the peaks) and stretch at points, (2, points)."""
+        """Return shift (in the unit of the peaks) and stretch at points, with shape (2, points)."""
         shift_stretch: Array = (theta - self.reference)[:, list(self.keys)] @ self.slopes
         return np.ascontiguousarray(shift_stretch.T) + np.array([[0.0], [1.0]])
 
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
-    """Find the parameters of a prior that scale the onset. `variable` names the peaks."""
+    """Find the parameters of a prior that scale the onset. `variable` is the name of the peaks."""
     middle = prior.middle
     problem, random = prior.at(middle)
     none, changed = (

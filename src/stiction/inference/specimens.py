@@ -1,16 +1,16 @@
-"""Mean and scatter between specimens, from profiles and peaks: one posterior on a grid.
+"""Posterior of the mean and the scatter between specimens, from profiles and peaks, on a grid.
 
-Problem. Specimen k has strength m b_k f(x): a mean m, a factor b_k of mean 1 and
-coefficient of variation s, and a field f of mean 1 within the specimen. Measured
-are the levels (means) of some specimen of mean strength c. Each measured specimen
-has its own factor. Find the posterior of m, s and the family of b, averaged over
-equally likely fields within.
+Problem. Specimen k has strength m b_k f(x). Here m is the mean, b_k a factor with
+mean 1 and coefficient of variation s, and f a field with mean 1 within the
+specimen. Measured are the levels (means) of some specimen of mean strength c. Each
+measured specimen has its own factor. Find the posterior of m, s and the family of
+b, averaged over equally likely fields within a specimen.
 
-Sources. Integration of hierarchical models: Gelman and others, Bayesian Data Analysis
-(2013), chapter 5. Half-Cauchy prior of a scatter: Gelman (2006), Bayesian Analysis 1,
-515.
+Sources. Gelman and others, Bayesian Data Analysis (2013), chapter 5, describe the
+integration of hierarchical models. Gelman (2006), Bayesian Analysis 1, 515,
+proposes the half-Cauchy prior for a scatter.
 
-Steps, with x = log(m b/reference), the logarithm of the strength of one specimen:
+In the steps, x = log(m b/reference) is the log strength of one specimen:
 
 1. Simulate onsets T of each field at the reference mean. This is sufficient if T(c)/c
    does not depend on c. Otherwise simulate at `ONSET_MEANS` means and interpolate
@@ -18,16 +18,17 @@ Steps, with x = log(m b/reference), the logarithm of the strength of one specime
 2. Tabulate the likelihood of each measured number as a function of x: the normal density
    of the logarithm of a level, or the density of simulated onsets at a peak
    (`stiction.inference.density`).
-3. Take `SCATTER_CELLS` values of s at equal shares of its prior, and `MEAN_CELLS` values
-   of log m. The likelihood of a number at (family, s, m) is the integral of step
-   2 over the density of x, which is the density of log b shifted by log m: a
-   convolution.
-4. Multiply over the numbers, and close in on the means with posterior mass.
-5. Fields are equally likely given the profiles. The peaks change their shares by the mean
-   of the likelihood over (family, s, m).
+3. Choose `SCATTER_CELLS` values of s at equal steps of its prior probability, and
+   `MEAN_CELLS` values of log m. The likelihood of a number at (family, s, m) is the
+   integral of step 2 over the density of x, which is the density of log b shifted
+   by log m: a convolution.
+4. Multiply the likelihoods of all numbers, and narrow the grid to the means with
+   posterior mass.
+5. Given the profiles, the fields are equally likely. The peaks multiply their
+   probabilities by the mean of the likelihood over (family, s, m).
 
-Departure. The levels enter the likelihood of (m, s) only. The fields within come from
-`fit_field` of the same profiles without their levels.
+Departure. The levels affect only the likelihood of (m, s). The fields within a
+specimen come from `fit_field` for the same profiles without their levels.
 """
 
 import math
@@ -83,7 +84,7 @@ def factor_of_family(family: str, cv: float) -> Any:
 
 
 def families_of(given: Any) -> tuple[str, ...]:
-    """Return families of factors: all for True, or the named families."""
+    """Return families of factors: all families if True, or else the named families."""
     names = (given,) if isinstance(given, str) else given
     names = tuple(FACTOR_FAMILIES) if given is True else names
     if not isinstance(names, list | tuple) or not names:
@@ -94,14 +95,14 @@ def families_of(given: Any) -> tuple[str, ...]:
 
 
 class FactorPrior(NamedTuple):
-    """Priors of the scatter s and the mean. A mean of None is flat in its logarithm."""
+    """Priors for the scatter s and the mean. None means a mean that is flat in its logarithm."""
 
     scatter: Any = scipy.stats.halfcauchy(scale=PRIOR_SCALE)
     mean: Any = None
 
     @classmethod
     def of(cls, given: Any) -> Self:
-        """Return the prior from a mapping of `MEAN_KEY` and `SCATTER_KEY` to distributions."""
+        """Return the prior, given a mapping from `MEAN_KEY` and `SCATTER_KEY` to distributions."""
         priors, keys = distributions_of(given or {}), (MEAN_KEY, SCATTER_KEY)
         if unknown := [key for key in priors if key not in keys]:
             raise InputError([unknown_name("prior", key, keys) for key in unknown])
@@ -114,14 +115,14 @@ class FactorPrior(NamedTuple):
         return prior
 
     def cells(self) -> Array:
-        """Return values of s at equal shares of the prior, (SCATTER_CELLS,)."""
+        """Return SCATTER_CELLS values of s at equal steps of prior probability."""
         low, high = self.scatter.cdf([0.0, MOST_CV])
         shares = low + (high - low) * (np.arange(SCATTER_CELLS) + 0.5) / SCATTER_CELLS
         return np.maximum(self.scatter.ppf(shares), LEAST_CV)
 
 
 class Profiles(NamedTuple):
-    """Equally likely fields within a specimen, and the level of each measured specimen."""
+    """Equally likely fields within a specimen, and the levels of the measured specimens."""
 
     fields: tuple[RandomInterface, ...]  # with the reference mean
     reference: float  # Pa, or a friction coefficient
@@ -132,14 +133,14 @@ class Profiles(NamedTuple):
 
     @classmethod
     def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
-        """Return fields without levels. Means and factors of the strength are left out."""
+        """Return fields without levels. Means and factors of the strength are removed."""
         reference = float(np.mean([one.strength.mean for one in members]))
         fields = tuple(dict.fromkeys(of_mean(one, reference) for one in members))
         return cls(fields, reference, np.zeros(0), np.zeros((len(fields), 0)), **more)
 
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
-    """Return a random interface with another mean and another factor of the strength."""
+    """Return a random interface with a different mean and a different factor of the strength."""
     factors = {k: v for k, v in (random.between or {}).items() if k != "strength"}
     between = factors | ({} if factor is None else {"strength": factor})
     field = random.strength
@@ -149,7 +150,7 @@ def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomI
 
 @dataclass(frozen=True, eq=False)
 class Onsets:
-    """Onsets of one kind of specimen over mean strength by field, and their densities."""
+    """Onsets divided by mean strength for one kind of specimen, by field, and their densities."""
 
     at: Array  # logarithms of c over the reference, (steps,)
     ratios: Array  # T(c) over c/reference, (fields, steps, samples)
@@ -157,12 +158,12 @@ class Onsets:
     area: float = 1.0  # ratio of peaks and onsets
 
     def of(self, order: Any) -> Self:
-        """Return the onsets of some fields by their numbers."""
+        """Return the onsets for the fields with given numbers."""
         densities = tuple(self.densities[k] for k in order)
         return replace(self, ratios=self.ratios[order], densities=densities)
 
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
-        """Return the logarithm of the density of each peak at x by a field, (peaks, points)."""
+        """Return the log density (peaks, points) of each peak at x for a field."""
         last = self.at.size - 1
         place = np.interp(x, self.at, np.arange(last + 1))
         first = np.minimum(place.astype(np.int64), max(last - 1, 0))
@@ -176,7 +177,7 @@ class Onsets:
         return out.T
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
-        """Return the range of x to tabulate for these peaks, and the least deviation of x."""
+        """Return the range of x to tabulate for these peaks, and the smallest deviation of x."""
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -185,7 +186,7 @@ class Onsets:
 
 
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
-    """Return points x over all ranges, a quarter of the least deviation apart."""
+    """Return points x over all ranges, spaced by a quarter of the smallest deviation."""
     lows, highs, deviations = zip(*ranges, strict=True)
     low, high = min(lows), max(highs)
     count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))
@@ -202,7 +203,7 @@ def _tabulated(family: str, cv: float) -> tuple[Array, Array]:
 
 
 def masses(family: str, cv: float, means: Array, x: Array) -> Array:
-    """Return the probability that x lies in the cell of each point, (means, points)."""
+    """Return the probability (means, points) that x lies in the cell of each point."""
     half = 0.5 * (x[1] - x[0])
     ends = np.append(x - half, x[-1] + half)
     return np.diff(np.interp(ends - means[:, None], *_tabulated(family, cv)), axis=1)
@@ -210,7 +211,7 @@ def masses(family: str, cv: float, means: Array, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Posterior mass of field, family, s and log m, and its evidence."""
+    """Posterior mass over field, family, s and log m, and the evidence."""
 
     profiles: Profiles
     means: Array  # log m over the reference, (means,), equidistant
@@ -224,7 +225,7 @@ class Grid:
         return dict(zip(self.profiles.families, masses, strict=True))
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
-        """Draw field, family, s and log m, (count, 4), also for given `fields`."""
+        """Draw field, family, s and log m, as (count, 4), also for given `fields`."""
         # Draw number i is the same in a longer list.
         cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)
         if fields is None:
@@ -240,14 +241,14 @@ class Grid:
         return np.stack([field, family, self.profiles.prior.cells()[cell], logs], axis=1)
 
     def interface(self, drawn: Array) -> RandomInterface:
-        """Return the random interface of a draw (4,)."""
+        """Return the random interface for a draw (4,)."""
         (field, family), profiles = drawn[:2].astype(int), self.profiles
         factor = factor_of_family(profiles.families[family], float(drawn[2]))
         mean = profiles.reference * math.exp(drawn[3])
         return of_mean(profiles.fields[field], mean, factor)
 
     def described(self, drawn: Array) -> dict[str, Array]:
-        """Return draws (draws, 4) as parameters by name."""
+        """Return parameters by name from draws (draws, 4)."""
         field, scale = drawn[:, 0].astype(np.int64), np.exp(drawn[:, 3])
         strengths = [one.strength for one in self.profiles.fields]
         deviations = np.array([one.standard_deviation for one in strengths])
@@ -261,7 +262,7 @@ class Grid:
 
 
 def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
-    """Return the posteriors of profiles alone and of profiles and peaks (steps 2 to 5)."""
+    """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -306,10 +307,10 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
 
 
 def _products(kernel: Array, tables: Array) -> Array:
-    """Return the sum over numbers of log likelihoods, (fields, families, cells, means).
+    """Return log likelihoods (fields, families, cells, means), summed over measured numbers.
 
-    `tables` holds log likelihoods of the numbers at x, (fields, numbers, points) (steps 3
-    and 4).
+    `tables` holds the log likelihoods (fields, numbers, points) of the numbers at x
+    (steps 3 and 4).
     """
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
@@ -321,7 +322,7 @@ def _products(kernel: Array, tables: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Likelihood of measured peaks by field and x, and predictions from a posterior."""
+    """Likelihood of measured peaks for each field and x, and predictions from a posterior."""
 
     profiles: Profiles
     method: Any
@@ -330,7 +331,7 @@ class Tables:
     peaks: tuple[Array, ...]
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
-        """Return the tables of other peaks, for all or some kinds of specimens."""
+        """Return the tables for other peaks, and for all or some kinds of specimens."""
         chosen = range(len(self.onsets)) if kinds is None else kinds
         return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in chosen))
 
@@ -340,16 +341,16 @@ class Tables:
         return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
 
     def of_field(self, field: int, x: Array) -> Array:
-        """Return log likelihoods of all peaks at x by a field, (peaks, points)."""
+        """Return log likelihoods (peaks, points) of all peaks at x for a field."""
         pairs = zip(self.onsets, self.peaks, strict=True)
         return np.concatenate([k.tabulated(field, peaks, self.error, x) for k, peaks in pairs])
 
     def __call__(self, x: Array) -> Array:
-        """Return log likelihoods of all peaks at x, (fields, peaks, points)."""
+        """Return log likelihoods (fields, peaks, points) of all peaks at x."""
         return np.stack([self.of_field(f, x) for f in range(len(self.profiles.fields))])
 
     def parts(self, u: Array) -> Array:
-        """Return the logarithm of the density of each peak at draws (draws, 4), (draws, peaks)."""
+        """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
         for family, cv, places in _laws(self.profiles, u):
@@ -362,7 +363,7 @@ class Tables:
         return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak of a kind of specimen for each draw (draws, 4)."""
+        """Draw a peak for a kind of specimen for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
         x = u[:, 3].copy()
@@ -376,7 +377,8 @@ class Tables:
     def quantile(self, grid: Grid, probabilities: Array, kind: int = 0) -> Array:
         """Return the quantiles of a further peak.
 
-        The predictive distribution is the mean over field, onset and grid, without draws.
+        The predictive distribution is the mean over field, onset and grid. No draws
+        are needed.
         """
         profiles, known = self.profiles, self.onsets[kind]
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)

@@ -1,32 +1,33 @@
-"""Whittle likelihood of records whose field is mapped from a Gaussian field, with noise on top.
+"""Whittle likelihood of records with noise, whose field is mapped from a Gaussian field.
 
-Problem. A record y = v(z) + e has periodogram I_k. For a spectrum of z, a map v
-and a noise variance its expectation is E_k. Find the parameters with the greatest
-likelihood
+Problem. A record y = v(z) + e has periodogram I_k. Its expectation E_k follows from
+the spectrum of z, the map v and the variance of the noise. Find the parameters with
+the greatest likelihood
 
     L = -sum_k w_k (log E_k + I_k/E_k).
 
-Sources. Whittle (1953), Arkiv foer Matematik 2, 423. With the exact expectation
-for a finite window it is the debiased likelihood of Sykulski, Olhede, Guillaumin,
-Lilly and Early (2019), Biometrika 106, 251, and on planes of Guillaumin,
-Sykulski, Olhede and Simons (2022), Journal of the Royal Statistical Society B 84,
-1526. Correlations of mapped fields: Grigoriu, Applied Non-Gaussian Processes
-(1995).
+Sources. The likelihood is due to Whittle (1953), Arkiv foer Matematik 2, 423. With
+the exact expectation for a finite window it becomes the debiased likelihood of
+Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, and on
+planes of Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
+Statistical Society B 84,
+1526. Correlations of mapped fields follow Grigoriu, Applied Non-Gaussian Processes
+      (1995).
 
 Steps:
 
-1. Average the periodograms of all records of one geometry (`window`).
+1. Average the periodograms of all records with the same geometry (`window`).
 2. The correlation of the values is a power series in the correlation of z, whose
-   coefficients are the squared Hermite coefficients of the map. White noise adds its
-   share at zero lag.
-3. E_k follows from this correlation exactly for the window. The variance is a free
+   coefficients are the squared Hermite coefficients of the map. White noise adds
+   its variance at zero lag.
+3. E_k follows exactly from this correlation and the window. The variance is a free
    parameter, so that its error in a short record does not disturb the shape of the
    spectrum.
-4. Add a floor of a thousandth of the highest power to I_k and E_k. A spectrum that is cut
-   off has almost no power at high wavenumbers, where rounding and higher orders
-   of the map would decide. The score stays unbiased, and power below the floor
-   ceases to count.
-5. Take the best point of a coarse grid of parameters, and climb by scoring
+4. Add a floor of a thousandth of the highest power to I_k and E_k. A truncated
+   spectrum has almost no power at high wavenumbers, and without a floor, rounding
+   and higher orders of the map would matter there. The score stays unbiased, and
+   power below the floor has no effect.
+5. Start at the best point of a coarse grid of parameters, and climb by scoring
    (`marginal_fit.climb`). Fisher's information is sum w d d^T with d = d log E/d
    theta.
 
@@ -83,15 +84,14 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in Hermite orders 0, 1, ..., and the rest as the
-    last share."""
+    """Return the shares of the variance in Hermite orders 0, 1, ... The last share is the rest."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
 
 
 class Observed(NamedTuple):
-    """Average periodogram of all records of one geometry, their number, and the floor."""
+    """Average periodogram of all records with the same geometry, their number, and the floor."""
 
     window: RecordWindow
     records: int
@@ -115,9 +115,9 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
-    `end_seen` says whether the truncation of the spectrum was given. Otherwise it is left
-    out: it lies at a multiple of 1/xi_0, and would determine the correlation length if it
-    fell among the wavenumbers of a record.
+    `end_seen` states whether the truncation of the spectrum was given. If not, the
+    truncation is left out: it lies at a multiple of 1/xi_0, and would determine the
+    correlation length if it fell among the wavenumbers of a record.
     """
 
     spectrum: Any
@@ -142,23 +142,23 @@ class Model(NamedTuple):
         return np.polynomial.polynomial.polyval(rho, self.shares)
 
     def signal(self, window: RecordWindow) -> Array:
-        """Return the expected periodogram, (*half), of values without noise and of variance 1."""
+        """Return the expected periodogram (*half) for values without noise, with variance 1."""
         return window.expectation(self.correlation(window))
 
     def expectation(self, window: RecordWindow, signal: Array | None = None) -> Array:
-        """Return the expected periodogram, (*half), from the `signal` if it is known (step 3)."""
+        """Return the expected periodogram (*half), from the `signal` if it is known (step 3)."""
         signal = self.signal(window) if signal is None else signal
         share = self.noise_share
         return self.variance * ((1.0 - share) * signal + share * window.white)
 
 
 def origin(name: str) -> float:
-    """Return the origin of the logarithm in which the error of a parameter is about normal."""
+    """Return the origin for the logarithm of a parameter, so that its error is about normal."""
     return 0.5 if name.endswith("exponent") else 0.0
 
 
 def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
-    """Return the name of a family of spectra and its fixed parameters, checked."""
+    """Return the name of a family of spectra and its fixed parameters, after checks."""
     table = table_of(given)
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
@@ -185,13 +185,13 @@ class SpectrumFamily:
 
     @cached_property
     def limits(self) -> Array:
-        """Ends of the ranges on the scale of the search, (parameters, 2)."""
+        """Ends of the ranges on the scale of the search, with shape (parameters, 2)."""
         ranges = RANGES | {"correlation_length": self.lengths}
         ends = zip(*[ranges[name] for name in self.free], strict=True)
         return np.transpose([self.vector(end) for end in ends])
 
     def model(self, vector: Array, shares: Array) -> Model:
-        """Return the model of a vector of parameters."""
+        """Return the model for a vector of parameters."""
         values = {
             n: float(v) if n == "noise_share" else origin(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
@@ -214,7 +214,7 @@ class SpectrumFamily:
         )
 
     def vector_of(self, model: Model) -> Array:
-        """Return the vector of a model."""
+        """Return the vector for a model."""
         return self.vector(list(self.of(model).values()))
 
     def of(self, model: Model) -> dict[str, float]:
@@ -249,7 +249,7 @@ class Whittle(NamedTuple):
         return value
 
     def coarse(self) -> Array:
-        """Return the best point of a coarse grid of parameters (step 5)."""
+        """Return the best point on a coarse grid of parameters (step 5)."""
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
         windows = [one.window for one in self.observed]
@@ -272,7 +272,7 @@ class Whittle(NamedTuple):
         return best
 
     def fit(self, start: Array) -> tuple[Array, tuple[Model, list[Array]]]:
-        """Return the vector of the greatest likelihood from a start, and `value`'s state there."""
+        """Return the vector with the greatest likelihood, from a start, and the state there."""
         limits = self.family.limits
         return climb(start, limits, self.value, self.score, longest=LONGEST, settled=SETTLED)
 
@@ -317,8 +317,8 @@ class Whittle(NamedTuple):
     ) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The error assumes independent ordinates. It is too small, but in proportion to the
-        true error.
+        The error assumes independent ordinates. It is too small, but proportional to
+        the true error.
         """
         model, (_, information) = state[0], self.score(at, state)
         slope = np.zeros(at.size)

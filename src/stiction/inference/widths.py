@@ -1,19 +1,20 @@
 """Expected widths of intervals and of the design after further tests or profiles.
 
 Problem. Specimens were measured, and their mean, scatter and fields have a
-posterior. How wide will the intervals and the design stress be after further
-measurements?
+posterior. How wide will the intervals be after further measurements, and how large
+the design stress?
 
-Source. Expectations over simulated campaigns, as in Lindley (1956), Annals of
-Mathematical Statistics 27, 986, with a width in place of information.
+Source. The expectation is over simulated campaigns, as in Lindley (1956), Annals of
+Mathematical Statistics 27, 986, but for a width instead of information.
 
 Steps, for each design and each simulated campaign:
 
-1. Draw a truth (field, family, s and mean) from the posterior of the present measurements.
-2. Draw further peaks and levels of profiles from this truth.
-3. Compute the posterior of all measurements together (`stiction.inference.specimens`).
-4. Take the width of the 90 % interval of each parameter, and the design stress of the
-   predictive distribution. The result holds their means over campaigns.
+1. Draw true values (field, family, s and mean) from the posterior given the present
+   measurements.
+2. Draw further peaks, and levels of further profiles, with these values.
+3. Compute the posterior given all measurements (`stiction.inference.specimens`).
+4. Compute the width of the 90 % interval for each parameter, and the design stress
+   from the predictive distribution. The result holds their means over campaigns.
 
 Departure. Only the `MAX_FIELDS` fields with the largest mass are kept.
 """
@@ -57,7 +58,7 @@ def expected_widths(
     unit: str,
     repetitions: int,
 ) -> xr.Dataset:
-    """Return widths of intervals and design stresses after further tests, see `design_of_tests`."""
+    """Return widths of intervals and design stresses after further tests. See `design_of_tests`."""
     seed, method, meter = simulation.seed, simulation.method, simulation.meter
     plans = {"now": (0, 0)} | {name: _plan(name, given) for name, given in designs.items()}
     if isinstance(random, SpecimenPosterior):
@@ -124,7 +125,7 @@ def _plan(name: str, given: Any) -> tuple[int, int]:
 
 
 def _fewer(tables: Tables, mass: Array) -> Tables:
-    """Return the tables of the fields with the largest mass."""
+    """Return the tables for the fields with the largest mass."""
     profiles = tables.profiles
     order = np.argsort(-np.broadcast_to(mass, len(profiles.fields)), kind="stable")[:MAX_FIELDS]
     fields = tuple(profiles.fields[k] for k in order)

@@ -1,28 +1,30 @@
-"""The exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
+"""Exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
-Problem. A record is not a period of the interface. Find the expectation of its
-periodogram after taper h (zero at gaps) and removal of a trend by the projection
-P. It is linear in the correlation C:
+Problem. A record is not a period of the interface. Find the expectation of the
+periodogram after a taper h (zero at gaps) and removal of a trend by the projection
+P. The expectation is linear in the correlation C:
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
 with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing
 and the loss of low wavenumbers to the trend.
 
-Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106,
-251, for a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
-Journal of the Royal Statistical Society B 84, 1526, for planes with gaps.
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251,
+treat a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
+Journal of the Royal Statistical Society B 84, 1526, treat planes with gaps.
 
 Steps:
 
-1. Fit orthonormal polynomials to the measured points: P is the identity less their
-   projection.
-2. For most wavenumbers the taper hides the trend, and a_k is the autocorrelation of h. One
-   transform gives the expectation at all of them.
+1. Fit orthonormal polynomials to the measured points: P is the identity minus the
+   projection on these polynomials.
+2. For most wavenumbers the trend has no effect because of the taper, and a_k is the
+   autocorrelation of h. One transform gives the expectation at all these
+   wavenumbers.
 3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
-4. The correlation comes from a transform of the spectrum on a period of `ROOM` records.
-   Add the density at all wavenumbers that look alike on the grid, the nearest
-   exactly and the farther aliases at few wavenumbers, because they are smooth.
+4. The correlation comes from a transform of the spectrum on a period of `ROOM`
+   records. Add the density at all wavenumbers that alias to the same wavenumber.
+   The nearest aliases are exact. Farther aliases are evaluated at few wavenumbers,
+   because their sum is smooth.
 
 Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
 """
@@ -66,10 +68,10 @@ class Edge(NamedTuple):
 
 
 class RecordWindow:
-    """Points of records with the same geometry, `spacings` (m) apart: taper, gaps, degree of trend.
+    """Geometry of records: points `spacings` (m) apart, taper, gaps and degree of the trend.
 
-    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. The shape of a real
-    transform is (*half).
+    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. A real transform has
+    shape (*half).
     """
 
     def __init__(
@@ -113,13 +115,13 @@ class RecordWindow:
         self.weights[(0,) * unit.ndim] = 0.0
 
     def products(self, weights: Array) -> Array:
-        """Return the sum of w_i w_j over pairs of measured points at each lag."""
+        """Return, for each lag, the sum of w_i w_j over pairs of measured points."""
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights
         return fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
 
     def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
-        """Return a_k at all lags, flat (step 3)."""
+        """Return a_k at all lags, flattened (step 3)."""
         turns = [number * np.arange(n) / n for number, n in zip(wave, self.shape, strict=True)]
         phase = 2.0 * np.pi * sum(np.ix_(*turns))
         carried = (self.taper * np.exp(-1j * phase))[self.measured]
@@ -130,7 +132,7 @@ class RecordWindow:
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
-        """Components of the wave vectors of `periodogram`, rad/m, in shapes that broadcast."""
+        """Components of the wave vectors in `periodogram`, rad/m, in shapes that broadcast."""
         axes = [fft.fftfreq(n, d) for n, d in zip(self.shape, self.spacings, strict=True)]
         axes[-1] = fft.rfftfreq(self.shape[-1], self.spacings[-1])
         return tuple(2.0 * np.pi * axis for axis in np.ix_(*axes))
@@ -142,13 +144,13 @@ class RecordWindow:
         return values - self.basis @ (self.basis.T @ values) + values.mean()
 
     def periodogram(self, values: Array) -> Array:
-        """Return |sum h (y - trend) exp(-i k x)|^2 of measured values (points,), (*half)."""
+        """Return |sum h (y - trend) exp(-i k x)|^2 as (*half), from measured values (points,)."""
         field = np.zeros(self.shape)
         field[self.measured] = values - self.basis @ (self.basis.T @ values)
         return np.abs(fft.rfftn(self.taper * field)) ** 2
 
     def expectation(self, covariance: Array) -> Array:
-        """Return the expected periodogram, (*half), from the covariance at all lags (2. and 3.)."""
+        """Return the expected periodogram (*half) from the covariance at all lags (steps 2, 3)."""
         every_other = tuple(slice(None, None, 2) for _ in self.shape)
         result = fft.rfftn(self._spread * covariance).real[every_other].copy()
         result[self._low] = self._exact @ covariance.ravel()
@@ -157,9 +159,9 @@ class RecordWindow:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode on a periodic grid. The sum is 1 (step 4).
 
-        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades out
-        at its truncation. It has no truncation if `end_seen` is false, because the
-        missing power of a rough spectrum would be taken for noise.
+        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades
+        out at its truncation. If `end_seen` is false, the spectrum is not truncated,
+        because the missing power of a rough spectrum would be mistaken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
@@ -187,11 +189,11 @@ class RecordWindow:
         return total
 
     def variance_of_mean(self, covariance: Array) -> float:
-        """Return the variance of the mean of the measured values from the covariance."""
+        """Return the variance of the mean of the measured values, from the covariance."""
         return float(np.sum(self.pairs * covariance) / np.sum(self.measured) ** 2)
 
     def taken_by_trend(self, covariance: Array) -> float:
-        """Return the expected sum of squares that `without_trend` takes from the field."""
+        """Return the expected sum of squares that `without_trend` removes from the field."""
         return float(np.sum(self._of_trend * covariance))
 
     def correlation(self, power: Array) -> Array:
@@ -200,14 +202,14 @@ class RecordWindow:
         return whole[self._lags]
 
     def sample(self, power: Array, rng: np.random.Generator) -> Array:
-        """Sample z at the measured points, (points,), as a piece of a period."""
+        """Sample z at the measured points (points,), as a piece of a period."""
         white = fft.rfftn(rng.standard_normal(self._period))
         whole = fft.irfftn(white * np.sqrt(power * math.prod(self._period)), self._period)
         return whole[tuple(slice(n) for n in self.shape)][self.measured]
 
 
 def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
-    """Return orthonormal polynomials of a total degree at the measured points, (points, terms)."""
+    """Return orthonormal polynomials (points, terms) up to a total degree, at measured points."""
     axes = np.ix_(*[np.linspace(-1.0, 1.0, n) for n in measured.shape])
     terms = [
         np.prod(np.broadcast_arrays(*[x**p for x, p in zip(axes, powers, strict=True)]), axis=0)
