@@ -1,7 +1,7 @@
-"""The command line: parse, call, print; and a result as a page.
+"""The command line, and pages that show a result.
 
 `commands` has a function for each command. Its arguments are the options, and its
 docstring is the help. `main` at the end turns errors into messages and exit codes.
-`report` puts text, figures and tables of a run on a page, with the template beside it,
-and `design_page` does so for a design.
+`report` writes a page with text, figures and tables of a run, with the template
+beside it. `design_page` writes a page for a design.
 """

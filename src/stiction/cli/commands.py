@@ -1,4 +1,4 @@
-"""The command line: parse, call, print. Numerics are imported inside commands: help is quick."""
+"""The command line: parse, call, print. Commands import numerics late, so that help is quick."""
 
 import functools
 import inspect
@@ -63,12 +63,12 @@ LOADING_RATE = 2e7
 
 
 def echo(text: Any = "", *, err: bool = False) -> None:
-    """Print a text that may come from a file, and escape all letters that steer a terminal."""
+    """Print text that may come from a file. Escape characters that control a terminal."""
     typer.echo(printable(str(text)), err=err)
 
 
 def in_options(text: str, command: Callable[..., Any]) -> str:
-    """Return a message in the words of a command: ``--gaps fill`` for ``gaps="fill"``."""
+    """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``."""
     methods = r"(?:\bmethod=)?st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)"
     text = re.sub(methods, _method, text)
     for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
@@ -94,7 +94,7 @@ def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
 
 
 def _ignore_local_style() -> None:
-    """Leave out a matplotlibrc in the current folder, which may come from a stranger."""
+    """Ignore a matplotlibrc in the current folder, because it may come from a stranger."""
     import matplotlib
 
     if Path(matplotlib.matplotlib_fname()).resolve().parent == Path.cwd():
@@ -121,7 +121,7 @@ def _interrupt(*_: object) -> None:
 
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
-    """Let an interruption end a run like Ctrl-C, which keeps stored results."""
+    """Let an interruption end a run as Ctrl-C does, so that stored results are kept."""
     signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
         signal.signal(signal.SIGINT, _interrupt)
@@ -138,7 +138,7 @@ def _resumable(out: Path) -> Iterator[None]:
 
 @contextmanager
 def _executor(scheduler: str | None) -> Iterator[Any]:
-    """Yield the executor of a Dask scheduler, or None."""
+    """Yield the executor for a Dask scheduler, or None."""
     if scheduler is None:
         yield None
         return
@@ -335,7 +335,7 @@ def check(study: StudyFile) -> None:
 
 
 def description(study: Any) -> dict[str, str]:
-    """Return a description of a study, in a few lines with titles."""
+    """Return a description of a study in a few titled lines."""
     import pandas as pd
 
     from stiction.ensemble.dataset import distinct
@@ -364,7 +364,7 @@ def description(study: Any) -> dict[str, str]:
 
 
 def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
-    """Return key numbers of a point and its random properties, by title and unit."""
+    """Return key numbers for a point and its random properties, with titles and units."""
     field = random.strength
     unit = "Pa" if field.of is None else "(friction coefficient)"
     numbers = {
@@ -380,7 +380,7 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
 
 
 def _cost(study: Any) -> dict[str, str]:
-    """Return the approximate time that a study takes, and the size of its result."""
+    """Return the approximate computing time for a study, and the size of its result."""
     from stiction.ensemble.batches import usable_cores
 
     points, samples, cores = study.experiments, study.ensemble.samples, usable_cores()
@@ -561,7 +561,7 @@ def rupture(
 
 
 def _summary(result: Any) -> str:
-    """Return the numbers of a rupture, a line for each variable, without NaN."""
+    """Return the numbers of a rupture, with a line for each variable that is not NaN."""
     lines = []
     for name in filter(result.__contains__, RUPTURE):
         numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
@@ -685,14 +685,14 @@ def reliability(
 
 
 def _options_of(names: Iterable[str]) -> str:
-    """Return names of arguments as options of a command."""
+    """Return the options of a command for names of arguments."""
     return ", ".join(f"--{name.replace('_', '-')}" for name in names)
 
 
 def _answer(
     study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
 ) -> None:
-    """Print the answer to the question of the command or of the study, at each point."""
+    """Print, for each point, the answer to the question in the command or in the study."""
     from stiction.ensemble.monte_carlo import monte_carlo
     from stiction.inference.agreement import agreement
     from stiction.study.study import Question
@@ -761,7 +761,7 @@ def _options(
 
 
 def _command(function: Callable[..., None]) -> Callable[..., None]:
-    """Word messages for the command. Ctrl-C ends with exit code 130, as shells expect."""
+    """Word messages for the command line. After Ctrl-C the exit code is 130, as shells expect."""
 
     def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
         echo(f"warning: {in_options(str(message), function)}", err=True)

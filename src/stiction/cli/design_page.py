@@ -1,4 +1,4 @@
-"""A design as a self-contained HTML page to file, which prints on A4."""
+"""A design as a self-contained HTML page for the files, which prints on A4."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -42,13 +42,13 @@ def write_design_page(
     path : path
         HTML file.
     problem : Problem
-        The problem of the design. Its constants are the inputs.
+        The problem for which the design was computed. Its constants are the inputs.
     evidence : sequence
-        Results behind the design, which are printed: a fit, a posterior, an
-        agreement. Their doubts and notes are listed as doubts.
+        Results on which the design rests, such as a fit, a posterior or an agreement.
+        They are printed on the page. Their doubts and notes are listed as doubts.
     sources : mapping, optional
-        The source of each input by its dotted key, such as ``{"load.pressing_force":
-        "drawing 12"}``. Inputs without a source are called assumed.
+        The sources of inputs by dotted key, such as ``{"load.pressing_force":
+        "drawing 12"}``. An input without a source is called 'assumed'.
     title : str
 
     Returns
@@ -59,7 +59,7 @@ def write_design_page(
     Raises
     ------
     InputError
-        If the answer is no design, or the file cannot be written.
+        If the answer is not a design, or if the file cannot be written.
 
     Examples
     --------
@@ -108,14 +108,14 @@ def write_design_page(
 
 
 def _demand(design: Answer) -> tuple[str, Callable[[float], str]]:
-    """Return 'force' or 'stress', and a function from a stress, Pa, to this demand in words."""
+    """Return 'force' or 'stress', and a function that words this demand for a stress, Pa."""
     if math.isnan(design.area):
         return "stress", partial(in_words, "Pa")
     return "force", lambda stress: in_words("N", design.area * stress)
 
 
 def _numbers(design: Answer) -> list[list[str]]:
-    """Return the rows of the table of results. Unknown optional quantities are left out."""
+    """Return the rows for the table of results. Unknown optional quantities are left out."""
 
     name, shown = _demand(design)
     low, high = map(shown, design.interval)
@@ -141,7 +141,7 @@ def _numbers(design: Answer) -> list[list[str]]:
 
 
 def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
-    """Return the heads and rows of the table of sensitivities."""
+    """Return the headings and rows for the table of sensitivities."""
     (name, shown), effects = _demand(design), design.sensitivities
     at_low, at_high = effects["stress_at_low"].values, effects["stress_at_high"].values
     columns = [map(str, effects[key].values) for key in ("source", "low", "high")]

@@ -63,7 +63,7 @@ class Page:
         self.parts.append({"kind": "figure", "caption": caption, "data": data})
 
     def table(self, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-        """Add a table, whose numbers are shown to five digits."""
+        """Add a table. Its numbers are shown with five digits."""
         cells = [[shown(entry) for entry in row] for row in rows]
         self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
 
@@ -85,7 +85,7 @@ class Page:
 
 
 def shown(entry: Any) -> str:
-    """Return a table entry as text: numbers to five digits, a dash for a missing value."""
+    """Return a table entry as text: numbers with five digits, or a dash for a missing value."""
     if entry is None or (isinstance(entry, float | np.floating) and np.isnan(entry)):
         return "\N{EN DASH}"
     if isinstance(entry, int | np.integer) and not isinstance(entry, bool):
@@ -96,7 +96,7 @@ def shown(entry: Any) -> str:
 
 
 def write_report(run: StoredRun, path: Path) -> None:
-    """Write a page about a run: figures, tables, failed samples, the study and versions."""
+    """Write a page about a run with figures, tables, failed samples, the study and versions."""
     state = run.status()
     if not state.done:
         reasons = state.damaged or ("no sample is stored yet",)
@@ -149,7 +149,7 @@ def add_curves(page: Page, run: StoredRun) -> None:
 
 
 def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
-    """Add densities of the onset and its quantiles along the longest axis of a sweep."""
+    """Add the density of the onset, and its quantiles along the longest axis of a sweep."""
     what = scaled(result[shown_quantity(result)])[2].partition(" (")[0]
     if not dims:
         figure = densities(result, None)
@@ -185,7 +185,7 @@ def _where(part: xr.Dataset, dims: list[str]) -> str:
 
 
 def densities(result: xr.Dataset, along: str | None) -> Figure:
-    """Return a figure with the densities of the onset and its position, along a sweep."""
+    """Return a figure with densities of the onset and its position, along a sweep."""
     parts = [result[[shown_quantity(result)]]]
     if DIRECTION in result["critical_position"].dims:
         place = result[["critical_position"]]
@@ -234,7 +234,7 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
 
 
 def _estimates(samples: Any) -> list[Any]:
-    """Return the number, mean, standard deviation and quantiles of samples as text."""
+    """Return as text the number, mean, standard deviation and quantiles of samples."""
     values = samples[np.isfinite(samples)]
     if values.size < 4:
         return [values.size, *[None] * (2 + len(QUANTILE_LEVELS))]
@@ -248,7 +248,7 @@ def _estimates(samples: Any) -> list[Any]:
 
 
 def rounded(value: float, error: float) -> str:
-    """Return a number to the second digit of its error."""
+    """Return a number, rounded to the second digit of its error."""
     if not 0.0 < error < math.inf:  # too few samples beyond the quantile
         return shown(float(value))
     digits = 1 - math.floor(math.log10(error))

@@ -137,7 +137,7 @@ def _fewer(tables: Tables, mass: Array) -> Tables:
 def _after(
     tables: Tables, truth: Array, tests: int, levels: int, rng: np.random.Generator
 ) -> tuple[Grid, Tables]:
-    """Return the posterior after further tests and profiles of a truth (1, 4) (steps 2 and 3)."""
+    """Return the posterior after further tests and profiles for a true draw (1, 4) (steps 2, 3)."""
     profiles = tables.profiles
     peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
     field, family, cv, log_mean = truth[0]

@@ -1,6 +1,7 @@
-"""Three methods for the load at which an interface begins to slide.
+"""Three methods that compute the load at which an interface begins to slide.
 
-Read `protocol`, the members of every method, and `onset`. `criterion` takes each
-patch by itself. `equilibrium` has every interaction and is exact as long as
-loading is slow. `dynamics` adds inertia, and starts from the end of equilibrium.
+Read `protocol`, which defines the members of every method, and `onset`. `criterion`
+treats each patch in isolation. `equilibrium` includes all interactions, and is
+exact if loading is slow. `dynamics` adds inertia, and starts where equilibrium
+ends.
 """

@@ -1,9 +1,9 @@
-"""The onset of given profiles by any method, and the check of a method that approximates another.
+"""Compute the onset of given profiles by any method, and check approximate methods.
 
-`onset`, `monte_carlo`, `infer` and failure probabilities check an approximate
-method, such as the local criterion: they solve some samples by the exact method,
-too. `exact_counterpart` returns the exact method, `may_differ` whether the check
-is worth its time, and `doubt` a warning.
+`onset`, `monte_carlo`, `infer` and failure probabilities check approximate methods,
+such as the local criterion, by solving some samples also with the exact method.
+`exact_counterpart` returns the exact method. `may_differ` returns whether the check
+is needed. `doubt` returns a warning.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ MAX_DIFFERENCE = 0.01
 
 
 def exact_counterpart(problem: Problem, method: Method) -> Method | None:
-    """Return the method that a method approximates, or `None` if it has no such method.
+    """Return the exact method that a method approximates, or `None`.
 
-    `None` also stands for an exact method that cannot take the problem.
+    The result is also `None` if the exact method cannot solve the problem.
     """
     name = optional_member(method, "exact_method")
     exact: Method | None = METHODS[name]() if name else None
@@ -54,7 +54,7 @@ def exact_counterpart(problem: Problem, method: Method) -> Method | None:
 def relative_differences(stress: Array, exact: Array) -> Array:
     """Return the differences from exact onsets, divided by the mean of the exact onsets.
 
-    Samples without an onset by either method are left out.
+    A sample is left out if either method finds no onset.
     """
     known = np.isfinite(stress) & np.isfinite(exact)
     mean = np.abs(exact.mean(where=known)) if known.any() else 1.0
@@ -64,7 +64,8 @@ def relative_differences(stress: Array, exact: Array) -> Array:
 def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
     """Return a warning if the mean or scatter of a difference is above 1 %, otherwise `None`.
 
-    `differences` maps a kind of samples to the mean and scatter of their relative differences.
+    `differences` maps a description of samples to the mean and scatter of relative
+    differences.
     """
     if not any(abs(size) > MAX_DIFFERENCE for pair in differences.values() for size in pair):
         return None
@@ -93,33 +94,34 @@ def onset(
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength tau_p (Pa), of shape (samples, nodes) or (nodes,), on a plane
-        (samples, nx, ny) or (nx, ny). Or several profiles by name, such as ``{"strength":
-        ..., "residual_strength": ...}``; give each of them here or in the problem, not in both
-        (see `Problem.sample`). In a DataArray or Dataset, the dimension 'x' runs along the
-        interface (on a plane 'x' and 'y'), its coordinate (m) gives the position of each
-        value, and stated `units` are converted (see `stiction.read_profile`). A DataArray with
-        the unit 1, or the name 'friction_coefficient', holds friction coefficients, which are
-        multiplied by the normal pressure.
+        Peak strength tau_p (Pa) with shape (samples, nodes) or (nodes,), or on a plane
+        (samples, nx, ny) or (nx, ny). Alternatively, several profiles by name, such as
+        ``{"strength": ..., "residual_strength": ...}``. Give each profile here or in the
+        problem, not in both (see `Problem.sample`). In a DataArray or Dataset, the
+        dimension 'x' runs along the interface (on a plane 'x' and 'y'), the coordinate
+        (m) gives the position of each value, and stated `units` are converted (see
+        `stiction.read_profile`). A DataArray with the unit 1, or the name
+        'friction_coefficient', holds friction coefficients, which are multiplied by the
+        normal pressure.
     method : LocalCriterion, Equilibrium or Rupture
-        The method. It has no default.
+        The method that computes the onset. There is no default.
     gaps : {"refuse", "fill"}
-        Whether to refuse missing values (NaN) or fill them as
+        Whether to refuse missing values (NaN), or to fill them as
         `stiction.read_profile` does.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable gets
+        True shows progress on standard error after a second. A callable receives
         (done, total).
 
     Returns
     -------
     xarray.Dataset
         Over 'sample': `critical_load`, `critical_stress`, `first_instability`
-        (Pa), `critical_position` (m), and the variables that the method adds. A
-        normal pressure adds `friction_coefficient`; a thickness, width or area
-        adds `critical_force` and `first_instability_force` (N). Every variable
-        has `units` and `long_name`. If gaps were filled, `in_gap` shows whether
-        the critical patch reaches into a gap, and the coordinate `measured` which
-        nodes have measured values.
+        (Pa), `critical_position` (m), and the variables that the method adds. If
+        there is a normal pressure, the result includes `friction_coefficient`. If a
+        thickness, width or area is known, it includes `critical_force` and
+        `first_instability_force` (N). Every variable has `units` and `long_name`. If
+        gaps were filled, `in_gap` states whether the critical patch reaches into a
+        gap, and the coordinate `measured` marks the nodes with measured values.
 
     Raises
     ------
@@ -129,10 +131,10 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If gaps are filled or the onset lies in a gap. If the local criterion is
-        off by more than 1 % in the first samples: at most 32, as many as
-        `Equilibrium` solves in two seconds, and only if a quick test leaves a
-        doubt.
+        If gaps are filled, or if the onset lies in a gap. Also if the error of the
+        local criterion exceeds 1 % in the first samples. These are checked only if a
+        quick test leaves a doubt: as many as `Equilibrium` solves in two seconds, but
+        at most 32.
     UnitWarning
         If a value is so unusual for a solid that its unit is in doubt.
 
@@ -174,9 +176,10 @@ def onset(
 
 
 def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) -> None:
-    """Warn if an approximate method is off in the first samples.
+    """Warn if an approximate method is inaccurate for the first samples.
 
-    The exact method solves at most `MAX_COMPARED` samples, as many as take `COMPARISON_SECONDS`.
+    The exact method solves as many samples as take `COMPARISON_SECONDS`, at most
+    `MAX_COMPARED`.
     """
     exact = exact_counterpart(problem, method)
     if exact is None:

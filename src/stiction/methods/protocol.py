@@ -1,4 +1,4 @@
-"""The protocol of methods, the table of all methods, and solvers whose results are checked."""
+"""The protocol for methods, the table of all methods, and solvers that check their results."""
 
 from __future__ import annotations
 
@@ -46,11 +46,12 @@ METHODS: Kinds = Kinds("methods", OWN)
 
 
 class Method(Protocol):
-    """Protocol of a method: options, and the solver that they define.
+    """Protocol for a method: its options, and the solver that they define.
 
-    `stiction.onset` and `stiction.monte_carlo` accept any frozen dataclass with these members. For
-    study files, make its `type` known by `stiction.extensions.register` or an entry point. The
-    members of `OptionalMembers` may be added.
+    `stiction.onset` and `stiction.monte_carlo` accept any frozen dataclass with these
+    members. To use the method in study files, make its `type` known with
+    `stiction.extensions.register` or an entry point. The members of `OptionalMembers`
+    may be added.
     """
 
     @property
@@ -62,19 +63,19 @@ class Method(Protocol):
         """Name of the method in figures, tables and progress."""
 
     def variables(self, problem: Problem) -> Mapping[str, Variable]:
-        """Return the variables of the solver's results, each with 'sample' as first dimension.
+        """Return the variables in the solver's results. Each has 'sample' as first dimension.
 
-        They include all of `stiction.extensions.onset_variables`.
+        They include all variables in `stiction.extensions.onset_variables`.
         """
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return how long a sample takes on a core, s, to a factor of three."""
+        """Return the time, s, that a sample takes on a core, within a factor of three."""
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why the method cannot take a problem, or an empty list."""
+        """Return the reasons why the method cannot solve a problem, or an empty list."""
 
     def prepare(self, problem: Problem) -> Solver:
-        """Return a solver of samples. Compute here whatever all samples share."""
+        """Return a solver for samples. Quantities that all samples share are computed here."""
 
 
 class OptionalMembers:
@@ -99,13 +100,14 @@ class OptionalMembers:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        From below: by min (tau_p - tau_i)/p, the load at which the first node slips. From above: by
-        the mean strength. The event is 'critical_stress' or 'first_instability'.
+        The bound from below is min (tau_p - tau_i)/p, the load at which the first
+        node slips. The bound from above is the mean strength. The event is
+        'critical_stress' or 'first_instability'.
         """
         return False, False
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
-        """Return whether to compare onsets of samples (Pa) with onsets by `exact_method`.
+        """Return whether to compare the onsets of samples (Pa) with the onsets by `exact_method`.
 
         Return False if a quick test finds that they differ by less than 1 %.
         """
@@ -122,7 +124,7 @@ MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
 
 
 def as_method(value: Any) -> Any:
-    """Return a method, or raise a ValueError that names the members it lacks."""
+    """Return a method, or raise a ValueError that lists its missing members."""
     if isinstance(value, type):
         raise ValueError(f"must be an object. Write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
@@ -141,7 +143,7 @@ MethodObject: TypeAlias = Annotated[
 
 
 def prepared(problem: Problem, method: Method) -> Solver:
-    """Return the solver of a method, which checks its values and adds friction coefficients."""
+    """Return the solver of a method. It checks values, and adds friction coefficients."""
     solver = method.prepare(problem)
     variables = method.variables(problem)
     lacking = [name for name in ONSET_VARIABLES if name not in variables]
@@ -182,7 +184,7 @@ def _check_values(
 
 
 def seconds_per_sample(problem: Problem, method: Method) -> float:
-    """Return how long a sample takes, s, at least a nanosecond, or raise an `InputError`."""
+    """Return the time, s, that a sample takes, at least 1 ns, or raise an `InputError`."""
     seconds = method.seconds_per_sample(problem)
     if not (is_finite(seconds) and seconds >= 0.0):
         raise InputError(
@@ -193,7 +195,7 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 
 def batch_size(problem: Problem, method: Method) -> int:
-    """Return how many samples form a batch: half a second of work, at most 512."""
+    """Return the number of samples in a batch: half a second of work, but at most 512 samples."""
     return max(
         1, min(MAX_BATCH_SAMPLES, int(BATCH_SECONDS / seconds_per_sample(problem, method)))
     )
@@ -202,7 +204,7 @@ def batch_size(problem: Problem, method: Method) -> int:
 def variables_of(
     problem: Problem, method: Method, pressure: bool = False
 ) -> dict[str, Variable]:
-    """Return the variables of a prepared solver; `pressure` if each sample has its own."""
+    """Return the variables of a prepared solver. `pressure` is true if pressures vary by sample."""
     variables = dict(method.variables(problem))
     if pressure or problem.given_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT
@@ -217,7 +219,7 @@ def label(
     attributes: Mapping[str, Any],
     more_variables: Mapping[str, Variable] = MappingProxyType({}),
 ) -> xr.Dataset:
-    """Return values of many samples as a dataset over 'sample' and, where needed, the nodes."""
+    """Return values for many samples as a dataset over 'sample' and, if needed, the nodes."""
     variables = variables_of(problem, method, "friction_coefficient" in values)
     coordinates = {"sample": (samples, SAMPLE)}
     return to_dataset(

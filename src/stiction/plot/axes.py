@@ -1,4 +1,4 @@
-"""Axes, given or new, units of their scales, and the problem behind a result."""
+"""Axes, which are given or new, units of their scales, and the problem behind a result."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ from stiction.problem.problem import Problem
 if TYPE_CHECKING:
 
     class FigureAxes(Axes):
-        """Axes on a figure, which can be saved, and not on a part of one."""
+        """Axes on a whole figure, which can be saved, instead of a part of a figure."""
 
         figure: Figure  # type: ignore[assignment,unused-ignore]
 else:
@@ -70,10 +70,10 @@ def space_numbers(axes: Axes) -> None:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return a figure that notebooks and galleries show, with sizes in inches.
+    """Return a figure, with sizes in inches, that notebooks and galleries show.
 
-    It is made outside `paper_style`, because a backend that is loaded here sets
-    parameters too.
+    The figure is made outside `paper_style`, because a backend that is loaded here
+    also sets parameters.
     """
     import matplotlib.pyplot as plt
 
@@ -86,7 +86,7 @@ def new_figure(width: float, height: float) -> Figure:
 def on_axes(
     ax: Axes | None, width: float = 1.35 * COLUMN, height: float = 2.8
 ) -> Iterator[Any]:
-    """Yield the caller's axes as they are, or new axes in the style of a printed page."""
+    """Yield the caller's axes unchanged, or new axes in the style of a printed page."""
     if ax is not None:
         if not isinstance(ax, Axes):
             raise InputError(
@@ -116,7 +116,7 @@ def problem_of(result: Any, problem: Problem | None = None) -> Problem:
 
 
 def need(result: Any, *names: str, hint: str = "") -> None:
-    """Refuse a result without these variables, in a message that ends with the hint."""
+    """Refuse a result without these variables. The message ends with the hint."""
     check("result", result, xr.Dataset)
     missing = [name for name in names if name not in result]
     if missing:
@@ -127,7 +127,7 @@ def need(result: Any, *names: str, hint: str = "") -> None:
 
 
 def named(results: Any) -> dict[str, xr.Dataset]:
-    """Return results by name. If no names are given, they are the names of the methods."""
+    """Return results by name. If no names are given, use the names of the methods."""
     if isinstance(results, xr.Dataset):
         results = [results]
     if not isinstance(results, Mapping):
@@ -144,9 +144,9 @@ def named(results: Any) -> dict[str, xr.Dataset]:
 
 
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
-    """Return the variable of an onset to draw: force, else coefficient, else stress.
+    """Return the variable of an onset to draw: force, or else coefficient, or else stress.
 
-    On a plane, whose area is always known, forces are drawn on request only.
+    On a plane the area is always known, but forces are drawn only on request.
     """
     if quantity is None:
         names = ["critical_force"] * (DIRECTION not in result.dims) + ["friction_coefficient"]
@@ -157,7 +157,7 @@ def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
 
 
 def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, str]:
-    """Return factor, unit and label, such as 'critical stress (MPa)', of like variables."""
+    """Return the factor, unit and label, such as 'critical stress (MPa)', for like variables."""
     values = np.concatenate([part.values.ravel() for part in (variable, *others)])
     factor, unit = unit_for(str(variable.attrs.get("units", "1")), values)
     name = str(variable.name).replace("_", " ")
@@ -167,7 +167,7 @@ def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, s
 
 
 def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) -> None:
-    """Add a scale of stress over mean normal pressure on the other side, if there is a pressure.
+    """If there is a pressure, add a scale of stress over mean normal pressure on the other side.
 
     `which` is the scale of stresses, "x" or "y", and `factor` the factor of its unit.
     """
@@ -178,7 +178,7 @@ def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) 
 
 
 def add_scale(axes: Axes, which: str, ratio: float, label: str) -> None:
-    """Add a scale of the values times a ratio on the other side."""
+    """Add a scale on the other side that shows the values times a ratio."""
     convert = (lambda value: value * ratio, lambda value: value / ratio)
     if which == "y":
         axes.secondary_yaxis("right", functions=convert).set_ylabel(label)

@@ -1,4 +1,4 @@
-"""Many onsets: density, quantiles along a sweep, and the tail over decades."""
+"""Figures of many onsets: density, quantiles along a sweep, and the tail over decades."""
 
 from contextlib import suppress
 from typing import Any
@@ -41,7 +41,7 @@ TINY = 1e-300
 def monte_carlo(
     result: Any, *, quantity: str | None = None, measured: Any = None, ax: Axes | None = None
 ) -> FigureAxes:
-    """Draw the density of the onset in an ensemble or several, or along a sweep.
+    """Draw the density of the onset, in one or more ensembles or along a sweep.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def monte_carlo(
         pressure, else `critical_stress`. `critical_position` is drawn as a
         histogram.
     measured : Peaks, Curves or array, optional
-        Peaks of tests, in SI or with a unit, which are marked separately.
+        Peaks from tests, in SI or with a unit. They are marked separately.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -109,7 +109,7 @@ def monte_carlo(
 
 
 def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[np.float64]:
-    """Return measured peaks of the drawn quantity, in SI."""
+    """Return measured peaks in SI, for the quantity that is drawn."""
     peaks = make_peaks(measured, str(variable.attrs.get("units", "1")))
     if peaks.unit != variable.attrs.get("units", "1"):
         raise InputError(
@@ -147,13 +147,13 @@ def quantiles(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `Study.run` with a sweep over a parameter or two. The second
-        parameter makes curves. Several results, as a list or by name, are
-        compared along the same sweep over a single parameter.
+        From `Study.run` with a sweep over one or two parameters. With two parameters,
+        there is a curve for each value of the second. Several results, as a list or
+        by name, are compared along the same sweep over a single parameter.
     quantity : str, optional
         As in `monte_carlo`.
     along : str, optional
-        Dimension along the abscissa. The default is the longest.
+        Dimension along the abscissa. By default the longest dimension.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -161,7 +161,7 @@ def quantiles(
     -------
     matplotlib.axes.Axes
         Medians with their 95 % confidence intervals, and bands between quartiles. A
-        single curve has a paler band between the 5 % and 95 % quantiles too.
+        single curve also has a paler band between the 5 % and 95 % quantiles.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def quantiles(
 def _compared(
     results: dict[str, xr.Dataset], quantity: str | None
 ) -> list[tuple[str | None, xr.DataArray]]:
-    """Return the same sweep of several results, by their names."""
+    """Return several results over the same sweep, by name."""
     quantity = shown_quantity(next(iter(results.values())), quantity)
     curves: list[tuple[str | None, xr.DataArray]] = []
     for name, result in results.items():
@@ -246,7 +246,7 @@ def _steps(variable: xr.DataArray, along: str) -> list[tuple[str | None, xr.Data
 def _quantiles(
     part: xr.DataArray, factor: float, along: str
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return quantiles (levels, steps), and errors of the median (2, steps), as drawn."""
+    """Return quantiles (levels, steps) and errors of the median (2, steps), as drawn."""
     values_at = np.full((len(DRAWN_QUANTILES), part.sizes[along]), np.nan)
     errors = values_at[:2].copy()
     for step in range(part.sizes[along]):
@@ -265,7 +265,7 @@ def _finite(values: Any) -> NDArray[np.float64]:
 
 
 def _step_texts(coordinate: xr.DataArray) -> list[str]:
-    """Return the values of the steps of a sweep in the unit of its name."""
+    """Return the values at the steps of a sweep, in the unit of its name."""
     if coordinate.dtype.kind == "f":
         return [f"{value:.4g}" for value in coordinate.values * scaled(coordinate)[0]]
     texts = map(str, coordinate.values)
@@ -287,8 +287,8 @@ def failure_curve(
     curve : Dataset
         From `stiction.failure_curve`.
     stress : float, optional
-        Demand, Pa: the mean shear stress to carry. It is marked, with its
-        probability.
+        Demand, Pa: the mean shear stress to carry. The figure marks the demand and
+        its probability.
     force : float, optional
         Demand as a force, N, instead of `stress`.
     ax : matplotlib.axes.Axes, optional
@@ -297,10 +297,10 @@ def failure_curve(
     Returns
     -------
     matplotlib.axes.Axes
-        The scale at the top shows forces if the area of the interface is known,
-        else friction coefficients if there is a normal pressure. A dotted line
-        marks the lower bound of the strength. For equally likely interfaces, the
-        line is their mean, and a wider band contains 90 % of them.
+        The scale at the top shows forces if the area of the interface is known, or
+        else friction coefficients if there is a normal pressure. A dotted line marks
+        the lower bound of the strength. For equally likely interfaces, the curve is
+        their mean, and a wider band contains 90 % of them.
 
     Raises
     ------
@@ -355,7 +355,7 @@ def failure_curve(
 
 
 def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
-    """Draw the sensitivities of a design, with the widest at the top.
+    """Draw the sensitivities of a design. The widest is at the top.
 
     Parameters
     ----------
@@ -367,8 +367,8 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar connects the designs at both ends of a range. The line is the
-        design, and the band its interval.
+        Each bar connects the designs at both ends of a range. The line is the design,
+        and the band is its interval.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Profiles along a line, maps of a plane, and onsets on them."""
+"""Figures of profiles along a line and maps of a plane, with onsets."""
 
 from collections.abc import Mapping
 from contextlib import suppress
@@ -41,16 +41,17 @@ def field(
     quantity: str | None = None,
     ax: Axes | None = None,
 ) -> FigureAxes:
-    """Draw a profile or a partly measured field, as lines along x or as a map of a plane.
+    """Draw a profile or a partly measured field, along x or as a map of a plane.
 
     Parameters
     ----------
     where : Problem or Interface
     profile : array or RandomField
-        An array of shape (nodes,) or (samples, nodes), of which the first six
-        samples are drawn. On a plane, (nx, ny) or (samples, nx, ny), of which the
-        first sample is drawn. A field is drawn as its median with the measured
-        values (`RandomField.given`), and on a line with its central 90 % band.
+        On a line, an array with shape (nodes,) or (samples, nodes). The first six
+        samples are drawn. On a plane, an array with shape (nx, ny) or (samples, nx,
+        ny). The first sample is drawn. A field is drawn as its median with the
+        measured values (`RandomField.given`), and on a line also with its central 90
+        % band.
     quantity : str, optional
         Name of the property, as `RandomInterface` uses it, or
         'friction_coefficient'. The default is 'friction_coefficient' for a field
@@ -113,7 +114,7 @@ def field(
 
 
 def rows_of(interface: Interface, profile: Any) -> Array:
-    """Return a profile as (samples, *shape), or raise an `InputError` for another shape."""
+    """Return a profile as (samples, *shape), or raise an `InputError` for a wrong shape."""
     values = np.asarray(getattr(profile, "values", profile), dtype=np.float64)
     shape = interface.shape
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:
@@ -125,7 +126,7 @@ def rows_of(interface: Interface, profile: Any) -> Array:
 
 
 def name_line(axes: Axes, interface: Interface, text: str) -> None:
-    """Name the scales of profiles along a line."""
+    """Label the scales of profiles along a line."""
     factor, unit = unit_for("m", interface.lengths)
     axes.set_xlim(0.0, interface.measure * factor)
     axes.set_xlabel(f"position $x$ ({unit})")
@@ -135,7 +136,7 @@ def name_line(axes: Axes, interface: Interface, text: str) -> None:
 def draw_map(
     axes: Axes, interface: Interface, values: NDArray[Any], text: str, **options: Any
 ) -> Any:
-    """Draw values (nx, ny) of a plane with their scale and names of the directions."""
+    """Draw values (nx, ny) on a plane, with their scale and the names of the directions."""
     factor, unit = unit_for("m", interface.lengths)
     (x, y), (dx, dy) = interface.lengths, interface.spacings
     ends: Any = factor * np.array([-0.5 * dx, x - 0.5 * dx, -0.5 * dy, y - 0.5 * dy])
@@ -151,7 +152,7 @@ def draw_map(
 
 
 def map_height(interface: Interface, more: float = 1.0) -> float:
-    """Return the height of a figure, inches, with a map and `more` for the rest."""
+    """Return the height, inches, of a figure with a map and `more` for other parts."""
     x, y = interface.lengths
     return more + 4.0 * float(np.clip(y / x, 0.2, 2.0))
 
@@ -164,7 +165,7 @@ def onset(
     sample: int = 0,
     ax: Axes | None = None,
 ) -> FigureAxes:
-    """Draw a strength profile and the position of its onset, by a method or several.
+    """Draw a strength profile and the position of its onset, by one or more methods.
 
     Parameters
     ----------
@@ -172,9 +173,9 @@ def onset(
         From `stiction.onset` with this strength. Give several methods as a list,
         or by name.
     strength : array
-        tau_p, Pa, of shape (nodes,) or (samples, nodes), on a plane (nx, ny) or
-        (samples, nx, ny). A DataArray of friction coefficients (unit 1) is
-        multiplied by the normal pressure.
+        tau_p, Pa, with shape (nodes,) or (samples, nodes), or on a plane (nx, ny) or
+        (samples, nx, ny). A DataArray of friction coefficients (unit 1) is multiplied
+        by the normal pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int
@@ -265,7 +266,7 @@ def _draw_plane(
 def _mark(
     axes: Axes, interface: Interface, results: Mapping[str, xr.Dataset], factor: float
 ) -> None:
-    """Mark the positions of onsets, on a line at their loads, in the unit of the factor."""
+    """Mark the positions of onsets. On a line, marks are at the loads times `factor`."""
     length, length_unit = unit_for("m", interface.lengths)
     for number, (name, result) in enumerate(results.items()):
         place = np.atleast_1d(result["critical_position"].values[0]) * length

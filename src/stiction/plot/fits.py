@@ -1,4 +1,4 @@
-"""Figures for checking fits: a field fitted to profiles, measured and predicted peaks."""
+"""Figures that check fits: a field fitted to profiles, and measured and predicted peaks."""
 
 from typing import Any
 
@@ -45,12 +45,11 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     Returns
     -------
     (4,) array of matplotlib.axes.Axes
-        (a) Values and the fitted marginal, (b) quantiles of the data against
-        quantiles of the fit, (c) correlation, with the effect of the window, and
-        (d) spectrum, each for all records together. The bands show records that
-        were simulated from the fitted field. They contain 90 % of the fits to
-        such records in (a) and (b), and 90 % of the sets of such records in (c)
-        and (d).
+        Panels for all records together: (a) values and the fitted marginal, (b)
+        quantiles of the data against quantiles of the fit, (c) correlation, with the
+        effect of the window, and (d) spectrum. The bands come from records that were
+        simulated from the fitted field. In (a) and (b) they contain 90 % of the fits
+        to such records. In (c) and (d) they contain 90 % of the sets of such records.
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
@@ -109,9 +108,9 @@ def _powers(observed: list[Observed]) -> list[Array]:
 
 
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
-    """Return the correlation in the windows at lags (m), weighted by the number of values.
+    """Return the correlation in the windows at lags (m). Records are weighted by their size.
 
-    A record counts at lags up to half of its length, because its own period repeats them
+    A record counts at lags up to half of its length, because its period repeats lags
     beyond.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
@@ -146,7 +145,7 @@ def _correlation(
 
 
 def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
-    """Return wavenumber (rad/m) and spectral density averaged over bands, (2, bands)."""
+    """Return band averages (2, bands) of wavenumber (rad/m) and spectral density."""
     rows: list[tuple[Array, Array, Array]] = []
     for (window, records, *_), power in zip(observed, powers, strict=True):
         kept = window.weights > 0.0
@@ -213,8 +212,8 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        If the prediction is right, all steps of 90 % of campaigns with so many
-        tests lie in the shaded band. Each length of specimens has its own colour.
+        If the prediction is right, the steps lie completely in the shaded band for 90
+        % of campaigns with as many tests. Each specimen length has a colour.
 
     Examples
     --------

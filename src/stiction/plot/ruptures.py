@@ -1,4 +1,4 @@
-"""Ruptures: slip rate in space and time, front, film, moment rate, and sizes of many events."""
+"""Figures of ruptures: slip rate, front, film, moment rate, and sizes of many events."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -65,7 +65,7 @@ KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stre
 def rupture(
     run: xr.Dataset, *, problem: Problem | None = None, ax: Axes | None = None
 ) -> FigureAxes:
-    """Draw slip rate in space and time, or the advance of the front on a plane.
+    """Draw the slip rate in space and time, or the advance of the front on a plane.
 
     Parameters
     ----------
@@ -114,8 +114,9 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Left the moment rate, until it stays below a twentieth of its largest
-        value; right its spectrum, which tends to the moment at low frequencies.
+        The left panel shows the moment rate, until it stays below a twentieth of its
+        largest value. The right panel shows its spectrum, which tends to the moment
+        at low frequencies.
 
     Examples
     --------
@@ -156,23 +157,23 @@ def events(
     *,
     problem: Problem | None = None,
 ) -> NDArray[Any]:
-    """Draw how frequent events of each size are, and their moment over their area or length.
+    """Draw the frequency of events by size, and their moment against area or length.
 
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
         From `monte_carlo`, `onset` or a study whose method has ``events=``, or from
         `simulate_rupture` or `equilibrium_path`. Give several as a list, or by name.
-    problem : Problem, optional
-        Needed only if the result does not hold it.
+        problem : Problem, optional Needed only if the result does not hold it.
 
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        Left the number of events per sample whose moment is at least so large;
-        right moment over area, on lines over length. Between half-spaces a line
-        shows cracks with the median `event_area_stress_drop`: Eshelby's circular crack on
-        planes, Starr's on lines.
+        The left panel shows the number of events per sample with at least a given
+        moment. The right panel shows moment against area, or on a line against
+        length. Between half-spaces, a curve shows cracks with the median
+        `event_area_stress_drop`: Eshelby's circular crack for planes, and Starr's crack
+        for lines.
 
     Examples
     --------
@@ -238,8 +239,9 @@ def events(
 def crack_moment(problem: Problem, drop: float, sizes: Array) -> Array:
     """Return the moment of cracks with a uniform stress drop (Pa) between half-spaces.
 
-    On a line of length 2a, pi drop a² G/G* (Starr, 1928); on a plane a circular crack of radius a,
-    16 (1 - nu)/(3 (2 - nu)) drop a³ (Eshelby, 1957).
+    For a crack of length 2a on a line, the moment is pi drop a² G/G* (Starr, 1928).
+    For a circular crack of radius a on a plane, it is 16 (1 - nu)/(3 (2 - nu)) drop
+    a³ (Eshelby, 1957).
     """
     solid = problem.solid
     if problem.interface.is_plane:
@@ -266,8 +268,8 @@ def film(
     path : path
         Ends in .gif.
     frames : int
-        Maximum number of frames, evenly spaced over the frames of the run, which lie
-        closer in time as the interface accelerates.
+        Maximum number of frames. They are evenly spaced over the frames of the run,
+        which are closer in time as the interface accelerates.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -311,7 +313,7 @@ def film(
 
 
 def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
-    """Return times of a run, s, and their beginning in words: the onset, if any."""
+    """Return the times of a run, s, and in words the event at time zero, such as the onset."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
         return run[times].values - onset, " since the onset"
@@ -319,14 +321,14 @@ def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
 
 
 def _rates(rate: Array, decades: float) -> tuple[Any, LogNorm]:
-    """Return slip rates, masked some decades below the largest, and their colours."""
+    """Return slip rates, masked if they are decades below the largest, and their colours."""
     top = max(float(rate.max()), 1e-12)
     low = top * 10.0**-decades
     return np.ma.masked_less(rate, low), LogNorm(low, top)
 
 
 def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
-    """Return the peak strength, Pa, NaN where infinite, and factor and unit of a scale."""
+    """Return the peak strength, Pa (NaN if infinite), and the factor and unit of a scale."""
     strength = run["peak_strength"].where(np.isfinite(run["peak_strength"])).values
     return strength, *unit_for("Pa", strength)
 
@@ -380,7 +382,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 
 
 def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
-    """Return a line of text at the top of a figure, with time and mean stress."""
+    """Return text at the top of a figure, and its content in each frame: time and mean stress."""
     since, begin = _since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)

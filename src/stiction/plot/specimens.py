@@ -1,4 +1,4 @@
-"""Figures of specimens: blocks and their drive, and the curve that a machine records."""
+"""Figures of specimens: the blocks and their drive, and the curve that a machine records."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,16 +29,16 @@ def specimen(
     *,
     sample: int = 0,
 ) -> NDArray[Any]:
-    """Draw the blocks with their drive, and the shear and pressure from the drive.
+    """Draw the blocks and their drive, and the shear and pressure that the drive causes.
 
     Parameters
     ----------
     problem : Problem
-        With a specimen.
+        A problem with a specimen.
     strength : array, optional
-        tau_p, Pa, (nodes,) or (samples, nodes).
+        tau_p, Pa, with shape (nodes,) or (samples, nodes).
     result : Dataset, optional
-        From `stiction.onset` with this strength: the critical patch is marked.
+        From `stiction.onset` with this strength. The critical patch is marked.
     sample : int
         Number of the sample, counted from 0.
 
@@ -88,7 +88,7 @@ def specimen(
 
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
-    """Draw two blocks, and arrows for the drive. Heights have their own scale."""
+    """Draw two blocks, and arrows for the drive. Heights have a separate scale."""
     blocks, length = problem.specimen, problem.interface.measure * scale
     assert blocks is not None  # `problem.blocks` has refused it
     height, drive = blocks.height * scale, blocks.drive
@@ -124,17 +124,17 @@ def force_travel(
     measured: Curves | None = None,
     ax: Axes | None = None,
 ) -> FigureAxes:
-    """Draw the curve of a machine: force against the travel of the drives, with its drops.
+    """Draw the curve of a machine: force against travel of the drives, with drops.
 
     Parameters
     ----------
     result : Dataset, or sequence of Dataset
-        From `stiction.equilibrium_path` of a specimen, at many loads. Several
-        paths, of samples from the same field, are drawn as their median, with a
-        band that contains 90 % of them at each travel.
+        From `stiction.equilibrium_path` for a specimen, at many loads. Several paths,
+        for samples from the same field, are drawn as a median, with a band that
+        contains 90 % of them at each travel.
     measured : Curves, optional
-        From `stiction.read_curve`. They are drawn over the prediction, with their
-        precursors.
+        From `stiction.read_curve`. The curves are drawn over the prediction, with
+        their precursors.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -197,7 +197,7 @@ def force_travel(
 
 
 def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
-    """Draw a band with 90 % of several curves, up to the travel at which half of them slide."""
+    """Draw a band with 90 % of several curves, up to the travel at which half have slid."""
     known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
     ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
     grid = np.linspace(0.0, float(np.median(ends)), 400)
@@ -215,21 +215,21 @@ def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -
 
 
 def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
-    """Draw how fast both blocks move while an event runs, at some times.
+    """Draw the velocity of both blocks at some times during an event.
 
     Parameters
     ----------
     run : Dataset
-        From `stiction.simulate_rupture` on a specimen.
+        From `stiction.simulate_rupture` with a specimen.
     problem : Problem, optional
         Needed only if the run does not hold it.
 
     Returns
     -------
     (rows, columns) array of matplotlib.axes.Axes
-        Velocity along the interface, at times when 2 to 95 % of the slip have
-        happened. All panels share a scale of colours, and 1 % of the values lie
-        beyond its ends. Time counts from the first arrival of the front.
+        Velocity along the interface, at times when 2 to 95 % of the slip has
+        occurred. All panels share a colour scale, and 1 % of the values lie beyond
+        its ends. Time counts from the first arrival of the front.
     """
     need(run, "block_velocity", hint=". It is kept for specimens")
     interface = problem_of(run, problem).interface
@@ -265,7 +265,7 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
 
 
 def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
-    """Return travel (m), force (N), its name, and the name of the force at events.
+    """Return travel (m), force (N), the name of the force, and the name of the force at events.
 
     If the thickness is unknown, the force is the mean stress (Pa).
     """

@@ -1,4 +1,4 @@
-"""The style of every figure: column widths of a journal, and lines distinct in grey."""
+"""The style of all figures: column widths of a journal, and lines that differ also in grey."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -68,16 +68,16 @@ _RC: dict[str, Any] = {
 
 @contextmanager
 def paper_style() -> Iterator[None]:
-    """Set fonts, widths, colours and ticks of a printed page for the figures drawn inside.
+    """Set the fonts, widths, colours and ticks of a printed page for figures drawn inside.
 
-    A style of the user, such as a dark style, has no effect inside.
+    Inside, a user's style, such as a dark style, has no effect.
     """
     with matplotlib.style.context(["default", _RC]):
         yield
 
 
 def readable(color: Any, background: Any) -> Any:
-    """Return a colour of the same hue with a contrast of at least 4.5 to 1 to a background.
+    """Return a colour with the same hue, and a contrast of at least 4.5 to 1 with a background.
 
     The contrast is defined in the Web Content Accessibility Guidelines 2.1, 1.4.3.
     """
@@ -98,7 +98,7 @@ def readable(color: Any, background: Any) -> Any:
 
 
 def keep_contrast(axes: Axes, given: set[Any]) -> None:
-    """Make new lines and texts on a user's axes readable, and leave `given` artists alone."""
+    """Make new lines and texts on a user's axes readable. The `given` artists stay unchanged."""
     background = axes.get_facecolor()
     if background[3] == 0.0:
         background = axes.figure.get_facecolor()
@@ -108,7 +108,7 @@ def keep_contrast(axes: Axes, given: set[Any]) -> None:
 
 
 def series(index: int, *, marker: bool = False) -> dict[str, Any]:
-    """Return colour, dashes and (on request) marker of series `index` as plot keywords."""
+    """Return plot keywords for series `index`: colour, dashes and (on request) marker."""
     color, dashes, symbol = _SERIES[index % len(_SERIES)]
     style: dict[str, Any] = {"color": color, "linestyle": dashes}
     if marker:

@@ -1,4 +1,4 @@
-"""Failure curves as runs on disk: repetitions in the store of a study."""
+"""Failure curves as runs on disk: the store of a study holds their repetitions."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ OF_LEVEL, OF_SAMPLE = ("ceiling", "log_probability"), ("value", "ancestor", "mem
 
 
 def repetition_of(state: LimitState, smallest: float, number: int) -> Descent:
-    """Return a repetition by number, down to the smallest probability of a curve."""
+    """Return the repetition with a given number, down to the smallest probability of a curve."""
     goal = Goal(0.0, probability=smallest)
     return repetition(state, goal, None, OF_CURVES.key, OF_CURVES.first, number)
 
 
 def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
-    """Return the first repetition of a span as a table of a store."""
+    """Return the first repetition of a span as a table for the store."""
     begin, (point, number, _) = time.perf_counter(), span
     with collect_warnings() as warned:
         descent = repetition_of(state, smallest, number)
@@ -89,7 +89,7 @@ def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
 
 
 def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
-    """Yield point, number and content of the repetitions in a table, without draws."""
+    """Yield the point, number and content of each repetition in a table, without draws."""
     for (point, number), table in pd.DataFrame(rows).groupby([POINT, NUMBER]):
         populations = []
         for _, level in table.groupby("level"):
@@ -128,7 +128,7 @@ class Repetitions:
         self._descents: list[dict[int, Descent]] = [{} for _ in points]
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot hold repetitions of these points, or ''."""
+        """Return why a table cannot hold repetitions for these points, or ''."""
         rows = table.rows
         if rows.dtype != ROW or table.failures or not rows.size:
             return "it holds no repetitions"
@@ -141,20 +141,20 @@ class Repetitions:
         return ""
 
     def add(self, table: Table) -> None:
-        """Take the repetitions of a table, but leave out numbers beyond the count."""
+        """Add the repetitions in a table, but leave out numbers beyond the count."""
         for point, number, descent in repetitions_in(table.rows):
             if number < self.done.shape[1]:
                 self._descents[point][number] = descent
                 self.done[point, number] = True
 
     def tail(self, point: int) -> Tail | None:
-        """Return the tail of a point from all of its repetitions, if there are any."""
+        """Return the tail at a point from all repetitions there, or None without repetitions."""
         descents = [descent for _, descent in sorted(self._descents[point].items())]
         spent = sum(descent.evaluations for descent in descents)
         return Tail(descents, spent=spent) if descents else None
 
     def curves(self, attributes: Mapping[str, Any]) -> list[xr.Dataset]:
-        """Return the curve of each point of the sweep, NaN for a point without repetitions."""
+        """Return the curve at each point of the sweep, or NaN at a point without repetitions."""
         wanted = chances(self.smallest)
         tails = [self.tail(point) for point in range(len(self.states))]
         curves = [
@@ -168,7 +168,7 @@ class Repetitions:
         return [empty if curve is None else curve for curve in curves]
 
     def dataset(self, attributes: Mapping[str, Any], axes: GridAxes) -> xr.Dataset:
-        """Return curves as `stiction.failure_curve`, over the axes of a sweep too."""
+        """Return curves as `stiction.failure_curve` does, with the axes of a sweep."""
         curves = self.curves(attributes)
         result = curves[0]
         if axes:
@@ -193,7 +193,7 @@ def complete_curves(
     progress: Show,
     pilot: bool,
 ) -> None:
-    """Compute the missing repetitions, except those `elsewhere`, (points, repetitions)."""
+    """Compute missing repetitions, except in the mask `elsewhere` (points, repetitions)."""
     store.resume(rows)
     missing, states, cores = ~(rows.done | elsewhere), rows.states, workers or usable_cores()
     with merge_warnings():

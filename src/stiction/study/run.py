@@ -1,4 +1,4 @@
-"""Runs on disk: parts of a study for several jobs, stored samples, and files for other programs."""
+"""Runs on disk: parts of a study for several jobs, stored samples, and export to files."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return the mask of the samples in a part, (points, samples): blocks in turn."""
+    """Return a mask (points, samples) of the samples in a part. Parts take blocks in turn."""
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
@@ -81,14 +81,14 @@ class Status(Result):
 
 
 class StoredRun:
-    """A run on disk, for reading: see `stiction.open_run`.
+    """A run on disk that is open for reading. See `stiction.open_run`.
 
     Attributes
     ----------
     path : Path
     study : Study
     settings : dict, optional
-        Smallest probability and event of failure curves. A run of samples has no
+        Smallest probability and event, for failure curves. A run of samples has no
         settings.
     """
 
@@ -107,11 +107,11 @@ class StoredRun:
 
     @property
     def methods(self) -> str:
-        """Labels of the methods of the study."""
+        """Labels of the methods in the study."""
         return " and ".join({point.method.label: None for point in self.study.experiments})
 
     def status(self) -> Status:
-        """Return the state of the run, after comparing all chunks with their checksums.
+        """Compare all chunks with their checksums, and return the state of the run.
 
         Raises
         ------
@@ -131,12 +131,12 @@ class StoredRun:
         )
 
     def dataset(self, only: Sequence[str] | None = None) -> xr.Dataset:
-        """Return all stored samples as a dataset, with NaN for missing samples.
+        """Return all stored samples as a dataset. Missing samples are NaN.
 
         Parameters
         ----------
         only : sequence of str, optional
-            Names of the variables to read. The default is all.
+            Names of the variables to read. By default all variables.
 
         Warns
         -----
@@ -157,7 +157,7 @@ class StoredRun:
         return result
 
     def curves(self) -> list[xr.Dataset]:
-        """Return the failure curve of each point, NaN for a point without repetitions."""
+        """Return the failure curve at each point, or NaN at a point without repetitions."""
         curves: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
         return curves
 
@@ -173,7 +173,7 @@ class StoredRun:
         return rows
 
     def export(self, path: str | Path, *, partial: bool = False, events: bool = False) -> None:
-        """Write `dataset` in the format of its suffix (.nc or .csv), whole or not at all.
+        """Write the `dataset` to a file (.nc or .csv), completely or not at all.
 
         Parameters
         ----------
@@ -181,13 +181,14 @@ class StoredRun:
         partial : bool
             Whether to write the stored part of an incomplete run.
         events : bool
-            Whether a table (.csv) has a row for each event, as
+            Whether a table (.csv) has a row for each event, as in
             `stiction.external.event_table`, instead of a row for each sample.
 
         Raises
         ------
         InputError
-            If the suffix is another, or the run has no events.
+            If the suffix is neither .nc nor .csv, or if `events` is true and the run
+            has no events.
         StoreError
             If the file cannot be written.
         RunError
@@ -206,9 +207,9 @@ class StoredRun:
 
 
 def export(result: xr.Dataset, path: Path, events: bool = False) -> None:
-    """Write a result as NetCDF (.nc) or as a table (.csv), whole or not at all.
+    """Write a result as NetCDF (.nc) or as a table (.csv), completely or not at all.
 
-    With `events` the table has a row for each event.
+    If `events` is true, the table has a row for each event.
     """
     if path.suffix == ".nc" and not events:
         write_result(result, path)
@@ -223,7 +224,7 @@ def export(result: xr.Dataset, path: Path, events: bool = False) -> None:
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:
-    """Write a result as a NetCDF file with checksums, whole or not at all."""
+    """Write a result as a NetCDF file with checksums, completely or not at all."""
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
         # NetCDF does not report a full disk, and keeps its unfinished file open.
@@ -240,7 +241,7 @@ def write_result(result: xr.Dataset, path: Path) -> None:
 
 
 def event_table(result: xr.Dataset) -> pd.DataFrame:
-    """Return the events of a result as a data frame: one row an event.
+    """Return the events in a result as a data frame with a row for each event.
 
     Parameters
     ----------
@@ -251,15 +252,15 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns are named ``name (unit)``: the sweep and the sample, if there are
-        any, the number of the event in its sample, and its variables (see
-        `equilibrium_path`).
+        Columns are named ``name (unit)``. They hold the sweep and the sample, if
+        there are any, the number of the event in its sample, and the variables of the
+        event (see `equilibrium_path`).
 
     Raises
     ------
     InputError
-        If the result has no events. An `AccuracyWarning` says if samples have
-        more events than it keeps.
+        If the result has no events. An `AccuracyWarning` is issued if samples have
+        more events than the result keeps.
 
     Notes
     -----
@@ -297,10 +298,11 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
 
 
 def table_of(result: xr.Dataset) -> pd.DataFrame:
-    """Return a table with a column for each variable and a row for each sample and point.
+    """Return a table with a column for each variable, and a row for each sample and point.
 
-    Columns are named ``name (unit)``: swept keys, the sample number, results. The curves of
-    equally likely interfaces are left out, but their band stays.
+    Columns are named ``name (unit)``. They hold swept keys, the sample number and
+    results. Curves of equally likely interfaces are left out, but their band is
+    included.
     """
     result = result.drop_dims("member", errors="ignore")
     wide = sorted(

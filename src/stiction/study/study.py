@@ -1,4 +1,4 @@
-"""A study: problem, strength, method and ensemble in a single object or TOML file."""
+"""A study: problem, strength, method and ensemble, in one object or TOML file."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ _One: Any = Annotated[
 
 
 def _interfaces(given: Any) -> Any:
-    """Return interfaces of a fit or a posterior, and anything else as it is."""
+    """Return the interfaces from a fit or a posterior. Return other values unchanged."""
     if isinstance(given, Likely):
         raise InputError(
             "random: has uncertain parameters. Give them as uncertain= of the study"
@@ -112,7 +112,7 @@ AnyRandom: Any = Annotated[
 
 
 def _peaks_of(given: Any) -> Any:
-    """Return peaks, which a study in plain form holds as a table {unit, values, lengths}."""
+    """Return peaks. A study in plain form holds them as a table {unit, values, lengths}."""
     if not isinstance(given, Mapping) or "values" not in given:
         return make_peaks(given)
     values = given["values"]
@@ -131,12 +131,12 @@ AnyPeaks: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plai
 
 @model(kw_only=True)
 class Question:
-    """A question: the failure probability of a demand, or the design for a probability.
+    """A question: the failure probability for a demand, or the design for a probability.
 
     Parameters
     ----------
     stress, force, friction_coefficient : float, optional
-        The demand, Pa, N or 1, as in `stiction.failure_probability`.
+        The demand in Pa, N or 1, as in `stiction.failure_probability`.
     probability : float, optional
         Probability of sliding below the design, as in `stiction.design_stress`.
     target_cv : float
@@ -175,7 +175,7 @@ class Question:
 
 @model(kw_only=True)
 class _Parts:
-    """The parts of a point of a sweep, each valid by itself."""
+    """The parts of a study at a point of a sweep. Each part is valid by itself."""
 
     problem: Problem
     random: AnyRandom
@@ -190,8 +190,8 @@ PARTS = tuple(_Parts.__dataclass_fields__)
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    The same names serve Python and TOML. A study from the attributes of a result runs
-    again to the same numbers.
+    Names are the same in Python and TOML. A study that is read from the attributes of
+    a result gives the same numbers again.
 
     Parameters
     ----------
@@ -202,26 +202,27 @@ class Study(_Parts):
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes that are crossed. Each axis maps dotted keys, which vary together, to
-        lists of values. Every point of the sweep has the same samples.
+        Axes of the sweep. All their combinations are computed. An axis maps dotted
+        keys, which vary together, to lists of values. The samples are the same at
+        every point of the sweep.
     uncertain : dict, optional
-        Distributions of parameters of ``random`` by dotted key, as in
-        `RandomInterface.uncertain`, and their ``count``, by default 30. That many
-        interfaces are drawn with the seed and are equally likely. `failure_curve`
-        gives their mean and band, and `run` samples over them.
+        Distributions of parameters in ``random`` by dotted key, as in
+        `RandomInterface.uncertain`, and a ``count``, by default 30. With the seed,
+        ``count`` equally likely interfaces are drawn. `failure_curve` computes their
+        mean and band, and `run` draws samples from all of them.
     mixture : bool
         Whether a list in ``random`` is complete, as in
         `stiction.failure_probability`.
     save : Save, optional
-        Results that `stiction rupture` keeps, and the places of its stations.
+        Results that `stiction rupture` keeps, and the positions of stations.
     reliability : Question, optional
-        Question to `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
+        Question for `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
         ``friction_coefficient`` to carry, or the ``probability`` of a design, with
         ``target_cv``.
     peaks : Peaks or as of `stiction.infer`, optional
-        Peaks of tests from which ``random`` was not inferred: `stiction
-        reliability` compares them with its prediction. In a study file the name
-        of a file that `read_peaks` reads.
+        Peaks of tests that were not used to infer ``random``. `stiction reliability`
+        compares them with its prediction. In a study file, give the name of a file
+        that `read_peaks` can read.
     title : str
         Title of the study, for readers.
 
@@ -271,7 +272,7 @@ class Study(_Parts):
         return self
 
     def _check_tables(self, point: Experiment) -> None:
-        """Refuse a demand or a station that does not fit a point."""
+        """Refuse a demand or a station that does not fit a point of the sweep."""
         question = self.reliability
         if question is not None and question.force is not None:
             point.problem.stress_of("reliability.force", question.force)
@@ -286,7 +287,7 @@ class Study(_Parts):
 
     @property
     def points(self) -> list[Point]:
-        """The points of the sweep in order. Without a sweep, there is a point without values."""
+        """The points of the sweep, in order. Without a sweep, there is one point without values."""
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
@@ -296,9 +297,9 @@ class Study(_Parts):
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """The experiment at each point, with a single copy of shared objects.
+        """The experiments at all points, with a single copy of shared objects.
 
-        A mistake is reported once, with the first point that has it.
+        A mistake is reported once, with the first point at which it occurs.
         """
         base = _Parts(**{name: getattr(self, name) for name in PARTS})
         made: dict[Any, Any] = {}
@@ -336,13 +337,13 @@ class Study(_Parts):
         return experiments
 
     def _mixture(self, random: Any) -> Any:
-        """Return a list of interfaces as a complete mixture."""
+        """Return a mixture from a list of interfaces that is complete."""
         if self.uncertain:
             raise InputError("mixture: interfaces of [uncertain] are a sample. Leave it out")
         return as_random(random, mixture=True)
 
     def _likely(self, random: Any) -> Any:
-        """Return the equally likely interfaces of uncertain parameters."""
+        """Return equally likely interfaces that follow from the uncertain parameters."""
         parameters = dict(self.uncertain)
         count = parameters.pop("count")
         axes = [key for axis in self.sweep for key in axis]
@@ -365,7 +366,7 @@ class Study(_Parts):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of a result, from which the study can be run again."""
+        """Attributes for a result. The study can be run again from these attributes."""
         try:
             attributes: dict[str, Any] = {"study": self.to_dict()}
         except InputError as error:  # a function of the user's: the result states it
@@ -389,9 +390,9 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are computed. The same call
-            resumes an interrupted run, computes failed samples again, and adds
-            samples if `samples` was raised.
+            Folder in which results are stored as they are computed. If you repeat the
+            call, it resumes an interrupted run, computes failed samples again, and
+            adds samples if `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
@@ -407,8 +408,8 @@ class Study(_Parts):
         Raises
         ------
         InputError, RunError
-            See `stiction.monte_carlo`. Also if `out` holds another study, or a
-            worker is lost.
+            As in `stiction.monte_carlo`. Also if `out` holds a different study, or if
+            a worker is lost.
         StoreError
             If `out` cannot be used.
         """
@@ -429,7 +430,7 @@ class Study(_Parts):
         )
 
     def _elsewhere(self, part: tuple[int, int] | None, samples: int) -> Any:
-        """Return the mask of the samples that other jobs compute, (points, samples)."""
+        """Return a mask (points, samples) of the samples that other jobs compute."""
         return part is not None and ~samples_of_part(part, len(self.experiments), samples)
 
     @checked
@@ -447,18 +448,18 @@ class Study(_Parts):
     ) -> xr.Dataset:
         """Estimate failure probabilities at every point, or at the missing points.
 
-        Repetition i, with 2,000 samples in each level, depends on (seed, i) only. The
-        number of samples in the study is not used.
+        Each repetition has 2,000 samples per level. Repetition i depends only on
+        (seed, i). The number of samples in the study is not used.
 
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are computed. The same
-            call resumes an interrupted run, and adds repetitions if `repetitions`
-            was raised.
+            Folder in which repetitions are stored as they are computed. If you repeat
+            the call, it resumes an interrupted run, and adds repetitions if
+            `repetitions` was raised.
         repetitions : int
-            Eight repetitions give a coefficient of variation of about 0.2 at
-            1e-9, and 32 give half of that.
+            Number of repetitions. At a probability of 1e-9, eight repetitions give a
+            coefficient of variation of about 0.2, and 32 repetitions give about 0.1.
         smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
@@ -467,15 +468,15 @@ class Study(_Parts):
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, from stored and computed
-            repetitions, over the axes of the sweep too, with `lower_bound` (Pa).
-            A point without repetitions has NaN.
+            As from `stiction.failure_curve`, also over the axes of the sweep, and
+            with `lower_bound` (Pa). All stored and computed repetitions are used.
+            Values at a point without repetitions are NaN.
 
         Raises
         ------
         InputError, StoreError, RunError
-            As `run`, and if a method is `Rupture`, whose failures can only be
-            counted.
+            As in `run`. Also if a method is `Rupture`, because its failures can only
+            be counted.
         """
         settings = {"smallest": smallest, "event": event}
         rows = Repetitions(self.experiments, repetitions, settings)
@@ -497,17 +498,17 @@ class Study(_Parts):
         Raises
         ------
         InputError
-            If a part exists in Python only (a spectrum that is a function).
+            If a part cannot be written, such as a spectrum that is a Python function.
         """
         plain = to_plain(self).items()
         left_out = ("title", "sweep", "mixture")
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the study as a TOML file, and many interfaces as a JSON file beside it.
+        """Write the study to a TOML file. Many interfaces are written to a JSON file beside it.
 
-        It raises an `InputError` if a part exists in Python only or the file cannot be
-        written.
+        Raises an `InputError` if a part exists only in Python, or if the file cannot
+        be written.
         """
         plain, place = self.to_dict(), check("path", path, FilePath)
         beside = place.with_suffix(".random.json")
@@ -526,7 +527,7 @@ class Study(_Parts):
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
-        """Make a study from plain dictionaries, with files of profiles in `folder`."""
+        """Make a study from plain dictionaries. Files of profiles are in `folder`."""
         return _read(cls, given, folder)
 
     @classmethod
@@ -549,7 +550,7 @@ class Study(_Parts):
 
 @model(kw_only=True)
 class Setup:
-    """The interface that a study file describes, without its random properties."""
+    """The interface that a study file describes, without random properties."""
 
     problem: Problem
     method: AnyMethod | None = None
@@ -557,13 +558,13 @@ class Setup:
 
 
 def read_setup(path: Path) -> Setup:
-    """Read an interface from a study file, which need not have the other tables."""
+    """Read an interface from a study file. The file need not contain the other tables."""
     keys, given = Setup.__dataclass_fields__, _read_toml(path)
     return _read(Setup, {key: given[key] for key in given if key in keys}, path.parent)
 
 
 def _check_toml(content: bytes) -> None:
-    """Refuse texts that Python's parser takes long for, such as keys with a thousand parts."""
+    """Refuse text that Python's parser would need long for, such as keys with a thousand parts."""
     words = 0
     for line in content.split(b"\n"):
         match = _NUMBERS.fullmatch(line)
@@ -596,7 +597,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
-    """Return the study in a TOML file, and the files of profiles that it names."""
+    """Return the study in a TOML file, and the files of profiles named in it."""
     named: list[Path] = []
     return _read(Study, _read_toml(path), path.parent, named), named
 
@@ -607,7 +608,7 @@ def _read(
     folder: str | Path | None,
     named: list[Path] | None = None,
 ) -> T:
-    """Validate a study, or a `Setup`, in plain form, with its files in `folder`.
+    """Validate a study or a `Setup` in plain form. Its files are in `folder`.
 
     Paths of files in the study are added to `named`.
     """
@@ -649,7 +650,7 @@ def _read(
 
 
 def _stored_interfaces(path: Path) -> list[Any]:
-    """Return the interfaces of a file that `Study.to_toml` wrote."""
+    """Return the interfaces in a file that `Study.to_toml` wrote."""
     with prefixed(str(path)):
         try:
             interfaces = json.loads(content_of(path))
@@ -676,8 +677,8 @@ def open_run(path: Any) -> StoredRun:
     InputError
         If `path` is not a path.
     StoreError
-        If the folder holds no run, or its study cannot be read, as without a class of
-        somebody else that it names.
+        If the folder holds no run, or if its study cannot be read, for example
+        because it names a class that is not installed.
     """
     place = check("path", path, FilePath)
     if place.is_file():

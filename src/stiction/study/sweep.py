@@ -1,4 +1,4 @@
-"""Sweeps over values of keys: axes are crossed, and the keys of an axis vary together."""
+"""Sweeps over values of keys. Axes are combined, and the keys on an axis vary together."""
 
 import dataclasses
 import math
@@ -31,7 +31,7 @@ Axis: TypeAlias = dict[str, list[Any]]
 
 
 class Point(NamedTuple):
-    """A combination in a sweep: its number and the value of every swept key."""
+    """A point of a sweep: its number, and the value of every swept key."""
 
     number: int
     values: dict[str, Any]
@@ -66,7 +66,7 @@ def _axis(given: Any) -> Axis:
 
 
 def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Dotted keys of a table: TOML reads an unquoted ``a.b = 1`` as nested tables."""
+    """Return a table with dotted keys. TOML reads an unquoted ``a.b = 1`` as nested tables."""
     result: dict[str, Any] = {}
     for key, value in given.items():
         inner = value.values() if isinstance(value, Mapping) else ()
@@ -78,7 +78,7 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def read_axes(given: Any) -> list[Axis]:
-    """Return the axes of a sweep from the tables of a study."""
+    """Return the axes of a sweep from tables in a study."""
     if not isinstance(given, list | tuple):
         raise InputError(f"must be a list of tables, each a [[sweep]], got {describe(given)}")
     axes: list[Axis] = []
@@ -122,7 +122,7 @@ Sweep: TypeAlias = Annotated[
 
 
 def _read_uncertain(given: Any) -> dict[str, Any] | None:
-    """Return ``count`` and, by full key, distributions as tables of marginals."""
+    """Return ``count``, and by full key the distributions as tables of marginals."""
     if given is None:
         return None
     if not isinstance(given, Mapping):
@@ -160,7 +160,7 @@ def _text(value: Any) -> str:
 
 
 def _unit(key: str, coefficients: Collection[str]) -> str:
-    """Return the unit of the values of a key; those of `coefficients` have none."""
+    """Return the unit of the values of a key. Values of `coefficients` have no unit."""
     of_field = key.split(".")[1] if "." in key else ""
     return unit_of_key(key, "1" if of_field in coefficients else UNITS.get(of_field, "1"))
 
@@ -170,8 +170,8 @@ def grid_axes(
 ) -> GridAxes:
     """Return the axes as dimensions of a result.
 
-    Their names are the last parts of their keys, or the whole keys if the last part is
-    not clear or a keyword of xarray. The axis of the key 'method' is called
+    The name of an axis is the last part of its key, or the whole key if the last part
+    is ambiguous or a keyword of xarray. The axis for the key 'method' is called
     'onset_method'.
     """
     keys = [key for axis in axes for key in axis]
@@ -197,7 +197,7 @@ def grid_axes(
 
 
 def _labels(values: Sequence[Any]) -> NDArray[Any]:
-    """Return numbers as given and names of other values, with a number if names repeat."""
+    """Return numbers as given, and names for other values. Repeated names get a number."""
     if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
         return np.array(values)
     texts = [value if isinstance(value, str) else _text(value) for value in values]

@@ -1,28 +1,28 @@
-"""The least moving average of strength over load, taken over critical windows.
+"""Find the least moving average of strength over load, over critical windows.
 
 Problem
 -------
-s is the strength less initial stress (Pa), p the load profile, and y the weights
-of a window (`windows`). The window centred at x becomes unstable by itself at the
-load <s, y>_x/<p, y>_x. Find the least load over all x and all windows. On a line,
-x may lie between the nodes. On a plane the load is taken at the nodes, which is
-exact for the discrete problem, and only its place is interpolated.
+s is the strength minus initial stress (Pa), p is the load profile, and y are the
+weights of a window (`windows`). The window centred at x becomes unstable in
+isolation at the load <s, y>_x/<p, y>_x. Find the least load over all x and all
+windows. On a line, x may lie between the nodes. On a plane the load is computed at
+the nodes, which is exact for the discrete problem, and only the position is
+interpolated.
 
 Algorithm
 ---------
-1. Averages at all nodes by Fourier transform (`averages`).
+1. Compute the averages at all nodes by Fourier transform (`averages`).
 2. On a plane, take the lowest node. A parabola through its neighbours gives the
-   place.
-3. On a line, estimate by a parabola through each local minimum of the nodes how
-   low the function falls there, and by how much the parabola may be wrong
-   (`_estimates`).
-4. In the lowest of them, and in any other that may be lower, take the minimum of
-   the polynomials through `STENCIL` nodes in the cells on both sides of the node
+   position.
+3. On a line, fit a parabola at each node that is a local minimum. Estimate how low
+   the function falls there, and the error of the parabola (`_estimates`).
+4. At the lowest local minimum, and at others that may be lower, find the minimum of
+   the polynomials through `STENCIL` nodes, in the cells on both sides of the node
    (`_minimum_near`).
 
-Round-off may exceed bounds that hold for the exact average, and so may the
-polynomials, which ring at jumps of the strength. Values are therefore cut at
-these bounds.
+The exact average has bounds. Round-off may violate these bounds, and so may the
+polynomials, which ring at jumps of the strength. Values are therefore limited to
+the bounds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -51,10 +51,11 @@ _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increas
 def averages(
     interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
 ) -> Iterator[Iterator[Array]]:
-    """Yield for each sample <s, y>/<p, y> over each window y, centred at every node, (*shape).
+    """Yield, for each sample and window y, <s, y>/<p, y> centred at every node, as (*shape).
 
-    Strength less initial stress s (Pa) is of shape (samples, *shape), the load profile p (*shape).
-    Averages are infinite where a window reaches beyond the extent of the interface.
+    Strength minus initial stress s (Pa) has shape (samples, *shape), and the load
+    profile p has shape (*shape). An average is infinite if the window reaches beyond
+    the extent of the interface.
     """
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
@@ -78,11 +79,12 @@ def averages(
 def least_average(
     interface: Interface, windows: Sequence[Window], excess: Array, profile: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return the least average of each sample over places and windows, as in `averages`.
+    """Return the least average of each sample over positions and windows (see `averages`).
 
-    Returns the averages (Pa), their places in nodes, and the numbers of their windows. On a line
-    the minimum may lie between the nodes. On a plane, and if the interface ends, the average is
-    taken at the nodes, and only its place is interpolated.
+    Returns the averages (Pa), their positions in nodes, and the numbers of their
+    windows. On a line the minimum may lie between the nodes. On a plane, and if the
+    interface ends, the average is taken at the nodes, and only the position is
+    interpolated.
     """
     count = len(excess)
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
@@ -102,9 +104,9 @@ def least_average(
 
 
 def _between_nodes(average: Array) -> Array:
-    """Step 2: return where a parabola around the lowest node has its minimum, in nodes.
+    """Step 2: return the position, in nodes, of the minimum of a parabola at the lowest node.
 
-    Places on the nodes only would show as stripes in a histogram.
+    Positions only at nodes would be visible as stripes in a histogram.
     """
     node = np.unravel_index(int(average.argmin()), average.shape)
     place = np.array(node, dtype=np.float64)
@@ -120,9 +122,9 @@ def _between_nodes(average: Array) -> Array:
 
 @jit
 def _estimates(values: Array, i: int) -> tuple[float, float]:
-    """Step 3: return the minimum near a node by a parabola, and how much lower it may be.
+    """Step 3: return the minimum near a node from a parabola, and how much lower it may be.
 
-    The minimum is infinite if the node is no local minimum.
+    The minimum is infinite if the node is not a local minimum.
     """
     n = values.size
     left, middle, right = values[i - 1], values[i], values[i + 1 - n]
@@ -148,12 +150,13 @@ def _slope(power: Array, u: float) -> tuple[float, float]:
 def _minimum_near(
     values: Array, strength: Array, profile: Array, reach: int, node: int, power: Array
 ) -> tuple[float, float]:
-    """Step 4: return the minimum between a node and its two neighbours, and its place.
+    """Step 4: return the minimum between a node and its two neighbours, and its position.
 
-    Newton's method on the slope is kept inside a bracket, and bisects if the function is not
-    convex. Two bounds keep the ringing of the polynomial out: the least ratio of strength to load
-    under the patch, and, if the values are convex, the lines through two values on either side,
-    extended until they meet.
+    Newton's method for the slope is kept inside a bracket, with bisection if the
+    function is not convex. Two bounds exclude ringing of the polynomial. The first is
+    the least ratio of strength to load under the patch. The second applies if the
+    values are convex: the lines through two values on either side, extended until
+    they meet.
     """
     n = values.size
     least = np.inf
@@ -204,7 +207,7 @@ def _minimum_of_rows(
     transform: Transform, excess: Array, profile: Array, multiplier: Array, reach: int,
     minimum: Array, place: Array,
 ) -> None:  # fmt: skip
-    """Steps 1, 3 and 4: write the lowest average of every row and its place, in nodes."""
+    """Steps 1, 3 and 4: write the lowest average in every row, and its position in nodes."""
     nodes = profile.size
     values, power = np.empty(nodes), np.empty(STENCIL)
     scale, spectrum = np.empty(nodes), np.empty(multiplier.size, np.complex128)

@@ -1,25 +1,24 @@
-"""Griffith's criterion for a non-uniform load: energy release rate and critical crack length.
+"""Griffith's criterion for non-uniform loads: energy release rate and critical crack length.
 
 Problem
 -------
 A crack of half-length a lies on a periodic line (period L, modulus G*) between
-two identical half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L)
-and tan(pi (x - centre)/L) = U cos t its stress intensity factors at both tips (H.
+two identical half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L) and
+tan(pi (x - centre)/L) = U cos t, the stress intensity factors at both tips (H.
 Bueckner, Zeitschrift fuer Angewandte Mathematik und Mechanik 50, 1970; W. Koiter,
 Ingenieur-Archiv 28, 1959) are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
-and the energy release rate is G = K |K|/(2 G*). A crack runs once G exceeds the
+and the energy release rate is G = K |K|/(2 G*). A crack runs if G exceeds the
 fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
-1. Gauss and Chebyshev's rule for (1), with D linear between the nodes
-   (`_intensity_factors`). K is linear in D, so that one evaluation serves all
-   loads.
-2. Bracket the crossings of G with the fracture energy at lengths one node apart,
-   and at shorter ones near zero. Bisect them (`griffith_length`).
+1. Evaluate (1) with Gauss and Chebyshev's rule, with D linear between the nodes
+   (`_intensity_factors`). K is linear in D, so one evaluation serves all loads.
+2. Bracket the lengths at which G crosses the fracture energy. Test lengths are one
+   node apart, and closer near zero. Bisect the brackets (`griffith_length`).
 """
 
 from typing import Any
@@ -41,7 +40,7 @@ N_HALVINGS = 30
 def energy_release_rate(
     problem: Problem, load: Real, lengths: Numbers, *, centre: Real = 0.0
 ) -> Array:
-    """Return the static energy release rate at both tips of a crack, by Bueckner's weights.
+    """Return the static energy release rate at both tips of a crack, from Bueckner's weights.
 
     Parameters
     ----------
@@ -51,15 +50,15 @@ def energy_release_rate(
     load : float
         tau_0, Pa.
     lengths : (m,) array or float
-        Lengths of the crack, m, between 0 and the length of the interface.
+        Crack lengths, m, between 0 and the length of the interface.
     centre : float
         Centre of the crack, m.
 
     Returns
     -------
     (m, 2) array, J/m²
-        At the left and the right tip. Negative if the stress drop acts against
-        the crack there.
+        Energy release rate at the left and the right tip. It is negative if the
+        stress drop acts against the crack at this tip.
 
     Raises
     ------
@@ -71,8 +70,8 @@ def energy_release_rate(
     Between identical half-spaces G = K|K|/(2 G*), where K is the integral of the stress drop times
     the weight of Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of
     collinear cracks to a single crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2)
-    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict the
-    length of confined ruptures in this way. Between the nodes the drop is linear.
+    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict
+    the length of confined ruptures in this way. The drop is linear between the nodes.
 
     Examples
     --------
@@ -102,12 +101,12 @@ def griffith_length(
     centre: Real = 0.0,
     arrest: Flag = False,
 ) -> Any:
-    """Return the length at which a crack begins to run, or is arrested, by Griffith's criterion.
+    """Return the length at which a crack begins to run or is arrested, by Griffith's criterion.
 
     Parameters
     ----------
     problem : Problem
-        A line, see `energy_release_rate`.
+        A line. See `energy_release_rate`.
     load : float or (k,) array
         tau_0, Pa. Many loads at once cost little more than a single load.
     fracture_energy : float
@@ -115,9 +114,9 @@ def griffith_length(
     centre : float
         Centre of the crack, m, at equal distances from both tips.
     arrest : bool
-        False returns the shortest length above which the smaller of the two
-        release rates exceeds Gamma, True the next length at which it falls below
-        Gamma again.
+        If false, return the shortest length above which the smaller of the two
+        release rates exceeds Gamma. If true, return the next length at which it falls
+        below Gamma again.
 
     Returns
     -------
@@ -156,7 +155,7 @@ def griffith_length(
 
 
 def _stress_drops(problem: Problem) -> Array:
-    """Return the stress drop (Pa) without a load, and by a unit load, at the nodes: (2, nodes)."""
+    """Return stress drops (2, nodes) at the nodes, Pa: without a load, and by a unit load."""
     if problem.interface.is_plane:
         raise InputError("problem: must have a line interface")
     problem.refuse_specimen("the theory of cracks between half-spaces", "use st.Equilibrium()")
@@ -172,7 +171,7 @@ def _stress_drops(problem: Problem) -> Array:
 
 
 def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: float) -> Array:
-    """Step 1: return K at both tips of cracks with given lengths, Pa m^(1/2), (drops, m, 2)."""
+    """Step 1: return K (drops, m, 2), Pa m^(1/2), at both tips of cracks with given lengths."""
     interface, period = problem.interface, problem.interface.measure
     points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)

@@ -1,11 +1,11 @@
-"""The local criterion: the onset at the weakest patch, with each patch taken by itself.
+"""The local criterion: the onset at the weakest patch, with each patch in isolation.
 
-1. Find the critical windows of the weakening rate (`windows`).
-2. Take the least average of strength over load, over windows and places
-   (`average`). On a specimen every place has a window of its own
+1. Find the critical windows for the weakening rate (`windows`).
+2. Find the least average of strength over load, over windows and positions
+   (`average`). On a specimen every position has its own window
    (`elasticity.weakest`).
-3. Behind a machine, subtract an estimate of the stress that slip takes off before
-   the onset (`_relief_of_patch`).
+3. With a machine, subtract an estimate of the stress that slip releases before the
+   onset (`_relief_of_patch`).
 """
 
 from collections.abc import Callable, Iterator
@@ -44,47 +44,48 @@ OF_SPECIMENS = {
 
 @model(kw_only=True)
 class LocalCriterion:
-    """Onset at the minimum of the nucleation stress, with each patch taken in isolation.
+    """Onset at the minimum of the nucleation stress, with each patch in isolation.
 
-    If no node reaches its residual strength (or zero) before the onset, this is
-    an upper bound of the exact onset, up to discretisation: interaction only
-    makes patches unstable earlier. If nodes do reach it, the onset comes later
-    than predicted. Events are assumed not to be arrested, so `first_instability`
-    and `critical_stress` are equal. If a quick test leaves a doubt, `onset` and
-    `monte_carlo` compare samples with `Equilibrium` and warn of differences above
-    1 %.
+    If no node reaches its residual strength (or zero) before the onset, this is an
+    upper bound of the exact onset, up to discretisation, because interaction can only
+    lower the load at which patches become unstable. If nodes reach their residual
+    strength, the exact onset is higher than predicted. Events are assumed not to be
+    arrested, so `first_instability` and `critical_stress` are equal. If a quick test
+    leaves a doubt, `onset` and `monte_carlo` compare samples with `Equilibrium`, and
+    warn about differences above 1 %.
 
     Notes
     -----
     The weights of the average are never negative, so the result lies between the least and the
     greatest strength even if the strength jumps. On a line the minimum may lie between the nodes.
-    For a nonlinear friction law, the criterion uses the weakening rate at zero slip and gives an
-    `AccuracyWarning`: if strength falls ever less steeply, the onset comes later. A law that
-    steepens raises an error.
+    For a nonlinear friction law, the criterion uses the weakening rate at zero slip and
+    issues an `AccuracyWarning`: if strength falls less and less steeply, the exact onset is
+    higher. A law that steepens raises an error.
 
-    If the interface ends, patches lie within its extent. Between half-spaces
-    stresses leave out what slip hands to the nodes beyond before the onset. On
-    parts of 2, 4, 8 and 17 nucleation lengths (strength of one nucleation length)
-    they were too high by 4, 1, 0.3 and 0.1 % on average, and by up to 21, 6, 2.5
-    and 3 %. The load was too high by 0.9, 0.3, 0.1 and 0.1 %. `onset` and
-    `monte_carlo` always compare such interfaces with `Equilibrium`, and the
-    warning gives the difference.
+    If the interface ends, patches lie within its extent. Between half-spaces, slip
+    before the onset transfers stress to the nodes beyond the extent, and the
+    criterion neglects this transfer. In tests, the correlation length of the strength
+    was one nucleation length, and the extent was 2, 4, 8 and 17 nucleation lengths.
+    Stresses were too high by 4, 1, 0.3 and 0.1 % on average, and by up to 21, 6, 2.5
+    and 3 %. Loads were too high by 0.9, 0.3, 0.1 and 0.1 %. `onset` and `monte_carlo`
+    always compare such interfaces with `Equilibrium`, and the warning gives the
+    difference.
 
-    On a plane the average is over critical ellipses with five aspect ratios. Each
-    is the smallest ellipse on which the stiffness K - W of the discrete problem
-    is unstable, and its eigenvector is the weight. The minimum is taken over
-    nodes and ellipses. `critical_aspect`, `critical_patch_extent` (m, along x and
-    y) and `critical_patch_area` (m²) describe the critical ellipse.
+    On a plane the average is over critical ellipses with five aspect ratios. A
+    critical ellipse is the smallest ellipse on which the stiffness K - W of the
+    discrete problem is unstable. The unstable eigenvector is the weight. The minimum
+    is taken over nodes and ellipses. `critical_aspect`, `critical_patch_extent` (m,
+    along x and y) and `critical_patch_area` (m²) describe the critical ellipse.
 
-    On a specimen each place has its own nucleation length: the shortest run of
-    nodes on which the stiffness of the blocks is unstable, with the eigenvector
-    as the weight. `critical_patch_length` (m) is the nucleation length at the
-    critical place. Behind a machine, stable slip lowers the mean stress below the
-    drive, `critical_load`. The stresses returned take off an estimate for the
-    critical patch alone. The slip of other patches is not known, so the stresses
-    are too high, in six set-ups by 0.2 to 5 % in mode II, like the drive itself.
-    A pusher near the interface causes events long before the interface slides.
-    `critical_stress` is then far too low.
+    On a specimen each position has its own nucleation length: the length of the
+    shortest run of nodes on which the stiffness of the blocks is unstable. The
+    eigenvector is the weight. `critical_patch_length` (m) is the nucleation length at
+    the critical position. With a machine, stable slip lowers the mean stress below
+    `critical_load`. The returned stresses include an estimate of this reduction, for
+    the critical patch alone. The slip of other patches is unknown, so the stresses
+    are too high. In six set-ups in mode II, stresses and `critical_load` were too
+    high by 0.2 to 5 %. A pusher near the interface causes events long before the
+    interface slides. `critical_stress` is then far too low.
 
     Examples
     --------
@@ -100,7 +101,7 @@ class LocalCriterion:
     samples_at_point: ClassVar[int] = 2000
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s."""
         # Measured. The time on planes is mostly transforms over several ellipses.
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
@@ -123,10 +124,11 @@ class LocalCriterion:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the onset from below and from above.
 
-        From below: the weights are positive, but behind a machine the criterion neglects the slip
-        of other patches. From above: load <g, p> <= <g, tau_p - tau_i> at each place, and the mean
-        over all places between half-spaces is load <p> <= <tau_p - tau_i>. An interface that ends
-        has no bounds.
+        The onset is bounded from below because the weights are positive, except with
+        a machine, because the criterion neglects the slip of other patches. It is
+        bounded from above because load <g, p> <= <g, tau_p - tau_i> at each position.
+        Averaged over all positions between half-spaces, this is load <p> <= <tau_p -
+        tau_i>. An interface that ends has no bounds.
         """
         everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
@@ -134,7 +136,8 @@ class LocalCriterion:
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether exact onsets may differ by more than 1 % in mean or scatter.
 
-        The quick test is for lines between half-spaces without ends. Otherwise it returns True.
+        The quick test applies to lines between half-spaces without ends. In other
+        cases the result is True.
         """
         interface = problem.interface
         half_spaces = problem.specimen is None and not interface.is_plane
@@ -151,10 +154,10 @@ class LocalCriterion:
         return variables if problem.specimen is None else variables | OF_SPECIMENS
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
-        """Return the solver for samples of a problem.
+        """Return a solver for samples of a problem.
 
-        It raises an `InputError` if the weakening rate varies along the interface or a critical
-        patch does not fit on it.
+        Raises an `InputError` if the weakening rate varies along the interface, or if
+        a critical patch does not fit on it.
         """
         check_law(problem)
         interface = problem.interface
@@ -192,7 +195,7 @@ class LocalCriterion:
 
 
 def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
-    """Return the onset of each specimen, at its weakest place."""
+    """Return the onset of each specimen, at its weakest position."""
     _warn_if_coarse(problem, sample)
     excess, spacing = excess_of(sample), problem.interface.spacing
     load, start, width, relief = np.zeros((4, sample.samples))
@@ -236,11 +239,12 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
 
 
 def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) -> float:
-    """Step 3: return by how much a patch's slip lowers the mean stress before its instability.
+    """Step 3: return the mean stress that slip on a patch releases before its instability.
 
-    Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the unstable mode. An
-    added equation fixes the multiple so that the slip at the two ends adds up to zero. At a free
-    end slip does not vanish in truth, and takes off more.
+    Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the
+    unstable mode. An additional equation fixes the multiple: the slips at the two
+    ends add up to zero. In reality, slip does not vanish at a free end, and releases
+    more stress.
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
@@ -256,11 +260,11 @@ def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) ->
 def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
-    This is the load tau_0 at which an isolated patch of length h_n centred at x
-    becomes unstable: the average of tau_p - tau_i over h_n with the critical
+    tau_n is the load tau_0 at which an isolated patch of length h_n centred at x
+    becomes unstable. It is the average of tau_p - tau_i over h_n, with the critical
     slip-rate profile as weight, divided by the same average of the load profile
-    (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020, Eq. 9). On a plane it
-    is the least over five ellipses.
+    (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020, Eq. 9). On a plane tau_n
+    is the minimum over five ellipses.
 
     Parameters
     ----------
@@ -272,7 +276,8 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     Returns
     -------
     (samples, *shape) or (*shape) array, Pa
-        Between the smallest and the largest (tau_p - tau_i)/p of the profile.
+        Nucleation stress, between the smallest and the largest (tau_p - tau_i)/p in
+        the profile.
 
     Raises
     ------
@@ -313,7 +318,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
 
 
 def check_law(problem: Problem) -> None:
-    """Raise an `InputError` for an unsupported problem, and warn of a nonlinear law."""
+    """Raise an `InputError` for an unsupported problem, and warn about a nonlinear law."""
     if refused := refusals(problem, LocalCriterion()):
         raise InputError(refused)
     if not problem.friction.linear:
@@ -325,7 +330,7 @@ def check_law(problem: Problem) -> None:
 
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
-    """Warn if the moving average is a sum over too few nodes."""
+    """Warn if the moving average covers too few nodes."""
     if problem.interface.is_plane:
         cost = "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4"
         problem.warn_if_coarse(sample, 8.0, cost)

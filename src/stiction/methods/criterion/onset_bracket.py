@@ -1,35 +1,36 @@
-"""Quick test whether a predicted onset of a line is right, without the equilibrium kernels.
+"""Test quickly whether a predicted onset on a line is right, without the equilibrium kernels.
 
 Problem
 -------
-Does a line have an equilibrium at the load tau_0, that is a slip d >= 0 (m) with
+Does a line have an equilibrium at the load tau_0? An equilibrium is a slip d >= 0
+(m) with
 
     K d + max(tau_p - W d, tau_r) >= tau_i + tau_0 p ?
 
 A predicted load is right to 1 % if there is an equilibrium at 0.99 times the load
-and no equilibrium at 1.01 times the load. If it is not, wider brackets tell by
-how much it is off.
+and no equilibrium at 1.01 times the load. Otherwise, wider brackets show how large
+the error is.
 
 Algorithm
 ---------
-The entries of K off the diagonal are not positive, and strength falls with slip.
-So the slip of the least equilibrium can be built up from zero and never has to be
-taken back (R. Chandrasekaran, Opsearch 7, 1970, for linear problems). `slides`
-starts from d = 0:
+The off-diagonal entries of K are not positive, and strength falls with slip.
+Therefore the slip of the least equilibrium can be increased step by step from zero,
+and never has to be reduced (R. Chandrasekaran, Opsearch 7, 1970, for linear
+problems). `slides` starts from d = 0:
 
 1. Compute the overstress f = tau_i + tau_0 p - K d - strength, Pa.
-2. The interface slides if the load exceeds the mean strength, or if a run of
-   residual nodes is so long that no fracture energy can stop a crack of this
-   length (Griffith, 1921).
+2. The interface slides if the load exceeds the mean strength. It also slides if a
+   run of residual nodes is so long that the fracture energy cannot stop a crack of
+   this length (Griffith, 1921).
 3. Let S be the nodes that slip or are overstressed. If no node is overstressed, d
    is an equilibrium.
-4. Newton's method: d_S grows by x with (K - W)_SS x = f, up to the first node
-   that reaches its residual strength.
-5. If K - W is not positive definite on S, a patch is unstable. A few steps with
-   frozen strengths, K_SS x = f, follow. They never pass the least equilibrium.
+4. Use Newton's method: d_S grows by x with (K - W)_SS x = f, until the first node
+   reaches its residual strength.
+5. If K - W is not positive definite on S, a patch is unstable. Then take a few
+   steps with frozen strengths, K_SS x = f, which never pass the least equilibrium.
 
-Departures from the source: strength has a corner, and steps end at a tolerance.
-If thousands of nodes slip the question stays undecided, as each step solves a
+Departures from the source: strength has a corner, and steps end at a tolerance. If
+thousands of nodes slip, the test remains undecided, because each step solves a
 dense system.
 """
 
@@ -57,10 +58,10 @@ GRIFFITH_MARGIN = 1.5
 
 
 def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
-    """Return the relative distance of exact onsets from predicted onsets, rms over samples.
+    """Return the relative rms difference between exact and predicted onsets over samples.
 
-    It is an estimate. Differences below the narrowest bracket, 1 %, count as
-    zero. It is infinite if a sample is undecided.
+    The result is an estimate. Differences below the narrowest bracket, 1 %, count as
+    zero. The result is infinite if a sample is undecided.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
 def _least_difference(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array, side: int
 ) -> float:
-    """Return the widest bracket on a side that the onset lies outside of, or 0."""
+    """Return the widest bracket, on a given side, that does not contain the onset, or 0."""
     least = 0.0
     for width in BRACKETS:
         sliding = slides(column, peak, residual, rate, (1.0 + side * width) * load)
@@ -102,7 +103,7 @@ def _least_difference(
 def slides(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array
 ) -> bool | None:
-    """Return whether a line slides under a load, having no equilibrium; `None` if undecided.
+    """Return whether a line slides under a load because it has no equilibrium. `None` if undecided.
 
     Parameters
     ----------
@@ -158,10 +159,11 @@ def slides(
 def _unstoppable_nodes(
     column: Array, peak: Array, residual: Array, rate: Array, load: Array
 ) -> float:
-    """Return the length of an unstoppable crack in nodes, infinite without a stress drop.
+    """Return the length, in nodes, of an unstoppable crack. Infinite without a stress drop.
 
-    Griffith's length is 4 G* E/(pi D^2), with the largest fracture energy E and the least stress
-    drop D. Between half-spaces K_0 is pi G*/4 divided by the spacing.
+    Griffith's length is 4 G* E/(pi D^2), with the largest fracture energy E and the
+    smallest stress drop D. Between half-spaces, K_0 is pi G*/4 divided by the
+    spacing.
     """
     drop = float(np.min(load - residual))
     energy = float(np.max((peak - residual) ** 2 / (2.0 * rate)))

@@ -1,29 +1,29 @@
-"""Critical windows: patches that are just unstable by themselves, with weights of their nodes.
+"""Critical windows: patches that are just unstable in isolation, with weights for their nodes.
 
 Problem
 -------
 K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of
-nodes on which the lowest eigenvalue of K is at most W, and y > 0 the eigenvector,
-with unit sum. With all other nodes held, slip on it is unstable from the load <s,
-y>/<p, y> on, where s is the strength less initial stress (Pa) and p the load
-profile. If K has no positive entry off its diagonal, y is a multiplier of the
-whole interface, so that this load bounds the onset from above as long as no node
+nodes on which the lowest eigenvalue of K is at most W. Its eigenvector y > 0 has
+unit sum. If all other nodes are held, slip on the window becomes unstable at the
+load <s, y>/<p, y>. Here s is the strength minus initial stress (Pa), and p is the
+load profile. If K has no positive off-diagonal entry, y is a multiplier for the
+whole interface. This load then bounds the onset from above, as long as no node
 reaches its residual strength.
 
 Algorithm
 ---------
-On a line the window is the nucleation length h_n, and y the eigenfunction of K.
-Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights of the nodes
-(`eigenfunction`). On a plane it is an ellipse, for each of five aspects:
+On a line, the window has the nucleation length h_n, and y is the eigenfunction of
+K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights for the nodes
+(`eigenfunction`). On a plane, the window is an ellipse. For each of five aspects:
 
-1. Start with a small box of nodes of the plane, made periodic with the stiffness
-   between its own nodes. A block of a Toeplitz matrix is a block of a circulant
-   matrix, so the problem on an ellipse of at most half the length of the box
-   stays the same. The cost follows the size of the ellipse, not of the plane.
+1. Start with a small box of nodes, made periodic with the stiffness between its own
+   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the
+   problem on an ellipse of at most half the length of the box stays the same. The
+   cost depends on the size of the ellipse, not of the plane.
 2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at
    most W (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
-3. If every ellipse in the box is stable, double the box and go to 2. If the box
-   is the plane already, the window does not fit.
+3. If every ellipse in the box is stable, double the box and repeat step 2. If the
+   box is already the whole plane, the window does not fit.
 
 For nu = 0 the critical disc has radius 2.0061 G/(2W).
 """
@@ -54,7 +54,7 @@ FIRST_PROBE_SHARE = 16  # the first ellipse to be tried has a sixteenth of all r
 
 
 class Window(NamedTuple):
-    """Critical patch, centred on the first node."""
+    """A critical patch, centred on the first node."""
 
     aspect: float  # ratio of the semi-axes along x and y; 1 on a line
     extents: tuple[float, ...]  # length in each direction, m
@@ -72,11 +72,11 @@ class Window(NamedTuple):
 def windows_of(
     problem: Problem, rate: float, stretches: Sequence[float] = STRETCHES
 ) -> list[Window]:
-    """Return the critical windows of a weakening rate (Pa/m), or raise an `InputError`.
+    """Return the critical windows for a weakening rate (Pa/m), or raise an `InputError`.
 
-    A line has a single window, a plane a window for each multiple of the aspect 1/sqrt(1 - nu): the
-    critical length in mode II is 1/(1 - nu) times the critical length in mode III. Every window
-    must fit on the interface.
+    A line has a single window. A plane has a window for each multiple of the aspect
+    1/sqrt(1 - nu), because the critical length in mode II is 1/(1 - nu) times the
+    critical length in mode III. Every window must fit on the interface.
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(rate)[0]
@@ -104,7 +104,7 @@ def windows_of(
 
 
 def places_of(interface: Interface, window: Window) -> Any:
-    """Return the nodes at which a window lies within the extent of an interface, (*shape)."""
+    """Return a mask (*shape) of the nodes at which a window lies within the interface's extent."""
     if not interface.is_held:
         return True
     beyond = interface.transform(1.0 * ~interface.breakable)
@@ -113,7 +113,7 @@ def places_of(interface: Interface, window: Window) -> Any:
 
 
 def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
-    """Return the windows that lie within the extent at some place; refuse if there is none."""
+    """Return the windows that fit within the extent. Raise an error if no window fits."""
     if fitting := [y for y in windows if np.any(places_of(interface, y))]:
         return fitting
     extents = " x ".join(f"{length:.4g}" for length in windows[0].extents)
@@ -125,7 +125,7 @@ def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
 
 @lru_cache(maxsize=64)
 def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
-    """Return the weights around node 0 and their transform; `half_width` is h_n/2 in nodes."""
+    """Return the weights around node 0, and their transform. `half_width` is h_n/2 in nodes."""
     weights = around(grid_weights(half_width), nodes)
     spectrum = np.fft.rfft(weights).real
     for array in (weights, spectrum):
@@ -148,9 +148,9 @@ def ellipse_window(
     rate: float,
     aspect: float,
 ) -> Window | None:
-    """Return the smallest unstable ellipse of an aspect, or `None` if it meets its images.
+    """Return the smallest unstable ellipse with an aspect, or `None` if it meets its images.
 
-    See steps 1 to 3 at the top of this file.
+    See steps 1 to 3 in the docstring of the module.
     """
     spacings = np.divide(lengths, shape)
     column = np.fft.irfft2(symbol, shape)
@@ -181,7 +181,7 @@ def ellipse_window(
 
 
 class Ellipse(NamedTuple):
-    """Ellipse on whose nodes the lowest eigenvalue of K is at most W."""
+    """Ellipse that contains nodes on which the lowest eigenvalue of K is at most W."""
 
     square: float  # of its semi-axis along x, m²
     eigenvalue: float  # Pa/m
@@ -193,8 +193,8 @@ def _smallest_unstable(
 ) -> Ellipse | None:
     """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or `None`, by bisection.
 
-    The column is the stress (Pa) at each node of the box by unit slip at node (0, 0). Ellipses up
-    to `stable_square` are known to be stable.
+    `column` holds the stress (Pa) at each node of the box due to unit slip at node
+    (0, 0). Ellipses up to `stable_square` are known to be stable.
     """
     symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, rate, column.shape)._replace(
