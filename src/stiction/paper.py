@@ -1,6 +1,7 @@
 """The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests.
 
-It uses public names, which are imported on first use, as a `Problem` does not need random fields.
+It uses the public names of the package only. They are imported on first use, so that a `Problem`
+does not load random fields.
 """
 
 from __future__ import annotations

@@ -263,7 +263,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
         for text in texts
     )
     share = (found[0].certificate_gap / found[0].first_instability).max().item()
-    assert any(f"up to {share:.2g} of it apart" in text for text in texts)
+    assert any(f"up to {share:.2g} of the load apart" in text for text in texts)
 
 
 def test_nucleation_length_at_a_free_end_and_in_the_middle():

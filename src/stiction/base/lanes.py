@@ -40,7 +40,7 @@ def _constant(value: float) -> ir.Constant:
 
 
 def _place(context: Any, builder: Any, kinds: Any, array: Any, index: Any) -> Any:
-    """Pointer to four numbers of a contiguous array, with no check and no negative index."""
+    """Return a pointer to four consecutive numbers. The index is not checked."""
     data = context.make_array(kinds[0])(context, builder, array).data
     index = context.cast(builder, index, kinds[1], types.intp)
     return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())

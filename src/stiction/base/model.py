@@ -373,7 +373,7 @@ def model(cls: type[T]) -> type[T]: ...
 def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 @dataclass_transform(frozen_default=True, field_specifiers=(dataclasses.field, Field))
 def model(cls: Any = None, *, kw_only: bool = False) -> Any:
-    """Class decorator: a frozen pydantic dataclass whose mistakes come as `InputError`.
+    """Class decorator: a frozen pydantic dataclass that reports invalid values as `InputError`.
 
     Objects compare by value (arrays too) and hash by value. Consistency checks go into a
     method decorated with ``pydantic.model_validator(mode="after")`` that raises

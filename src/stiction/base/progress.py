@@ -137,7 +137,7 @@ def _listen() -> None:
 
 
 def _display() -> Callable[[Meter, bool], None]:
-    """Return a function that shows a meter, with a flag at its last call."""
+    """Return a function that shows a meter. Its second argument is true at the last call."""
     stream, soon = sys.stderr, LONG
     if stream is not None and stream.isatty():
         return _in_terminal()

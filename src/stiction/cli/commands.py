@@ -655,7 +655,7 @@ def reliability(
         given = [name for name, value in of_curve.items() if value is not None]
         if given:
             raise InputError(
-                f"{_options_of(given)}: applies to a whole curve, which needs --out FOLDER"
+                f"{_options_of(given)}: applies to a whole curve only. Add --out FOLDER"
             )
         _answer(loaded, asked, workers, page)
         return

@@ -152,11 +152,12 @@ def _in_plane(
 
 
 def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> Array:
-    """Step 2: return K of a block on rollers less K of two ends without a top, Pa/m².
+    """Step 2: return K of a block on rollers minus K of two ends without a top, Pa/m².
 
-    The kernel of a block, in units of E*/(4 H), is a sum over k of k (1 - k r) exp(-k r) at a
-    distance r, less k (1 - k (x + s) + 2 k² x s) exp(-k (x + s)) for the left end, and the same for
-    the right end. The kernels of half-spaces, which are subtracted, are its limits for large H.
+    The kernel of a block, in units of E*/(4 H), is a sum over k. Two nodes at a distance r
+    contribute k (1 - k r) exp(-k r). Each end subtracts k (1 - k (x + s) + 2 k² x s) exp(-k (x +
+    s)), with the distances x and s of the nodes from this end. The kernels of half-spaces, which
+    are subtracted, are the limits for large H.
     """
     spacing, c = harmonics.length / nodes, 0.5 * np.pi / harmonics.height
     x, i = (np.arange(nodes) + 0.5) * spacing, np.arange(nodes)

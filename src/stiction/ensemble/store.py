@@ -210,7 +210,9 @@ def digest(data: bytes) -> str:
 def _check_folder(folder: Path) -> None:
     """Refuse a link in place of the folder of chunks, because files would go to its target."""
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
-        raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
+        raise InputError(
+            f"{folder}: is not a folder. Remove it, or choose another folder for the run"
+        )
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:

@@ -112,7 +112,9 @@ class SpecimenPosterior(Posterior):
     def prior(self) -> Any:
         """Raise an `InputError`, because fields within a specimen have no prior of parameters."""
         raise InputError(
-            "prior: `prior_transform` and `log_likelihood` need parameters with a prior of `infer`"
+            "prior: this posterior has no parameters with a prior, because it holds fields within a"
+            " specimen. `prior_transform` and `log_likelihood` need a posterior from st.infer with"
+            " prior="
         )
 
     def _summary(self) -> Summary:

@@ -157,7 +157,8 @@ def _checked(record: Record, quantity: str) -> Record:
     if np.median(aside) > 0.0 and far.any():
         warn_accuracy(
             f"{int(far.sum())} of {values.size} values are outliers, such as"
-            f" {values[aside.argmax()]:.4g}. If they are not real, make them NaN to leave them out"
+            f" {values[aside.argmax()]:.4g}. If they are errors of measurement, set them to NaN"
+            " to leave them out"
         )
     else:
         _doubt_jumps(record)

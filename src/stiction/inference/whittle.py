@@ -191,7 +191,7 @@ class SpectrumFamily:
         return np.transpose([self.vector(end) for end in ends])
 
     def model(self, vector: Array, shares: Array) -> Model:
-        """Return the model for a vector of parameters."""
+        """Return the model for a vector of free parameters."""
         values = {
             n: float(v) if n == "noise_share" else origin(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)

@@ -154,7 +154,7 @@ def force_travel(
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
         raise InputError(
-            "result: some paths are forces, others stresses. Draw them in separate figures"
+            "result: some paths contain forces and others stresses. Draw them in separate figures"
         )
     units = str(results[0][name].attrs["units"])
     if measured is not None and (measured.unit, measured[0].travel_unit) != (units, "m"):

@@ -287,9 +287,9 @@ class Problem:
             compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
         doubts = [
             Doubt(
-                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} of the {what}. Check the"
-                " units of both. All are in Pa. Coefficients are fractions, not percentages, and"
-                " need of='friction_coefficient'",
+                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check"
+                " the units of both, which are in Pa. Friction coefficients are fractions, not"
+                " percentages, and need of='friction_coefficient'",
                 mean / of,
                 *limits,
             )
@@ -677,7 +677,7 @@ class Problem:
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
-                " of the nodes. They would slip in reverse, which is not modelled, and are held"
+                " of the nodes. Reverse slip is not modelled, so these nodes are held"
             )
         shape = self.interface.shape
         load_profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=float)

@@ -78,8 +78,8 @@ def _known(given: Any) -> Any:
         if not isinstance(entry, RandomInterface | RandomField):
             raise InputError(
                 f"{f'[{number}] ' * several}must be a RandomInterface or a RandomField, got"
-                f" {describe(entry)}. Pass a profile to st.onset, or fit a field to it with"
-                " st.fit_field"
+                f" {describe(entry)}. For a measured profile, use st.onset, or fit a field to"
+                " it with st.fit_field"
             )
     return given
 

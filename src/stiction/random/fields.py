@@ -232,9 +232,9 @@ class RandomField:
         share = float(with_mean.sigma[0] ** 2)
         if share > MAX_MEAN_SHARE:
             warn_accuracy(
-                "the field has no mean mode, which on so short an interface would hold"
-                f" {100.0 * share:.2g} % of the variance: all samples have nearly the same mean."
-                " RandomField(mean_mode=True) lets it vary"
+                "the field has no mean mode, which would hold"
+                f" {100.0 * share:.2g} % of the variance on so short an interface. All samples have"
+                " nearly the same mean. RandomField(mean_mode=True) lets the mean vary"
             )
 
     @checked
@@ -682,6 +682,6 @@ def as_random_interface(given: Any) -> RandomInterface:
     if not isinstance(given, RandomInterface):
         raise InputError(
             f"random: must be a RandomInterface or a RandomField, got {describe(given)}."
-            " Pass a profile to st.onset, or fit a field to it with st.fit_field"
+            " For a measured profile, use st.onset, or fit a field to it with st.fit_field"
         )
     return given

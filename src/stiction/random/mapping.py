@@ -62,8 +62,9 @@ MAX_REST = 1e-6  # share of the variance for which the last coefficient may stan
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
     """Compute F^-1(Phi(z)) for a frozen scipy.stats distribution (Grigoriu, 1995).
 
-    Phi(z) rounds to 1 long before z = 8. The upper tail therefore uses Phi(-z), which keeps its
-    digits if scipy inverts the survival function of the family directly.
+    Phi(z) loses its digits as it approaches 1, and rounds to 1 near z = 8.3. The upper tail
+    therefore uses Phi(-z), which keeps its digits if scipy inverts the survival function of the
+    family directly.
     """
     tail, lower, value = ndtr(-np.abs(z)), z < 0.0, np.empty_like(z)
     value[lower], value[~lower] = distribution.ppf(tail[lower]), distribution.isf(tail[~lower])

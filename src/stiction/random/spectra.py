@@ -122,7 +122,7 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
-    """Step 2: return the first lag at which the correlation of z on a line falls to `target`, m."""
+    """Step 2: return the first lag (m) at which the correlation on a line falls to `target`."""
     # The slope of the correlation is at most the mean wavenumber. Between lags
     # that are close against the root mean square of the wavelengths, it is nearly
     # straight. March in such steps until it is below the target, then search

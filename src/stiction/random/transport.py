@@ -106,7 +106,7 @@ class Transport(NamedTuple):
 
 
 class ErrorEstimate(NamedTuple):
-    """Largest error of mapped draws, at any place that step 1 keeps."""
+    """Largest errors of the mapped draws, over all places that step 1 keeps."""
 
     mean: float  # of z, in standard deviations of z
     deviation: float  # of the standard deviation of z, as a share of it

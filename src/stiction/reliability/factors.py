@@ -176,7 +176,7 @@ def solve(state: LimitState, first: int, samples: int) -> Counts:
 
 
 def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
-    """Count until the goal is reached (steps 4 and 5). Return None if chains cost less."""
+    """Count failures up to the goal (steps 4 and 5). Return None if chains cost less."""
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
         return None

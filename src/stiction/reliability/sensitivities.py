@@ -136,7 +136,7 @@ def _at(state: LimitState, key: str, value: float) -> LimitState:
 
 
 def _by_family(counts: Counts, probability: float) -> dict[str, float]:
-    """Return the quantile for each family of the factor that has enough specimens (step 2)."""
+    """Return the quantile for each family of the factor with enough specimens (step 2)."""
     random = counts.state.experiment.random
     laws, law = random.factor_laws
     names = {family: name for name, family in FACTOR_FAMILIES.items()}

@@ -118,9 +118,10 @@ class Repetitions:
     ) -> None:
         if any(optional_member(point.method, "counted_only") for point in points):
             raise InputError(
-                "method: failures by rupture are counted, not sampled by levels. Use"
-                " st.Equilibrium() or st.LocalCriterion(), or failure_probability(...,"
-                " algorithm='plain')"
+                "method: st.Rupture cannot compute a failure curve, because its failures can only"
+                " be"
+                " counted. Use st.Equilibrium() or st.LocalCriterion(), or call"
+                " failure_probability(..., algorithm='plain')"
             )
         self.smallest, self._only = settings["smallest"], only
         self.states = [LimitState(point, settings["event"]) for point in points]

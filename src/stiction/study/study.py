@@ -339,7 +339,10 @@ class Study(_Parts):
     def _mixture(self, random: Any) -> Any:
         """Return a mixture from a list of interfaces that is complete."""
         if self.uncertain:
-            raise InputError("mixture: interfaces of [uncertain] are a sample. Leave it out")
+            raise InputError(
+                "mixture: cannot be combined with [uncertain], whose interfaces are a sample and"
+                " not a complete mixture. Remove mixture"
+            )
         return as_random(random, mixture=True)
 
     def _likely(self, random: Any) -> Any:
@@ -351,7 +354,9 @@ class Study(_Parts):
             key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
         ]
         if swept:
-            raise InputError(f"uncertain: {swept[0]} is swept too. Remove it from either table")
+            raise InputError(
+                f"uncertain: {swept[0]} is also swept. Remove it from [uncertain] or from the sweep"
+            )
         if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
             return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
         return random.uncertain(parameters, count, self.ensemble.seed)

@@ -200,8 +200,8 @@ def finish_step(
 ) -> Any:
     """Update diagnostics, arrivals and the record. Return the fall of the mean stress, Pa.
 
-    `increments` is the slip of the nodes in the step (m), `strength` their strength after it (Pa).
-    Without rows the record stays empty.
+    `increments` is the slip of the nodes in the step (m), and `strength` is their strength after
+    the step (Pa). If the record has no rows, it stays empty.
     """
     now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival

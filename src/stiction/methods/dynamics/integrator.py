@@ -79,7 +79,7 @@ class Run:
     events: list[NDArray[Any]] = dataclasses.field(default_factory=list)
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
-        """Return the static stress of a slip at a load, as an interface at rest carries it, Pa."""
+        """Return the stress (Pa) on an interface at rest with a given slip and load."""
         grid, nodes = self.medium.grid, self.setting.nodes
         interface = self.medium.interface
         stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)

@@ -89,8 +89,8 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
     if limit == 0.0:
         error = max(kernel.error for kernel in kernels)
         raise InputError(
-            f"kernel_tolerance: with an error of {error:.2g} in the memory kernel waves grow"
-            f" at any time step. Got {tolerance:g}, use {STEADY_TOLERANCE:g} or less"
+            f"kernel_tolerance: with an error of {error:.2g} in the memory kernel, waves"
+            f" grow at any time step. Got {tolerance:g}. Use {STEADY_TOLERANCE:g} or less"
         )
     grid, step = _grid(problem, kernels), courant * limit
     table = None if interface.is_plane else step_table(grid, step)

@@ -274,10 +274,10 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
 
 
 def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
-    """Return stiffness, force and compliance of the even or the odd motion.
+    """Return stiffness, force and compliance for the even or the odd motion.
 
-    Rows are eliminated from the top downwards. `folds`, (nodes, half), give u and v of all nodes of
-    a row.
+    Rows are eliminated from the top downwards. The matrices `folds`, of shape (nodes, half), map
+    the unknowns of half a row to u and v at all its nodes.
     """
     nodes, size = folds[0].shape
     fold = sp.csr_matrix(scipy.linalg.block_diag(*folds, *folds))

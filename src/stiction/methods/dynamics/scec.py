@@ -81,8 +81,8 @@ def write_scec(
         )
     if not normal_stress <= 0.0:
         raise InputError(
-            f"normal_stress: must be negative, in compression, or zero, got {normal_stress!r}."
-            " Change the sign of a pressure"
+            f"normal_stress: must be negative (compression) or zero, got {normal_stress!r}."
+            " If this is a pressure, change its sign"
         )
     dims = run.arrival_time.dims
     middle = dict(zip(dims, np.atleast_1d(origin).tolist(), strict=True))

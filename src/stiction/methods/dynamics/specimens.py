@@ -118,9 +118,9 @@ class DynamicEvent:
     steps: int = 0
 
     def take_steps(self, count: int, ends: bool = True) -> bool:
-        """Take `count` steps, or with `ends` until all nodes have slipped.
+        """Take `count` steps. With `ends`, stop earlier if all nodes have slipped.
 
-        Returns whether some node has not slipped.
+        Return whether a node has not slipped yet.
         """
         taken = wave_steps(
             self.sample, self.start, self.front, self.mesh, self.waves, count, ends

@@ -7,7 +7,7 @@ from stiction.base.arrays import Array
 
 
 class Parameters(Protocol):
-    """The part of a law that kernels use: a NamedTuple of its own type with these members."""
+    """Parameters of a law in kernels. Each law has its own NamedTuple with these members."""
 
     @property
     def initial_slope(self) -> float:

@@ -98,7 +98,11 @@ def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
         factor = factor_to(si, given or stated or si)
         known = given and parse(stated)
         if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
-            raise InputError(f"is given in {given}, but the source states {stated}")
+            raise InputError(
+                f"is given in {given}, but the source states {stated}. Leave the unit out, or"
+                " correct"
+                " the source"
+            )
     return values * factor
 
 
@@ -461,7 +465,7 @@ def _plain(name: Any) -> str:
 
 
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
-    """Return an array over 'x' ('x' and 'y', or 'row'). Samples, if any, come first."""
+    """Return the array over 'x' (or 'x' and 'y', or 'row'). A dimension of samples comes first."""
     if len(dims) == 1 and "x" in array.coords:
         array = array.swap_dims({array["x"].dims[0]: "x"})
     names = [str(dim) for dim in array.dims]
@@ -528,8 +532,7 @@ def _doubt_metres(heights: Array) -> None:
     """Warn about heights without a unit that are probably in um or nm."""
     if heights.size and np.ptp(heights) > TALL:
         warn_user(
-            f"height: has no unit, so it is taken in m, and ranges over {np.ptp(heights):.3g} m."
-            " Give"
-            " unit='um' or another, or unit='m' if that is right",
+            f"height: has no unit and is read in m. The heights span {np.ptp(heights):.3g} m. Pass"
+            " unit='um' or another unit, or unit='m' if metres are right",
             UnitWarning,
         )

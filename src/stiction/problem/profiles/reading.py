@@ -286,7 +286,9 @@ def at_nodes(
             array = labelled(value, quantity, interface.dims)
             if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # a value for each sample
                 if quantity == "strength":
-                    raise InputError("has no dimension along the interface. Call it 'x'")
+                    raise InputError(
+                        "has no dimension along the interface. Name this dimension 'x'"
+                    )
                 return array.values[:, np.newaxis], True
             return place(array, interface, gaps=gaps)
         with suppress(TypeError):  # values that are no numbers are refused with other mistakes

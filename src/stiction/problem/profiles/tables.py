@@ -295,7 +295,7 @@ def _check_line(number: int, line: str, separator: str) -> None:
         )
     if (letters := max(map(len, cells), default=0)) > MAX_LETTERS:
         raise InputError(
-            f"line {number} has a cell of {letters} letters, at most {MAX_LETTERS} can be read"
+            f"line {number} has a cell of {letters} characters. At most {MAX_LETTERS} can be read"
         )
 
 

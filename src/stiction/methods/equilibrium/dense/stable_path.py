@@ -232,8 +232,8 @@ def _stop_unloaded(
 ) -> tuple[int, bool]:
     """Step 2, for (3): move the rates from `v_nodes` towards v, and stop nodes on the way.
 
-    Returns the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
-    are then the solution of (2) for them.
+    Return the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
+    then hold the solution of (2) for the slipping nodes.
     """
     workspace, v = state.workspace, state.workspace.v
     some_stopped = False

@@ -190,9 +190,9 @@ def close(
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
-    If another patch turns out to be unstable, it is held instead. Load and slip are a guess;
-    `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known. Returns whether the bounds
-    are within `gap` of the load, and the curvature found.
+    If a different patch turns out to be unstable, the spring holds that patch. `load` and `slip`
+    are first guesses. `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known. Return
+    whether the bounds are within `gap` of the load, and the curvature that was found.
     """
     if bracket.closed(gap):
         return True, bend
