@@ -92,7 +92,9 @@ def test_what_stands_in_the_place_of_a_random_field_gets_one_line():
     problem, field = make_problem(), beta_strength(4e-3)
     given = {"method": EXACT, "samples": 2, "progress": False}
     for wrong in (field.sample(problem.interface)[0], 256 * [1e6], "strength", [field, 1.0]):
-        with pytest.raises(st.InputError, match="For a measured profile, use st.onset") as caught:
+        with pytest.raises(
+            st.InputError, match="For a measured profile, use st.onset"
+        ) as caught:
             st.monte_carlo(problem, wrong, **given)
         assert len(caught.value.problems) == 1
         assert caught.value.problems[0].startswith("random: ")
