@@ -1,30 +1,30 @@
-"""The table of events: instabilities that came to rest, of every method that follows them.
+"""The table of events, which are instabilities that came to rest, for all methods.
 
 Problem
 -------
-An event takes an interface at rest from the slip d_0 to the slip d_1. With delta
-= d_1 - d_0, it releases the stress K delta at the load at which it begins. The
-table has these measures:
+An event takes an interface at rest from the slip d_0 to the slip d_1. With delta =
+d_1 - d_0, the event releases the stress K delta, at the load at which it begins.
+The table holds these measures:
 
-1. The patch of an event is where delta is above `MIN_ADDED_SLIP` of its largest
-   value, around that value. It has extents, an area and a mean slip. Slip
-   elsewhere also grows a little.
-2. The moment is G times the integral of delta. The magnitude of a plane follows
-   from it: Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori, 1979,
-   in SI units).
-3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is
-   the mean of K delta over the patch, the second its mean weighted by delta. The
-   third is twice the energy that the slip releases beyond friction at the
-   residual strength, over the integral of delta. Waves and weakening share this
+1. The patch of an event is the region around the largest delta in which delta
+   exceeds the share `MIN_ADDED_SLIP` of its largest value. The patch has extents,
+   an area and a mean slip. Outside the patch, slip also grows a little.
+2. The moment is G times the integral of delta. On a plane, the magnitude follows
+   from the moment: Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori,
+   1979, in SI units).
+3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is the
+   mean of K delta over the patch. The second is the mean of K delta weighted by
+   delta. The third is twice the energy that the slip releases beyond friction at
+   the residual strength, over the integral of delta. Waves and weakening share this
    energy. If the stress comes to rest at the residual strength at a constant load,
-   the third equals the second. A rupture knows both shares, which contain the work
-   of the load that rises meanwhile.
-4. The fracture energy is dissipated above the residual strength.
-5. Methods with inertia know how long an event takes and, between half-spaces,
-   when it begins and what it radiates.
+   the third equals the second. In a rupture both shares of the energy are known.
+   They contain the work of the load, which rises during the event.
+4. The fracture energy is the energy dissipated above the residual strength.
+5. Methods with inertia also give the duration of an event. Between half-spaces,
+   they give the time at which the event begins and the radiated energy.
 
-Behind a machine the load is the drive: the mean stress that it would cause
-without slip. Slip relieves it.
+With a machine, the load is the drive: the mean stress that the drive would cause
+without slip. Slip lowers the actual stress.
 """
 
 from collections.abc import Mapping, Sequence
@@ -64,7 +64,7 @@ MIN_ADDED_SLIP = 1e-3
 
 
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:
-    """Return the variables of each event on a line or a plane, with the inertia of a rupture."""
+    """Return the variables of events. `inertia` adds the variables that a rupture provides."""
 
     def variable(units: str, text: str) -> Variable:
         return Variable(units, text, ("event",))
@@ -98,7 +98,7 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
 
 
 def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
-    """Return the variables of events of many samples."""
+    """Return the variables of events in many samples."""
     return {
         name: replace(variable, dims=("sample", *variable.dims))
         for name, variable in variables.items()
@@ -106,9 +106,9 @@ def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
 
 
 class ArrestedEvent(NamedTuple):
-    """States before and after an instability that came to rest.
+    """The states before and after an instability that came to rest.
 
-    `timed` holds the variables that only a method with inertia knows, by name.
+    `timed` holds, by name, the variables that only a method with inertia provides.
     """
 
     before: EquilibriumState
@@ -124,9 +124,10 @@ def event_table(
     variables: Mapping[str, Variable],
     most: int | None = None,
 ) -> dict[str, Array]:
-    """Return the variables of the events of one sample, (events, ...) arrays.
+    """Return the variables of the events in one sample as arrays (events, ...).
 
-    With `most`, the first so many events, and NaN where there are fewer.
+    With `most`, the arrays hold the first `most` events. If there are fewer, they are
+    padded with NaN.
     """
     events = events[:most]
     measured = [_measures(problem, rows, row, *event) for event in events]
@@ -203,12 +204,12 @@ def _measures(
 
 
 def moment_of(problem: Problem, slip: Array) -> float:
-    """Return the moment of a slip (m), N, or its rate by a slip rate, N/s; times m on a plane."""
+    """Return the moment of a slip (m), N, or the rate from a slip rate, N/s. N m on a plane."""
     return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
 
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
-    """Return the travel of a specimen's two drives together since the unloaded state, m."""
+    """Return the total travel, m, of the two drives of a specimen since the unloaded state."""
     force = (load - float(problem.blocks.mean_relief(slip))) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
@@ -216,7 +217,7 @@ def travel_of(problem: Problem, load: float, slip: Array) -> float:
 def elongation_of(problem: Problem, stress: float) -> float:
     """Return the elongation of the machine (m) at a mean stress of the whole interface (Pa).
 
-    It is NaN under a dead load, which has no far end.
+    The elongation is NaN under a dead load, which has no far end.
     """
     assert problem.specimen is not None
     machine, depth = problem.specimen.drive.stiffness, problem.specimen.thickness

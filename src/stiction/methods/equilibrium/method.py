@@ -1,4 +1,4 @@
-"""Equilibrium as a method: exact quasi-static onset with every interaction."""
+"""Equilibrium as a method: exact quasi-static onset with all interactions."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
@@ -44,55 +44,55 @@ ON_NODES = {
 
 @model(kw_only=True)
 class Equilibrium:
-    """Exact quasi-static onset with every interaction between patches.
+    """Exact quasi-static onset with all interactions between patches.
 
     A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes
     about 0.15 s.
 
-    The load rises until no equilibrium is left. While strength falls linearly,
-    this is a linear programme, solved to round-off with a certificate. After the
+    The load rises until there is no equilibrium. While strength falls linearly, this
+    is a linear programme, which is solved to round-off with a certificate. After the
     first instability, or after the first corner of a `PiecewiseWeakening`, the
-    equilibria are followed event by event. That is exact, too, and costs 5 times
-    as much for two pieces and 50 times for 32. On planes the path between events
+    equilibria are followed event by event. This is also exact. It takes 5 times as
+    long for two pieces and 50 times as long for 32. On planes the path between events
     is followed in steps of the load. Weakening rate, residual strength, initial
     stress and load profile may vary along the interface.
 
-    On planes the programme is solved with Fourier transforms. Its bounds are a
-    share `gap` of the load apart, and the results give the lower bound, at which
-    there is an equilibrium.
+    On planes the programme is solved with Fourier transforms. The distance between
+    its bounds is the share `gap` of the load. Results contain the lower bound, at
+    which there is an equilibrium.
 
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at fixed
-        weakening rates. It is NaN if a law steepens and a node passes a corner
-        before the first instability, and on planes if the turning point is not
-        found. If a node of a specimen stops before the first instability, the
-        derivatives are difference quotients, which take a path for every node.
+        Also return d first_instability / d tau_p at every node, at fixed weakening
+        rates. The sensitivity is NaN if a law steepens and a node passes a corner
+        before the first instability, and on planes if the turning point is not found.
+        If a node of a specimen stops before the first instability, the derivatives
+        are difference quotients, which need a path for every node.
     slip : bool
         Also return the slip at the first instability.
     events : int
-        Also return this number of arrested events of each sample over 'event',
-        padded with NaN. The event in which an interface that ends slides is among
-        them. They form a sequence: stress and slip continue from event to event.
-        The variables are described in `equilibrium_path`.
+        Also return this number of arrested events for each sample over 'event',
+        padded with NaN. If an interface ends, the event in which it slides is
+        included. The events form a sequence: stress and slip continue from event to
+        event. The variables are described in `equilibrium_path`.
     gap : float
-        On planes, the distance of the bounds as a share of the load, 1e-10 to
-        1e-2. Lines are solved to round-off, or to 1e-9 if thousands of nodes
-        slip.
+        On planes, the distance between the bounds as a share of the load, 1e-10 to
+        1e-2. Lines are solved to round-off, or to 1e-9 if thousands of nodes slip.
 
     Notes
     -----
-    The result has these variables besides the variables of every method: `certificate_gap`, the
-    distance of rigorous bounds of the first instability (Pa), `slip_patches` at the first
-    instability, `critical_patch_length` (m), `arrested_events`, `residual_reached` (whether a node
-    reached its residual strength before the interface slid), and `sliding_position` (m), which
-    differs from `critical_position` only after an arrested event.
+    In addition to the variables of every method, the result contains `certificate_gap`, the
+    distance between rigorous bounds of the first instability (Pa), `slip_patches` at the
+    first instability, `critical_patch_length` (m), `arrested_events`, `residual_reached`
+    (whether a node reached its residual strength before the interface slid), and
+    `sliding_position` (m), which differs from `critical_position` only after an arrested
+    event.
 
-    Equilibrium decides about arrest; inertia may carry a rupture through. There
-    is no upper bound, and `certificate_gap` is NaN, if a law steepens and a node
-    passes a corner before the first instability, or if a node of a specimen stops
-    before it.
+    Arrest is decided in equilibrium. Inertia may carry a rupture further. There is no
+    upper bound, and `certificate_gap` is NaN, if a law steepens and a node passes a
+    corner before the first instability, or if a node of a specimen stops before the
+    first instability.
 
     On planes, positions have two components, along 'direction'.
     `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²)
@@ -122,7 +122,7 @@ class Equilibrium:
     label = "equilibrium"
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s."""
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
@@ -152,11 +152,12 @@ class Equilibrium:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        From below: no node slips at a load below min (tau_p - tau_i)/p. Slip lowers the mean stress
-        only behind a machine, but `critical_stress` is the largest stress on the way.
-        From above: stress is at most strength at every node, so its mean is at most the mean
-        strength. Behind a machine the first instability need not happen, and has no bound. If
-        the interface ends, slip lowers the mean stress of the part that can break.
+        The bound from below holds because no node slips at a load below min (tau_p -
+        tau_i)/p. With a machine, slip lowers the mean stress, but `critical_stress`
+        is the largest stress on the way. The bound from above holds because stress is
+        at most strength at every node. With a machine, the first instability need not
+        happen, and has no bound. If the interface ends, slip lowers the mean stress
+        of the part that can break.
         """
         if problem.interface.is_held:
             return False, False
@@ -178,5 +179,5 @@ class Equilibrium:
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return the solver for samples of a problem."""
+        """Return a solver for samples of a problem."""
         return OnsetSolver(problem, self, make_program(problem, self.gap))

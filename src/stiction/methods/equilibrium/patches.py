@@ -1,8 +1,8 @@
-"""Patches of slipping nodes on a line or plane: number, position and extent.
+"""Number, position and extent of patches of slipping nodes on a line or plane.
 
-Nodes of a plane are connected if their cells share an edge (four neighbours),
-also across the borders. The `interface` of these functions is an `Interface`.
-Kernels do not depend on its file.
+Nodes on a plane are connected if their cells share an edge (four neighbours), also
+across the borders. In these functions, `interface` is an `Interface`. Kernels do
+not depend on the file that defines it.
 """
 
 from typing import Any, NamedTuple
@@ -35,7 +35,7 @@ class Patch(NamedTuple):
 
 
 def count_patches(slip: Array) -> int:
-    """Return how many runs of slipping nodes there are on a circle."""
+    """Return the number of runs of slipping nodes on a circle."""
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
     return max(starts, int(above[0]))
@@ -43,10 +43,10 @@ def count_patches(slip: Array) -> int:
 
 @jit
 def main_patch(field: Array) -> tuple[int, int, float]:
-    """Return first node, length and centroid (in nodes, from 0 to n) of the run with the peak.
+    """Return the first node, length and centroid (in nodes, 0 to n) of the run with the peak.
 
-    A run is a sequence of positive entries; the field is not negative. If all entries are positive,
-    the run is centred at the peak.
+    A run is a sequence of positive entries. No entry of the field is negative. If all
+    entries are positive, the run is centred at the peak.
     """
     n = field.shape[0]
     peak = 0
@@ -80,12 +80,12 @@ def main_patch(field: Array) -> tuple[int, int, float]:
 
 
 def with_ends(field: Array, interface: Any) -> Array:
-    """Return a field with a zero appended if the interface has ends, so that they do not meet."""
+    """If the interface has ends, append a zero to a field, so that the ends do not meet."""
     return np.append(field, 0.0) if interface.is_free else field
 
 
 def line_patch(field: Array, interface: Any) -> Patch:
-    """Return the patch on a line that holds the largest entry in a field."""
+    """Return the patch on a line that contains the largest entry of a field."""
     spacing = interface.spacing
     _, length, centre = main_patch(with_ends(field, interface))
     centre += interface.first
@@ -93,7 +93,7 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return each node's patch by number (from 1, at rest 0), and how many patches there are."""
+    """Return the number of the patch at each node (from 1; 0 at rest), and their count."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -110,9 +110,9 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 
 
 def span(occupied: Mask, peak: int) -> tuple[int, int]:
-    """Return the first place and the length of the shortest arc with all occupied places.
+    """Return the beginning and the length of the shortest arc that contains all occupied places.
 
-    If every place is occupied, it is the whole circle, cut opposite the peak.
+    If every place is occupied, the arc is the whole circle, cut opposite the peak.
     """
     n = occupied.size
     places = np.flatnonzero(occupied)
@@ -125,7 +125,7 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
 
 
 def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
-    """Return the patch on a plane that a mask marks, centred at the centroid of the weight."""
+    """Return the patch marked by a mask on a plane, centred at the centroid of the weight."""
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):
@@ -143,8 +143,8 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
 def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
     """Return the nodes of the patch around the largest weight, and the patch.
 
-    The weight is not negative and not all zero. Nodes belong to a patch if their weight is above a
-    share of the largest.
+    The weight is not negative, and positive somewhere. Nodes belong to a patch if
+    their weight exceeds a share of the largest weight.
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:
@@ -159,11 +159,12 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 
 
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
-    """Return the patch that becomes unstable, from its multiplier y >= 0; NaN if y is zero.
+    """Return the patch that becomes unstable, from the multiplier y >= 0. NaN if y is zero.
 
-    On a line it is the run with the largest y. On a plane it is the connected area around the
-    largest y in which y is above a tenth of its largest value. Slipping nodes with a smaller y do
-    not count: on rough strengths they reach across the whole plane.
+    On a line, the patch is the run with the largest y. On a plane, it is the
+    connected area around the largest y in which y exceeds a tenth of its largest
+    value. Slipping nodes with a smaller y do not count, because with a rough strength
+    they extend across the whole plane.
     """
     if not multiplier.any():
         nowhere = (np.nan,) * len(interface.shape)

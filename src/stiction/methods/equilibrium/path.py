@@ -1,14 +1,14 @@
-"""The path of a sample: slip and stress at given loads, and the arrested events on the way.
+"""The path of a sample: slip and stress at given loads, and arrested events.
 
 Algorithm
 ---------
-1. Follow the sample to global sliding, which gives its arrested events and the
-   last load.
-2. For each load before sliding, start from the nearest known state: the
-   equilibrium after the last event, or the equilibrium at the load before.
-3. Follow the stable path from there to the load. If it fails beside an event,
-   take the state that is about to jump. If it fails elsewhere, the load is within
-   round-off of sliding.
+1. Follow the sample to global sliding. This gives the arrested events and the last
+   load.
+2. For each load before sliding, start from the nearest known state: the equilibrium
+   after the last event, or the equilibrium at the previous load.
+3. Follow the stable path from there to the load. If this fails close to an event,
+   use the state that is about to jump. If it fails at other loads, the load is
+   within round-off of sliding.
 """
 
 from typing import Any
@@ -61,7 +61,7 @@ def _check_loads(loads: Any) -> Array:
 def equilibrium_path(
     problem: Problem, profiles: Any, loads: Any, *, method: Any = None
 ) -> xr.Dataset:
-    """Return slip and stress of an interface at rising loads, and its arrested events.
+    """Return the slip and stress of an interface at rising loads, and the arrested events.
 
     Patches grow, merge and become unstable. An instability that comes to rest is
     an arrested event.
@@ -90,23 +90,22 @@ def equilibrium_path(
         Pa), `event_position` (m), `event_length` of the patch that slipped (m),
         `event_mean_slip` over that length (m), `event_largest_slip` (m),
         `event_moment`, G times the integral of the added slip (N per unit depth),
-        and `event_fracture_energy`, dissipated above the residual strength (J/m).
-        There are three stress drops (Pa). `event_area_stress_drop` is the mean
-        over the patch, and `event_slip_stress_drop` the mean weighted by the
-        added slip. `event_energy_stress_drop` is twice the energy that the slip
-        releases beyond friction at the residual strength, over the integral of
-        the slip. With a `Rupture` as the method, events have `event_duration`
-        (s). `stiction.external.event_table` makes a data frame.
+        and `event_fracture_energy`, the energy dissipated above the residual strength
+        (J/m). There are three stress drops (Pa). `event_area_stress_drop` is the mean
+        over the patch. `event_slip_stress_drop` is the mean weighted by the added
+        slip. `event_energy_stress_drop` is twice the energy that the slip releases
+        beyond friction at the residual strength, over the integral of the slip. With
+        a `Rupture` as the method, events have `event_duration` (s).
+        `stiction.external.event_table` converts the events to a data frame.
 
-        On specimens, `load` is the drive: the mean stress that it would cause
-        without slip. `travel` is the sum of the travels of both drives (m).
+        On specimens, `load` is the mean stress that the drive would cause without
+        slip. `travel` is the sum of the travels of both drives (m).
         `crosshead_travel` (m) adds the deformation of the machine, force over
-        stiffness, and is NaN under a dead load. Events also have
-        `event_stress_drop` (fall of the mean stress, Pa), `event_travel` and
-        `event_crosshead_travel` before the event (m), `event_travel_step` (m) and
-        `event_start`, the left end of the patch (m). With a thickness, width or
-        area, mean stresses are also given as forces: `force`, `event_force` and
-        `event_force_drop` (N).
+        stiffness, and is NaN under a dead load. Events also have `event_stress_drop`
+        (fall of the mean stress, Pa), `event_travel` and `event_crosshead_travel`
+        before the event (m), `event_travel_step` (m) and `event_start`, the left end
+        of the patch (m). With a thickness, width or area, mean stresses are also
+        given as forces: `force`, `event_force` and `event_force_drop` (N).
 
         On planes, positions have two components, along 'direction'.
         `event_extent` (m) and `event_area` (m²) replace the length, the moment is
@@ -115,14 +114,14 @@ def equilibrium_path(
     Raises
     ------
     InputError
-        If there are several samples, if the loads do not rise, or if `onset`
-        would raise it.
+        If there are several samples, if the loads do not rise, or if `onset` would
+        raise an error.
 
     Notes
     -----
-    A patch jumps to the least equilibrium at the same load, where an overdamped interface would
-    stop. Inertia may carry a rupture through. Only `Rupture` decides that; pass it as `method` on
-    a specimen.
+    A patch jumps to the least equilibrium at the same load, where an overdamped
+    interface would stop. Inertia may carry a rupture further. Only `Rupture` can
+    decide this. On a specimen, pass a `Rupture` as `method`.
 
     Examples
     --------

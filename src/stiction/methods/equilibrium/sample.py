@@ -1,9 +1,9 @@
-"""Samples, equilibrium states, and the protocol of the search for equilibria.
+"""Samples, equilibrium states, and the protocol for the search for equilibria.
 
-Strength falls with slip along straight pieces. A law of M pieces has M corners,
-and piece M is the residual strength. Between corners everything is linear, so
-solvers step from corner to corner. The linear law has a single piece, whose start
-is tau_p to the bit.
+Strength falls with slip along straight pieces. A law with M pieces has M corners,
+and piece M is the residual strength. Between corners the equations are linear, so
+solvers step from corner to corner. The linear law has a single piece, which starts
+exactly at tau_p.
 """
 
 from collections.abc import Mapping
@@ -29,9 +29,10 @@ and never ends."""
 
 
 class Pieces(NamedTuple):
-    """Falling, piecewise linear function f of u = slip/d_c, the same at every node.
+    """Falling, piecewise linear function f of u = slip/d_c. It is the same at every node.
 
-    W of a node is the weakening rate of its first piece, whose relative slope is therefore 1.
+    At a node, W is the weakening rate of the first piece. The relative slope of this
+    piece is therefore 1.
     """
 
     ends: Array  # (M,): u at the end of each piece; the last is 1
@@ -74,7 +75,7 @@ def pieces_of(law: FrictionLaw) -> Pieces:
 
 
 class Outcome(IntEnum):
-    """Fate of an interface that moves at a fixed load."""
+    """Outcome for an interface that moves at a fixed load."""
 
     SLIDING = 0
     ARRESTED = 1
@@ -82,9 +83,9 @@ class Outcome(IntEnum):
 
 
 class StaticSample(NamedTuple):
-    """Strength profile; arrays (nodes,). Rate and d_c are 0 where strength is constant.
+    """Strength profile, as arrays (nodes,). Rate and d_c are 0 at nodes with constant strength.
 
-    Beyond the extent of the interface excess and d_c are infinite.
+    Beyond the extent of the interface, excess and d_c are infinite.
     """
 
     excess: Array  # tau_p - tau_i, Pa
@@ -98,9 +99,9 @@ class StaticSample(NamedTuple):
 def make_sample(
     excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
 ) -> StaticSample:
-    """Return a sample, or many over the first axis.
+    """Return a sample, or many samples along the first axis.
 
-    Nodes whose fall of strength is within round-off get a constant strength.
+    If strength falls by no more than round-off at a node, it is constant there.
     """
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
@@ -116,7 +117,7 @@ def make_sample(
 
 
 def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
-    """Return a sample of a batch, or all samples, in the form that the kernels take."""
+    """Return one sample or all samples of a batch, in the form that kernels need."""
     initial = rows.initial_stress[row]
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
     excess = (rows.strength[row] - initial).reshape(shape)
@@ -134,7 +135,7 @@ def row_of(samples: StaticSample, row: int) -> StaticSample:
 
 
 class Present(NamedTuple):
-    """Present piece of each node, its value at zero slip (Pa) and its slope (Pa/m)."""
+    """Present pieces of the nodes, with their value at zero slip (Pa) and slope (Pa/m)."""
 
     piece: NDArray[np.int64]
     strength: Array
@@ -143,7 +144,7 @@ class Present(NamedTuple):
 
 @dataclass
 class EquilibriumState:
-    """Equilibrium on the path of a sample, by default an unstable equilibrium."""
+    """An equilibrium on the path of a sample. By default it is unstable."""
 
     load: float  # tau_0, Pa
     slip: Array  # (n,): d, m
@@ -166,7 +167,7 @@ class EquilibriumState:
 
     @property
     def highest(self) -> float:
-        """Largest load that the interface carried on the way here, Pa."""
+        """Largest load that the interface carried on the way to this state, Pa."""
         return self.load if self.peak is None else self.peak
 
 
@@ -195,7 +196,7 @@ class Jump(NamedTuple):
 
 
 class Program(Protocol):
-    """Protocol of the search for equilibria: `DenseProgram` or `PlaneProgram`; thread-safe.
+    """Thread-safe protocol for the search for equilibria: `DenseProgram` or `PlaneProgram`.
 
     `widest_gap` is the largest certificate gap without a warning, as a share of the load.
     """
@@ -213,7 +214,8 @@ class Program(Protocol):
     ) -> Jump:
         """Let an unstable state jump to another equilibrium, or to sliding.
 
-        With `to_rest`, on an interface that ends, it goes on once all slips that can break.
+        If an interface ends, the jump stops when all nodes that can break slip. With
+        `to_rest`, it goes on.
         """
 
     def at(
@@ -222,14 +224,14 @@ class Program(Protocol):
         """Return the equilibrium at a load above a state, or `None` if it is not found."""
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the derivative of an instability's stress by the strengths, (n,).
+        """Return the derivative (n,) of an instability's stress with respect to the strengths.
 
         The stress is the mean stress divided by the mean of the load profile. The strengths are the
         present pieces of the law, continued to zero slip.
         """
 
     def stress_released(self, state: EquilibriumState) -> Array:
-        """Return the stress that the slip takes off the interface, K d, Pa."""
+        """Return the stress K d that slip releases, Pa."""
 
 
 def residual_nodes(sample: StaticSample, slip: Array) -> NDArray[np.bool_]:
@@ -239,7 +241,7 @@ def residual_nodes(sample: StaticSample, slip: Array) -> NDArray[np.bool_]:
 
 
 def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None = None) -> bool:
-    """Return whether any slip goes beyond the given piece of its node, by default the first."""
+    """Return whether slip at any node exceeds the given piece, by default the first piece."""
     pieces = sample.pieces
     end = pieces.ends[0] if piece is None else np.append(pieces.ends, 1e300)[piece]
     beyond: NDArray[np.bool_] = slip > (2.0 - pieces.at_corner) * (end * sample.critical)
@@ -248,7 +250,7 @@ def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None =
 
 @jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
-    """Return the piece on which a node with a given d_c is after a slip."""
+    """Return the piece on which a node with a given d_c is after some slip."""
     piece = 0
     while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
         pieces.ends[piece] * critical
@@ -259,9 +261,9 @@ def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
 
 @jit_inside
 def start_of(sample: StaticSample, i: int, piece: int) -> float:
-    """Return the strength of node i on a piece continued to zero slip, less initial stress, Pa.
+    """Return the strength of node i minus initial stress, Pa, for a piece continued to zero slip.
 
-    The first piece gives tau_p, the last tau_r.
+    The first piece gives tau_p, and the last piece gives tau_r.
     """
     share = sample.pieces.starts[piece]
     return share * sample.excess[i] + (1.0 - share) * sample.residual[i]
@@ -269,7 +271,7 @@ def start_of(sample: StaticSample, i: int, piece: int) -> float:
 
 @jit_inside
 def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
-    """Return strength less initial stress of node i after some slip, Pa."""
+    """Return the strength of node i minus initial stress after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
     return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
 
@@ -284,7 +286,7 @@ def _find_pieces(sample: StaticSample, slip: Array, present: Present) -> None:
 
 
 def present_pieces(sample: StaticSample, slip: Array) -> Present:
-    """Return the pieces on which the nodes are after a slip."""
+    """Return the pieces on which the nodes are after some slip."""
     present = Present(np.empty(slip.size, dtype=np.int64), *np.empty((2, slip.size)))
     _find_pieces(sample, slip, present)
     return present
@@ -294,9 +296,9 @@ def present_pieces(sample: StaticSample, slip: Array) -> Present:
 def step_to_corner(
     sample: StaticSample, slip: Array, direction: Array, longest: float
 ) -> float:
-    """Move slip along a direction to the first corner of any node, and return the step.
+    """Move slip along a direction until the first node reaches a corner, and return the step.
 
-    The step is at most `longest`. If it is infinite, slip stays.
+    The step is at most `longest`. If the step is infinite, slip does not change.
     """
     step = longest
     ends = sample.pieces.ends
@@ -316,7 +318,7 @@ def step_to_corner(
 def unsupported(sample: StaticSample, load: float, slip: Array) -> bool:
     """Return whether the load exceeds the present strengths of the whole interface.
 
-    Then it slides, as strength only falls with slip.
+    If so, the interface slides, because strength only falls with slip.
     """
     balance = 0.0
     for i in range(slip.shape[0]):

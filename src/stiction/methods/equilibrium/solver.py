@@ -1,13 +1,12 @@
-"""Onsets of samples by exact equilibrium, on lines, specimens and planes.
+"""Onsets of samples from exact equilibrium, on lines, specimens and planes.
 
-Algorithm of a sample (`follow_to_sliding`), for which a `Program` supplies the
-two searches:
+Algorithm for a sample (`follow_to_sliding`). A `Program` supplies the two searches:
 
 1. Start from rest and raise the load to the next instability (`Program.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
 3. Let the unstable patch jump at constant load (`Program.jump`). If no
    equilibrium stops it, the interface slides: stop.
-4. The patch came to rest, which is an arrested event. Go to 1 from the new
+4. If the patch comes to rest, this is an arrested event. Go to step 1 from the new
    equilibrium.
 """
 
@@ -57,14 +56,14 @@ STRENGTH_STEP = 1e-7
 
 
 class SamplePath(NamedTuple):
-    """Course of a sample until it slides.
+    """The course of a sample until it slides.
 
-    `first` is the first instability and `last` the last equilibrium. `known` is false if a jump or
-    a path was not followed to its end; the load of `last` is then a lower bound. `peak` is the
-    largest mean stress on the way, divided by the mean of the load profile (Pa). With inertia,
-    `arrival` is the time at which the front of the last event reached each node (s). If
-    the interface ends, `last` is the last instability, and `sliding` its event, if it was followed
-    to its end.
+    `first` is the first instability, and `last` is the last equilibrium. `known` is false
+    if a jump or a path was not followed to its end. The load of `last` is then a lower
+    bound. `peak` is the largest mean stress on the way, divided by the mean of the load
+    profile (Pa). With inertia, `arrival` is the time at which the front of the last event
+    reached each node (s). If the interface ends, `last` is the last instability, and
+    `sliding` is its event, if the event was followed to its end.
     """
 
     first: EquilibriumState
@@ -77,7 +76,7 @@ class SamplePath(NamedTuple):
 
     @property
     def all_events(self) -> list[ArrestedEvent]:
-        """The arrested events, and the event in which an interface that ends slides."""
+        """All arrested events. If the interface ends, also the event in which it slides."""
         return self.events + ([] if self.sliding is None else [self.sliding])
 
 
@@ -118,7 +117,7 @@ def follow_to_sliding(
 
 
 def make_program(problem: Problem, gap: float = 1e-6) -> Program:
-    """Return the programme that finds equilibria of a problem, or raise an `InputError`."""
+    """Return the programme that finds equilibria for a problem, or raise an `InputError`."""
     if reasons := refused(problem.friction):
         raise InputError(reasons)
     return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
@@ -135,7 +134,7 @@ def warn_of_signs(problem: Problem) -> None:
 
 
 class OnsetSolver:
-    """Solver for samples by `Equilibrium` with its options; thread-safe."""
+    """Solver for samples by `Equilibrium` with given options. It is thread-safe."""
 
     inertia = False
 
@@ -143,7 +142,7 @@ class OnsetSolver:
         self.problem, self.options, self.program = problem, options, program
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the variables of `Equilibrium`, each with the samples as first dimension."""
+        """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
         warn_of_signs(self.problem)
         self.problem.warn_if_coarse(
             rows,
@@ -172,7 +171,7 @@ class OnsetSolver:
     def _values(
         self, rows: Sample, row: int, sample: StaticSample, path: SamplePath
     ) -> dict[str, Any]:
-        """Return the variables of one sample; stresses are divided by the load profile."""
+        """Return the variables of one sample. Stresses are divided by the load profile."""
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
@@ -219,9 +218,9 @@ class OnsetSolver:
         return values
 
     def _peak(self, path: SamplePath) -> float:
-        """Return the largest mean stress on the way, over the mean of the load profile, Pa.
+        """Return the largest mean stress on the way, divided by the mean load profile, Pa.
 
-        If the interface ends, it is the largest at an instability.
+        If the interface ends, only stresses at instabilities count.
         """
         if not self.problem.interface.is_held:
             return path.peak
@@ -236,7 +235,7 @@ class OnsetSolver:
         certified: Mask,
         stopped: Mask,
     ) -> None:
-        """Warn of exceptional samples; `values` hold all samples, with stresses in Pa."""
+        """Warn about exceptional samples. `values` holds all samples, with stresses in Pa."""
         first, unproved = values["first_instability"], ~certified
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
@@ -296,9 +295,10 @@ class OnsetSolver:
 def _sensitivity(
     problem: Problem, program: Program, sample: StaticSample, state: EquilibriumState
 ) -> Array:
-    """Return the derivative of the stress of an instability by the peak strengths, (n,).
+    """Return the derivative (n,) of an instability's stress with respect to peak strengths.
 
-    It is NaN if a law steepens and a node passed a corner before the instability.
+    The derivative is NaN if a law steepens and a node passed a corner before the
+    instability.
     """
     pieces = sample.pieces
     if state.stopped:
@@ -315,7 +315,7 @@ def _sensitivity(
 def _quotients(
     problem: Problem, program: Program, sample: StaticSample, first: EquilibriumState
 ) -> Array:
-    """Return the derivative of a first instability by difference quotients, a path for each node.
+    """Return derivatives of a first instability as difference quotients, with a path for each node.
 
     Between events paths are straight, so a small step gives the exact derivative.
     """

@@ -1,4 +1,4 @@
-"""The Cholesky factor L of A on the slipping nodes, which follows them as they change.
+"""The Cholesky factor L of A on the slipping nodes, updated as these nodes change.
 
 Problem
 -------
@@ -9,35 +9,35 @@ folder solves systems
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
 
 for sets S and rates W that change a little from one system to the next. A pivot
-that is not positive shows that A_SS is not positive definite: then the
-equilibrium is unstable.
+that is not positive shows that A_SS is not positive definite. The equilibrium is
+then unstable.
 
 Algorithm
 ---------
-L is updated instead of being computed anew (P. Gill, G. Golub, W. Murray and M.
+L is updated instead of computed again (P. Gill, G. Golub, W. Murray and M.
 Saunders, Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix
 Computations, 2013, section 6.5).
 
 1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj -
    l'l)^1/2. If A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has
    z'Az = A_jj - l'l <= 0, and A z = 0 on S (`singular_direction`).
-2. Remove a node (`remove`). The rows below it move up, which leaves one entry in
-   each of them above the diagonal. Plane rotations of neighbouring columns make
-   it zero.
+2. Remove a node (`remove`). The rows below it move up, which leaves one entry above
+   the diagonal in each of these rows. Plane rotations of neighbouring columns make
+   the entry zero.
 3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is
-   the unit vector of the node. Plane rotations of the columns of L with a^1/2 e
-   make the latter zero.
+   the unit vector of the node. Plane rotations between the columns of L and a^1/2 e
+   make a^1/2 e zero.
 4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose
-   nodes still slip and weaken no more than before, raise the entries of those
-   that weaken less, and append the other nodes.
+   nodes still slip and weaken no more than before. Raise the entries of nodes that
+   weaken less, and append the other nodes.
 
-Departures from the textbook, all for speed:
+Departures from the textbook, for speed:
 
-- The rows of L lie one after the other in a flat array, each padded to a multiple
-  of eight numbers. This takes half the memory of a square, and no two rows
-  compete for the same cache sets.
+- The rows of L are stored one after the other in a flat array. Each row is padded
+  to a multiple of eight numbers. This takes half the memory of a square array, and
+  no two rows compete for the same cache sets.
 - Four rows are appended together, so that each row of L is read once for four new
-  ones.
+  rows.
 - A pivot counts as not positive if its square is below `PIVOT_RTOL` of the
   diagonal entry.
 
@@ -76,7 +76,7 @@ def row_start(row: int) -> int:
 
 @jit
 def forward_substitute(factor: Array, first: int, last: int, values: Array) -> None:
-    """Solve L x = values in place for the rows first..last-1, when earlier rows are solved."""
+    """Solve L x = values in place for the rows first..last-1. Rows before them are solved."""
     for r in range(first, last):
         start = row_start(r)
         row = factor[start : start + r + 1]
@@ -85,9 +85,10 @@ def forward_substitute(factor: Array, first: int, last: int, values: Array) -> N
 
 @jit_inside
 def _forward_substitute_four(factor: Array, n_rows: int) -> None:
-    """Solve L x = values in place for four right sides: the rows that follow the `n_rows` of L.
+    """Solve L x = values in place for four right sides, which are the rows after `n_rows` in L.
 
-    Two columns at a time: eight running sums keep the processor's vector units busy.
+    Two columns are processed at a time. Eight running sums keep the processor's
+    vector units busy.
     """
     s0 = row_start(n_rows)
     s1 = row_start(n_rows + 1)
@@ -160,7 +161,7 @@ def raise_diagonal(
 ) -> None:
     """Step 3: add a positive amount to the diagonal entry of A_SS at a position.
 
-    `rotations` is a workspace: the cosines and sines of the rotations.
+    `rotations` is a workspace for the cosines and sines of the rotations.
     """
     cosines, sines = rotations[0], rotations[1]
     for r in range(position, n_rows):
@@ -181,7 +182,7 @@ def raise_diagonal(
 
 @jit
 def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
-    """Solve L' x = values in place, rows of L taken four at a time."""
+    """Solve L' x = values in place, with four rows of L at a time."""
     i = n_rows
     while i >= 4:
         i -= 4
@@ -217,9 +218,9 @@ def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
 
 
 class Workspace(NamedTuple):
-    """Factor L on the slipping nodes of a sample, with the arrays that go with it.
+    """Factor L on the slipping nodes of a sample, and the arrays that belong to L.
 
-    Arrays have an entry for each node (n,), or in S an entry for each row of L.
+    Arrays have an entry for each node (n,), or in S for each row of L.
     """
 
     stiffness: Any  # K as kernels take it: `elasticity.stiffness`
@@ -248,7 +249,7 @@ class Workspace(NamedTuple):
 
 
 def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> Workspace:
-    """Return a workspace for samples of n nodes. Pages of L that are never used cost no memory."""
+    """Return a workspace for samples with n nodes. Unused pages of L take no memory."""
     capacity = min(n, max_slipping)
     return Workspace(
         stiffness,
@@ -266,7 +267,7 @@ def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> 
 
 
 class SlipState(NamedTuple):
-    """Slip of a sample, which moves along as the load rises or a patch jumps."""
+    """Slip of a sample. It is updated as the load rises or a patch jumps."""
 
     sample: StaticSample
     slip: Array  # d, m
@@ -278,10 +279,11 @@ class SlipState(NamedTuple):
 
 @jit
 def append(workspace: Workspace, n_slipping: int, count: int) -> int:
-    """Step 1: append queue[:count] to S and L, until done or a pivot fails.
+    """Step 1: append queue[:count] to S and L, until all are appended or a pivot fails.
 
-    Returns the number of rows in L. If it is below n_slipping + count, the pivot for the next node
-    in S failed. The row of this node, without the pivot, then follows the last row in L.
+    Returns the number of rows in L. If this number is below n_slipping + count, the
+    pivot for the next node in S failed. The row of the failed node, without the
+    pivot, then follows the last row in L.
     """
     factor, slipping, queue = workspace.factor, workspace.slipping, workspace.queue
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
@@ -330,7 +332,7 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
 
 @jit
 def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
-    """Step 2: take the node at a position out of S and L, and return how many stay."""
+    """Step 2: remove the node at a position from S and L. Return the number of remaining nodes."""
     factor, slipping = workspace.factor, workspace.slipping
     cosines, sines = workspace.rotations[0], workspace.rotations[1]
     for r in range(position + 1, n_slipping):
@@ -357,7 +359,7 @@ def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
 
 @jit
 def factor_slipping(workspace: Workspace) -> int:
-    """Step 4: factor A on the nodes marked by `is_slipping`. Returns as `append` does."""
+    """Step 4: factor A on the nodes marked by `is_slipping`. The result is as in `append`."""
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
     slipping, queue, is_slipping = workspace.slipping, workspace.queue, workspace.is_slipping
     factored_diagonal, n_factored = workspace.factored_diagonal, workspace.n_factored[0]
@@ -400,7 +402,7 @@ def factor_slipping(workspace: Workspace) -> int:
 def substitute_slipping(
     workspace: Workspace, first: int, last: int, values: Array, Linv_values: Array
 ) -> None:
-    """Extend L^-1 times a field, which has `values` at the nodes, by the rows first..last-1."""
+    """Extend L^-1 times a field with `values` at the nodes by the rows first..last-1."""
     for r in range(first, last):
         Linv_values[r] = values[workspace.slipping[r]]
     forward_substitute(workspace.factor, first, last, Linv_values)
@@ -420,9 +422,9 @@ def multiply_slipping(
 def multiply_outside(
     workspace: Workspace, n_slipping: int, values: Array, product: Array
 ) -> None:
-    """Multiply as `multiply_slipping` does, but leave the product at the slipping nodes as it is.
+    """Multiply as in `multiply_slipping`, but do not change the product at the slipping nodes.
 
-    (On a line they are overwritten with the same product, up to round-off.)
+    (On a line these entries are overwritten with the same product, up to round-off.)
     """
     apply_outside(
         workspace.stiffness, workspace.slipping, n_slipping, values, workspace.is_slipping,
@@ -432,7 +434,7 @@ def multiply_outside(
 
 @jit_inside
 def apply_stiffness_to_resting_slip(state: SlipState) -> None:
-    """Write K times the slip of the nodes that slipped and rest to `workspace.K_resting`.
+    """Write K times the slip of nodes that slipped and now rest to `workspace.K_resting`.
 
     Overwrites `workspace.queue` and `workspace.rhs`.
     """
@@ -448,7 +450,7 @@ def apply_stiffness_to_resting_slip(state: SlipState) -> None:
 
 @jit_inside
 def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) -> None:
-    """Solve A_SS d = load p - q for the slip in S, from L^-1 p and L^-1 q."""
+    """Solve A_SS d = load p - q for the slip in S, given L^-1 p and L^-1 q."""
     for t in range(n_slipping):
         slip[t] = load * workspace.Linv_p[t] - workspace.Linv_q[t]
     back_substitute(workspace.factor, n_slipping, slip)
@@ -456,11 +458,11 @@ def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) 
 
 @jit_inside
 def singular_direction(workspace: Workspace, n_factored: int, direction: Array) -> None:
-    """Write z = (-A_SS^-1 A_Sj, 1), clipped at zero, after `append` failed at j, its next node.
+    """Write z = (-A_SS^-1 A_Sj, 1), clipped at zero, after `append` failed at node j.
 
-    If K has no positive entry off its diagonal, z >= 0 and A z <= 0 everywhere: a multiplier that
-    bounds the load from above, and the direction in which slip jumps. The entries of z in S are
-    left in `workspace.solution`, not clipped.
+    If K has no positive off-diagonal entry, z >= 0 and A z <= 0 everywhere. Then z is
+    a multiplier that bounds the load from above, and the direction in which slip
+    jumps. The entries of z in S, without clipping, are left in `workspace.solution`.
     """
     z = workspace.solution
     start = row_start(n_factored)

@@ -1,48 +1,47 @@
-"""The jump beyond an instability of a line or specimen: to another equilibrium, or to sliding.
+"""The jump after an instability of a line or specimen, to a new equilibrium or to sliding.
 
 Problem
 -------
-At a load (Pa) at which an equilibrium became unstable, find the least equilibrium
-that is not below its slip, or show that there is none. K is the stiffness (Pa/m),
-d >= 0 the slip (m), s(d) the strength less initial stress (Pa), which falls along
-straight pieces, and p the load profile:
+An equilibrium became unstable at a load (Pa). Find the least equilibrium at this
+load with no less slip, or show that there is no such equilibrium. K is the
+stiffness (Pa/m), d >= 0 is the slip (m), s(d) is the strength minus initial stress
+(Pa), which falls along straight pieces, and p is the load profile:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-A node is driven if load p - K d - s(d), its overload, is not negative. If K has
-no positive entry off its diagonal, and strength only falls with slip, a field of
-slip at which all slipping nodes are driven lies below the least equilibrium, and
-so do the fields of steps 1 and 2.
+A node is driven if load p - K d - s(d), its overload, is not negative. Suppose that
+K has no positive off-diagonal entry, and that strength only falls with slip. Then
+slip at which all slipping nodes are driven lies below the least equilibrium. So
+does the slip after steps 1 and 2.
 
 Algorithm
 ---------
-Our own: two kinds of step that do not pass the least equilibrium.
+The algorithm is our own. Its two types of step do not pass the least equilibrium.
 
 1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S =
-   (load p - s)_S. Slip moves to this solution, where it is larger. K_SS is
-   factored once and only grows.
+   (load p - s)_S. Slip increases to this solution at nodes at which the solution is
+   larger. K_SS is factored once and only grows.
 2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W
-   of the present pieces. If A_SS is positive definite, move towards the solution
-   of the linear problem of these pieces. If not, move along z >= 0 with A z <= 0
-   (step 1 in `cholesky`). The move ends where the first node reaches the next
-   corner of its law.
-3. After each step of either kind, the resting nodes that are overstressed join S.
+   of the present pieces. If A_SS is positive definite, move towards the solution of
+   the linear problem for these pieces. If not, move along z >= 0 with A z <= 0
+   (step 1 in `cholesky`). The move ends when the first node reaches the next corner
+   of its law.
+3. After each step of either type, the resting nodes that are overstressed join S.
 4. Step 1 is repeated as long as nodes join or pass corners, at most
-   `MAX_ELASTIC_STEPS` times in a row; then follows a step 2, and so on. Step 2
-   costs another factor. It is needed because step 1 alone creeps towards an
+   `MAX_ELASTIC_STEPS` times in a row. Then step 2 follows, and so on. Step 2
+   requires a second factor. It is needed because step 1 alone creeps towards an
    equilibrium without reaching it.
 5. The interface slides if all nodes slip, if its mean strength cannot carry the
-   load, if a run of nodes at their residual strength is longer than a given
-   length (Griffith's, which no fracture energy can stop), or if nothing bounds a
-   step 2. It is arrested if a step 2 ends at the solution of the linear problem
-   and no node joins.
+   load, if a run of nodes at their residual strength is longer than Griffith's
+   length, which no fracture energy can stop, or if step 2 is unbounded. It is
+   arrested if step 2 ends at the solution of the linear problem and no node joins.
 
-On a specimen K may have positive entries off its diagonal (`may_stop`), so that a
-step unloads a node that slips. Slip does not go back. In step 1 such a node
-leaves S and rests until it is overstressed again. In step 2 it is left out of the
-step only, and the interface is not arrested as long as this node is overstressed.
-Every step lowers the energy, so that the steps end, where no stress is above its
-strength.
+On a specimen, K may have positive off-diagonal entries (`may_stop`), so that a step
+may unload a slipping node. Slip does not go back. In step 1 such a node leaves S,
+and rests until it is overstressed again. In step 2 the node is left out of this
+step only, and the interface is not arrested as long as the node is overstressed.
+Every step lowers the energy. Therefore the steps end, at a state in which no stress
+exceeds its strength.
 """
 
 from enum import IntEnum
@@ -89,7 +88,7 @@ MAX_ELASTIC_STEPS = 16
 
 
 class Support(IntEnum):
-    """Support of the interface after the overstressed nodes have joined S."""
+    """How strengths support the interface after the overstressed nodes have joined S."""
 
     RESTING_NODES = 0
     NONE = 1  # every node slips or has slipped
@@ -105,7 +104,7 @@ class Joined(NamedTuple):
 
 @jit_inside
 def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
-    """Return the longest run of residual nodes on the circle, and how many corners were passed."""
+    """Return the longest run of residual nodes on the circle, and the number of passed corners."""
     n = slip.shape[0]
     longest = 0
     run = 0
@@ -141,7 +140,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> J
 
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
-    """Step 1: unmark the nodes that an elastic step would move back. Return how many stay."""
+    """Step 1: unmark the nodes that an elastic step would move back. Return how many remain."""
     workspace = state.workspace
     n_stay = n_slipping
     for t in range(n_slipping):
@@ -155,10 +154,11 @@ def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int
 
 @jit_inside
 def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
-    """Steps 1 and 3: make an elastic step, and let the nodes that it overstresses join.
+    """Steps 1 and 3: make an elastic step. The nodes that it overstresses join.
 
-    The rows of L^-1 times the drive are kept for the leading nodes whose drive has not changed
-    since the step before. At the residual strength it no longer changes.
+    The rows of L^-1 times the drive are kept for the leading nodes whose drive has
+    not changed since the previous step. At the residual strength, the drive no longer
+    changes.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
@@ -201,8 +201,8 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
     """Step 2: unmark the nodes whose solution is below zero. Return how many.
 
-    A solution counts as below zero if K_ii times it is more than `atol` (Pa) below, or it is more
-    than the share `rtol` of the largest below.
+    A solution counts as below zero in two cases: if K_ii times the solution is below
+    -`atol` (Pa), or if the solution is below -`rtol` times the largest solution.
     """
     solution = workspace.solution
     largest = 1.0
@@ -221,9 +221,10 @@ def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol
 def _write_direction(
     state: SlipState, true_pieces: Workspace, n_marked: int, drive: Array, tolerance: float
 ) -> float:
-    """Step 2: write the direction of the step. Return the longest step along it.
+    """Step 2: write the direction of the step. Return the longest step along the direction.
 
-    It is 1 if the direction leads to the solution of the linear problem, otherwise infinite.
+    The longest step is 1 if the direction leads to the solution of the linear
+    problem, and otherwise infinite.
     """
     slip, may_stop = state.slip, state.may_stop
     # Leave out nodes that would move back, and solve again, until no such node is
@@ -297,10 +298,10 @@ def _step_with_true_pieces(
 def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspace) -> Outcome:
     """Follow an instability at a fixed load to the least equilibrium, or to sliding.
 
-    Slip and K d of the state belong to the instability, perhaps moved along its direction to a
-    corner. On return they belong to the equilibrium, or are a lower bound of it.
-    A run of `unstoppable` nodes at their residual strength slides. `true_pieces` is a second
-    workspace.
+    Slip and K d in the state belong to the instability, perhaps moved along its
+    direction to a corner. On return they belong to the equilibrium, or are a lower
+    bound of the equilibrium. If `unstoppable` nodes in a row are at their residual
+    strength, the interface slides. `true_pieces` is a second workspace.
     """
     sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]

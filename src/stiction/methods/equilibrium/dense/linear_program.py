@@ -1,4 +1,4 @@
-"""The load of the first instability of a line or specimen, as a linear programme.
+"""Load of the first instability on a line or specimen, from a linear programme.
 
 Problem
 -------
@@ -9,35 +9,35 @@ and load profile p > 0,
     max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
       = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
 
-Every feasible d bounds the load from below and every feasible y, a multiplier,
-from above. If K has no positive entry off its diagonal, the equilibrium at a load
-is the least feasible slip there (R. Cottle, J.-S. Pang and R. Stone, The Linear
-Complementarity Problem, 1992, section 3.11), and nodes only have to be added to
-the set S of the slipping nodes.
+Every feasible d bounds the load from below, and every feasible y, a multiplier,
+bounds the load from above. If K has no positive off-diagonal entry, the equilibrium
+at a load is the least feasible slip (R. Cottle, J.-S. Pang and R. Stone, The Linear
+Complementarity Problem, 1992, section 3.11), and nodes only have to be added to the
+set S of the slipping nodes.
 
 Algorithm
 ---------
-Our own: (1) by an active set that grows, (2) by cuts that lower the load. It
-starts from an upper bound of (2), for example the weakest window, and from a load
-below it.
+The algorithm is our own. It solves (1) with an active set that grows, and (2) with
+cuts that lower the load. It starts from an upper bound of (2), for example from the
+weakest window, and from a load below this bound.
 
-1. At the load, find the nodes at rest that are overstressed. If there are any,
-   add them to S, the most overstressed first, each as a row of the factor L of
-   A_SS (`cholesky`).
-2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S, and go to 1.
+1. At the load, find resting nodes that are overstressed. If there are any, add them
+   to S, the most overstressed first. Each node adds a row to the factor L of A_SS
+   (`cholesky`).
+2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S. Go to step 1.
 3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is
    feasible in (2): a cut. Lower the bound and the load to <excess, y>/<p, y>.
-   Solve for the slip there, take out the nodes that would slip backwards, and go
-   to 1. If the cut lowers the load by round-off only, the load is the solution:
-   `_back_off` makes its slip feasible, and the algorithm ends.
-4. If no node is overstressed, the load has an equilibrium. If it is the upper
-   bound, it is the solution. Otherwise raise it towards the bound by
-   `SHARE_TOWARDS_BOUND` of the way, or up to the bound once within `CLOSE_RTOL`
-   of it, solve for the slip, and go to 1.
+   Solve for the slip at this load, remove the nodes that would slip backwards, and
+   go to step 1. If the cut lowers the load only by round-off, the load is the
+   solution. Then `_back_off` makes the slip feasible, and the algorithm ends.
+4. If no node is overstressed, the load has an equilibrium. If the load is the upper
+   bound, it is the solution. Otherwise raise the load towards the bound by
+   `SHARE_TOWARDS_BOUND` of the way, or to the bound if it is within `CLOSE_RTOL`.
+   Solve for the slip, and go to step 1.
 
-The order of the nodes in step 1 and the share in step 4 are for speed. In another
-order the search stalls near the solution, and at too high a load far too many
-nodes join before a pivot fails.
+The order of the nodes in step 1 and the share in step 4 are for speed. In a
+different order the search stalls near the solution. If the load is too high, far
+too many nodes join before a pivot fails.
 """
 
 import numpy as np
@@ -86,9 +86,10 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
 
 @jit_inside
 def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
-    """Write the resting nodes above their strength to `workspace.queue`. Return how many.
+    """Write the resting nodes above their strength to `workspace.queue`. Return their number.
 
-    The most overstressed node comes first. Overstresses within the tolerance (Pa) do not count.
+    The most overstressed node comes first. Overstress within the tolerance (Pa) does
+    not count.
     """
     sample, slip, Kd, workspace, _, _ = state
     count = ZERO
@@ -107,7 +108,7 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
 
 @jit_inside
 def stress_tolerance(sample: StaticSample, load: float) -> float:
-    """Overstress, Pa, that counts as round-off."""
+    """Return the overstress, Pa, that counts as round-off."""
     total = 0.0
     n = sample.excess.shape[0]
     for i in range(n):
@@ -118,18 +119,19 @@ def stress_tolerance(sample: StaticSample, load: float) -> float:
 
 @jit_inside
 def _solve(state: SlipState, load: float, n_slipping: int) -> None:
-    """Write the slip in S at a load to `workspace.solution`, and K d."""
+    """Write the slip in S at a load to `workspace.solution`. Also write K d."""
     solve_slip(state.workspace, n_slipping, load, state.workspace.solution)
     multiply_slipping(state.workspace, n_slipping, state.workspace.solution, state.Kd)
 
 
 @jit_inside
 def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
-    """Step 3: lower the load of the slip by so little that no resting node is overstressed.
+    """Step 3: lower the load of the slip slightly, until no resting node is overstressed.
 
-    Close to the solution slip grows so fast with the load that round-off in the load alone may
-    leave a node overstressed. One step along the tangent v = d d/d load mends it. The load that is
-    returned stays: the certificate shows by how much the load of the slip differs from it.
+    Close to the solution, slip grows so fast with the load that round-off in the load
+    may leave a node overstressed. One step along the tangent v = d d/d load corrects
+    this. The returned load does not change. The certificate shows the difference
+    between the returned load and the load of the slip.
     """
     sample, _, Kd, workspace, _, _ = state
     v, Kv = workspace.solution, workspace.Kv
@@ -147,10 +149,10 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
 
 @jit_inside
 def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
-    """Step 3: take the nodes that would slip backwards out of S. Return how many stay.
+    """Step 3: remove the nodes that would slip backwards from S. Return how many remain.
 
-    L stays valid up to the first of them, so all nodes behind it leave, too. Nodes that belong to
-    S are overstressed then, and come back.
+    L remains valid up to the first of these nodes, so all nodes after it are also
+    removed. Removed nodes that belong to S are then overstressed, and come back.
     """
     slip = workspace.solution
     while n_slipping > 0:
@@ -170,7 +172,7 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
 def _cut(
     state: SlipState, n_factored: int, bound: float, multiplier: Array
 ) -> tuple[float, float]:
-    """Step 3: return the load of the cut, and the new bound. Write the bound's multiplier."""
+    """Step 3: return the load of the cut and the new bound. Write the multiplier of the bound."""
     sample, _, _, workspace, _, _ = state
     y = workspace.direction
     singular_direction(workspace, n_factored, y)
@@ -192,12 +194,12 @@ def _cut(
 def solve_program(
     state: SlipState, start: float, bound: float, cap: float, multiplier: Array
 ) -> tuple[float, bool]:
-    """Return the load that solves (1), with slip d, K d and multiplier, and whether it is solved.
+    """Return the load that solves (1), with slip d, K d and multiplier, and whether (1) is solved.
 
-    The bound is an upper bound with its multiplier, and the first load is `start`. Nodes that slip
-    already (`state.slip`) are the first to join. If `cap` is below the solution, the result is the
-    least equilibrium at this load. It is not solved if there are too many passes, or more slipping
-    nodes than the workspace can hold.
+    The bound is an upper bound with its multiplier, and the first load is `start`.
+    Nodes that already slip (`state.slip`) join first. If `cap` is below the solution,
+    the result is the least equilibrium at the load `cap`. The problem is not solved
+    if there are too many passes, or more slipping nodes than the workspace can hold.
     """
     sample, slip, Kd, workspace, _, _ = state
     top = min(bound, cap)
@@ -266,7 +268,7 @@ def certificate(
     workspace: Workspace,
     Ky: Array,
 ) -> float:
-    """Return the distance of the rigorous bounds (1) by the slip and (2) by the multiplier, Pa.
+    """Return the distance between rigorous bounds, Pa: (1) from slip, (2) from the multiplier.
 
     Writes K times the multiplier y to `Ky`.
     """

@@ -1,21 +1,21 @@
-"""Equilibria of a line or a specimen, with dense factors: which algorithm is used when.
+"""Choose the algorithm for equilibria of a line or a specimen, with dense factors.
 
-1. The next instability is a linear programme of the present pieces of the
-   friction law (`linear_program`), if no node reaches a corner of its law before.
-   A line on which very many nodes slip is handed over to transforms
-   (`plane_onset`), which are faster there.
-2. Otherwise the path is followed event by event (`stable_path`). The programme is
-   not tried again on this path, except from rest.
-3. Behind a machine the path is always followed: slip lowers the force, whose
-   largest value may lie before the instability. If all nodes slip without one,
+1. If no node reaches a corner of its law before the next instability, the
+   instability follows from a linear programme for the present pieces of the
+   friction law (`linear_program`). If very many nodes of a line slip, transforms
+   are used (`plane_onset`), because they are faster.
+2. Otherwise the path is followed event by event (`stable_path`). On this path the
+   programme is not tried again, except from rest.
+3. With a machine, the path is always followed: slip lowers the force, and the force
+   may be largest before the instability. If all nodes slip without an instability,
    the interface slides stably.
 4. If only part of a line or specimen can break, the other nodes have an infinite
-   strength. They hold the part, whose K is positive definite, so that each
-   instability ends at an equilibrium. It slides if all slips there that can
-   break.
-5. Beyond an instability of a line, the quick test for sliding comes first
-   (`runaway`). If it does not decide, and on specimens always, the jump is
-   followed to its end (`jump`).
+   strength. They hold the part that can break. K is positive definite on this part,
+   so each instability ends at an equilibrium. The interface slides if all nodes
+   that can break slip in this equilibrium.
+5. After an instability of a line, a quick test for sliding comes first (`runaway`).
+   If the test is undecided, and always on specimens, the jump is followed to its
+   end (`jump`).
 """
 
 import threading
@@ -67,7 +67,7 @@ RESTING_MULTIPLIER_RTOL = 1e-9
 
 
 class DenseProgram:
-    """Search for equilibria of a line or a specimen; thread-safe."""
+    """Search for equilibria of a line or a specimen. It is thread-safe."""
 
     widest_gap = 1e-9
     """Certificate gap, as a share of the load, above which there is a warning."""
@@ -94,7 +94,7 @@ class DenseProgram:
 
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
-        """The thread's workspaces, for elastic steps (and programmes) and for true pieces."""
+        """Workspaces of the thread, for elastic steps (and programmes) and for true pieces."""
         if not hasattr(self._of_thread, "workspaces"):
             self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
@@ -103,7 +103,7 @@ class DenseProgram:
         return pair
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
-        """Return the bound of a sample's weakest window (Pa), and its multiplier."""
+        """Return the bound from the weakest window of a sample (Pa), and its multiplier."""
         low, high = _rates(sample)
         windows = self.elastic.windows(low, high) if high > 0.0 else NONE
         workspace, multiplier = np.empty((2, self.nodes))
@@ -117,8 +117,8 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         """Return the critical load (at most `cap`) with its proofs, or `None` if the search stalls.
 
-        Only the first piece of the friction law counts: `excess` and `rate`. `state` is a known
-        equilibrium at a lower load.
+        Only the first piece of the friction law is used: `excess` and `rate`. `state`
+        is a known equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
         if bound == cap == np.inf:  # no window fits within the extent
@@ -148,7 +148,7 @@ class DenseProgram:
     def _by_transforms(
         self, sample: StaticSample, state: EquilibriumState | None
     ) -> EquilibriumState | None:
-        """Solve a programme in which many nodes slip, or return `None` if its bounds stay apart."""
+        """Solve a programme in which many nodes slip. Return `None` if its bounds stay apart."""
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None
@@ -176,9 +176,9 @@ class DenseProgram:
         state: EquilibriumState | None = None,
         target: float = np.inf,
     ) -> EquilibriumState:
-        """Return the next instability from a state or from rest, or the state at a load before it.
+        """Return the next instability from a state or from rest, or the state at a lower load.
 
-        See steps 1 to 3 at the top of this file.
+        See steps 1 to 3 in the docstring of the module.
         """
         state = state or at_rest(sample)
         from_rest, by_events = not state.slip.any(), state.by_events or self.driven
@@ -269,10 +269,10 @@ class DenseProgram:
     def _run(
         self, sample: StaticSample, instability: EquilibriumState, slip: Array, to_rest: bool
     ) -> tuple[int, float]:
-        """Test for sliding (step 5): return the outcome and an unstoppable length.
+        """Test for sliding (step 5). Return the outcome and an unstoppable length.
 
-        The length is a number of residual nodes. Slip moves on to a lower bound of the next
-        equilibrium.
+        The length is a number of residual nodes. Slip moves to a lower bound of the
+        next equilibrium.
         """
         direction = instability.direction
         if self.runs is None or to_rest:
@@ -291,18 +291,18 @@ class DenseProgram:
         )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the multiplier y, or, where slip lowers the mean stress, its derivative.
+        """Return the multiplier y. If slip lowers the mean stress, return its derivative.
 
         With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D,
         and y is the derivative of the largest D by the strengths s. Up to the
-        instability (K - W) d = D p - s on the slipping nodes, and no node has
-        stopped. So d grows with D at the rate d' = (K - W)^-1 p, the derivative
-        of <p, d> by s is -d', and the mean stress has the derivative
+        instability, (K - W) d = D p - s on the slipping nodes, and no node has
+        stopped. Therefore d grows with D at the rate d' = (K - W)^-1 p, the
+        derivative of <p, d> by s is -d', and the mean stress has the derivative
 
             y - (r/n) (<p, d'> y - d').
 
-        If the interface ends, the mean stress of the n nodes that can break is D
-        - <c, d>, over the mean of their p, with c = K 1/(n <p>) and 1 on these
+        If the interface ends, the mean stress of the n nodes that can break, divided
+        by the mean of p there, is D - <c, d>, with c = K 1/(n <p>) and 1 on these
         nodes. The derivative is then
 
             y - <c, d'> y + (K - W)^-1 c.
@@ -327,18 +327,19 @@ class DenseProgram:
 
 
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
-    """Return the linear sample of the pieces on which nodes are after a slip, for `solve`.
+    """Return, for `solve`, the linear sample with the pieces on which nodes are after a slip.
 
-    `excess` and `rate` belong to these pieces, continued to zero slip. The law no longer counts.
+    `excess` and `rate` belong to these pieces, continued to zero slip. The law has no
+    further effect.
     """
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, rate=present.rate)
 
 
 def _rates(sample: StaticSample) -> tuple[float, float]:
-    """Return the lowest and the highest weakening rate above zero, or zeros if there is none.
+    """Return the lowest and the highest non-zero weakening rate, or zeros if all rates are zero.
 
-    Rates that differ by round-off only are returned as equal.
+    Rates that differ only by round-off are returned as equal.
     """
     rates = sample.rate[sample.rate > 0.0]
     if rates.size == 0:

@@ -1,36 +1,34 @@
-"""Quick test whether an unstable patch of a line certainly grows until the interface slides.
+"""Test quickly whether an unstable patch on a line certainly grows until the interface slides.
 
 Problem
 -------
-At a load (Pa) a patch of a line became unstable. K is the stiffness (Pa/m), d the
-slip (m), s(d) the strength less initial stress (Pa) and p the load profile. Does
-slip come to rest again? `jump` decides this for any sample. Most samples slide,
-and this test shows it faster: without it onsets take three to five times as long.
-It follows the patch alone, as one run of nodes, while all other nodes are held.
-This is a lower bound of the slip, as slip elsewhere only adds stress (K has no
-positive entry off its diagonal).
+At a load (Pa) a patch on a line became unstable. K is the stiffness (Pa/m), d is
+the slip (m), s(d) is the strength minus initial stress (Pa) and p is the load
+profile. Does slip come to rest again? `jump` decides this for any sample. Most
+samples slide, and this test shows sliding faster. Without the test, onsets take
+three to five times as long. The test follows only the patch, as a run of nodes,
+while all other nodes are held. The result is a lower bound of the slip, because
+slip at other nodes only adds stress (K has no positive off-diagonal entry).
 
 Algorithm
 ---------
-Our own, on two known results: the factor of a Toeplitz matrix (`block_factor`)
-and Griffith's length (`unstoppable_length`).
+The algorithm is our own. It uses two known results: the factor of a Toeplitz matrix
+(`block_factor`) and Griffith's length (`unstoppable_length`).
 
-1. Move along the direction of the instability until a node reaches a corner of
-   its law. If none does, the interface slides.
-2. Nodes beside the run that are overloaded join it, as far as the stress there is
-   known.
-3. Elastic step: with the strengths of the moment, solve K_RR x = (load p - K d -
-   s(d))_R on the run R, cut the right side at zero, and add x to the slip. Blocks
-   of K on runs with the same length are equal, so that a single Cholesky factor
+1. Move along the direction of the instability until a node reaches a corner of its
+   law. If no node reaches a corner, the interface slides.
+2. Overloaded nodes beside the run join the run, as far as their stress is known.
+3. Take an elastic step. With the present strengths, solve K_RR x = (load p - K d -
+   s(d))_R on the run R, with the right side cut off at zero, and add x to the slip.
+   Blocks of K on runs with the same length are equal, so a single Cholesky factor
    serves all runs and samples.
 4. The interface slides if nodes at their residual strength form a run of the
    unstoppable length, or if the mean strength of the interface cannot carry the
    load.
-5. The test gives up (UNDECIDED) if slip hardly grows any more, after
-   `MAX_RUN_STEPS` steps, or if the run, or the unstoppable length, is longer than
-   the factor.
-6. Compute the stress that all slip added so far causes, on the run and half its
-   length to both sides, and go to 2.
+5. The test gives up (UNDECIDED) if slip hardly grows, after `MAX_RUN_STEPS` steps,
+   or if the run or the unstoppable length is longer than the factor.
+6. Compute the stress due to all slip added so far, on the run and for half its
+   length on both sides. Go to step 2.
 """
 
 from functools import lru_cache
@@ -68,11 +66,11 @@ UNSTOPPABLE_MARGIN = 1.5
 
 
 def block_factor(column: Array, width: int) -> Array:
-    """Return the Cholesky factor of the leading block in K, for runs up to `width` nodes.
+    """Return the Cholesky factor of the leading block of K, for runs with up to `width` nodes.
 
-    The block is a Toeplitz matrix: its factor follows column by column from two vectors, in
-    `width`^2 operations (the algorithm of Schur; T. Kailath and A. Sayed, Fast Reliable Algorithms
-    for Matrices with Structure, 1999, chapter 1).
+    The block is a Toeplitz matrix. Its factor follows, column by column, from two
+    vectors in `width`^2 operations (the algorithm of Schur; T. Kailath and A. Sayed,
+    Fast Reliable Algorithms for Matrices with Structure, 1999, chapter 1).
     """
     factor = np.empty(row_start(width + 4))
     starts = np.array([row_start(r) for r in range(width)])
@@ -113,11 +111,12 @@ def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
 
 @jit
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
-    """Return the length of a run of residual nodes that no strength around it can stop, in nodes.
+    """Return the length, in nodes, of a run of residual nodes that no strength around can stop.
 
-    Griffith's (1921) length with the least stress drop D and the largest fracture energy, which is
-    (tau_p - tau_r) d_c times the area under the law. A crack of half-length a releases
-    pi a D^2/(2 G*) at each tip. The length is infinite if a node has no stress drop.
+    This is Griffith's (1921) length with the smallest stress drop D and the largest
+    fracture energy. The fracture energy is (tau_p - tau_r) d_c times the area under
+    the law. A crack of half-length a releases pi a D^2/(2 G*) at each tip. The length
+    is infinite if a node has no stress drop.
     """
     stress_drop = np.inf
     energy = 0.0
@@ -144,9 +143,9 @@ def runs_away(
 ) -> tuple[Outcome, float]:
     """Return SLIDING if the patch of an instability certainly slides, otherwise UNDECIDED.
 
-    The second value is the number of residual nodes in a row that would show sliding in `jump`.
-    Slip d, K d, the direction and K times the direction belong to the instability. Afterwards slip
-    is a lower bound of the least equilibrium.
+    The second value is the number of residual nodes in a row that proves sliding in
+    `jump`. Slip d, K d, the direction and K times the direction belong to the
+    instability. After the call, slip is a lower bound of the least equilibrium.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)

@@ -1,58 +1,58 @@
-"""Follow the stable equilibria of a line or a specimen while the load rises, event by event.
+"""Follow stable equilibria of a line or a specimen, event by event, while the load rises.
 
 Problem
 -------
-p is the profile of the load, K the stiffness (Pa/m), and d >= 0 the slip (m). The
-strength of node i, less its initial stress, falls with slip along straight
-pieces: s_i = q_i - W_i d_i. Slip is an equilibrium at a load (Pa) if no stress is
-above its strength, and equal to it where nodes slip:
+p is the load profile, K is the stiffness (Pa/m), and d >= 0 is the slip (m). The
+strength of node i, minus its initial stress, falls with slip along straight pieces:
+s_i = q_i - W_i d_i. Slip is an equilibrium at a load (Pa) if no stress exceeds the
+strength, and if both are equal at slipping nodes:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-With A = K - diag(W), slip and the rate v at which it grows with the load (m/Pa)
-follow from
+With A = K - diag(W), the slip and its growth rate v with the load (m/Pa) follow
+from
 
     A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,                                (2)
 
-where d_rest is the slip of nodes that slipped before and rest. (2) holds until a
-node enters or leaves S, or reaches a corner of its friction law. The equilibrium
+where d_rest is the slip of nodes that slipped before and now rest. (2) holds until
+a node enters or leaves S, or reaches a corner of its friction law. The equilibrium
 is stable as long as A_SS is positive definite.
 
-On a line K has no positive entry off its diagonal, and a node that slips never
-stops. On a specimen it may have some (`may_stop`), so that slip at one node can
-unload another. Slip never goes back: a node that is unloaded rests. The rates at
-the nodes that reach their strength then minimise v'Av/2 - p'v over v >= 0:
+On a line, K has no positive off-diagonal entry, and a slipping node never stops. On
+a specimen, K may have positive off-diagonal entries (`may_stop`), so that slip at
+one node can unload other nodes. Slip never goes back: an unloaded node rests. The
+rates at the nodes that reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
     v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
 
 Algorithm
 ---------
-Parametric quadratic programming: the solution is piecewise linear in the load,
-and its kinks are found one after the other, as on the critical line of H.
+The method is parametric quadratic programming. The solution is piecewise linear in
+the load, and its kinks are found one after the other, as on the critical line of H.
 Markowitz (Naval Research Logistics Quarterly 3, 1956). Step 2 is an active-set
 method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
 16.5).
 
-1. Find S and factor A_SS = L L'. If a pivot fails, go to 5.
+1. Find S and factor A_SS = L L'. If a pivot fails, go to step 5.
 2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from
-   its former value towards the solution. The first node whose rate reaches zero
-   on the way stops: take it out of S and solve again.
+   its former value towards the solution. The first node whose rate reaches zero on
+   the way stops. Remove it from S and solve again.
 3. Find the smallest rise of the load at which a resting node reaches its strength
-   (a start) or a slipping node a corner of its law, and go there. If a node at
-   its strength would be overstressed by any rise, it starts at once, which is how
-   A v >= p comes about.
-4. After a start, append a row to L. After a corner, A_SS changes in one diagonal
-   entry: rotate the rows of L from there on, or compute them again if the node
-   now weakens more steeply.
+   (a start), or a slipping node reaches a corner of its law. Raise the load. If any
+   rise would overstress a node at its strength, the node starts at once. This
+   ensures A v >= p.
+4. After a start, append a row to L. After a corner, one diagonal entry of A_SS
+   changes. Rotate the rows of L from this entry on, or compute them again if the
+   node now weakens more steeply.
 5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the
-   direction z = (-A_SS^-1 A_Sj, 1) of the failed node j. If z >= 0 nothing bounds
-   slip along z: it jumps at constant load, and the path ends, unstable.
-   Otherwise, for (3) only, v moves along z until a rate reaches zero. If a start
-   failed, that node stops, and the start is tried again. If a corner or the first
-   factor failed, the nodes without a row in L leave S, and may start again. Those
-   that do not before the load rises have stopped.
-6. The path ends at the target, or when every node has slipped. It is given up if
-   S outgrows L, or if nodes stop and start without end.
+   direction z = (-A_SS^-1 A_Sj, 1) at the failed node j. If z >= 0, slip along z is
+   unbounded: it jumps at constant load, and the path ends, unstable. Otherwise, for
+   (3) only, v moves along z until a rate reaches zero. If a start failed, that node
+   stops, and the start is tried again. If a corner or the first factor failed, the
+   nodes without a row in L leave S, and may start again. Nodes that do not start
+   again before the load rises have stopped.
+6. The path ends at the target, or when every node has slipped. The path is
+   abandoned if S outgrows L, or if nodes stop and start without end.
 
 Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or
 `position`.
@@ -116,7 +116,7 @@ class PathEnd(NamedTuple):
 
 
 class PathEvent(NamedTuple):
-    """Next start or corner, with NOBODY in both places if the target comes first."""
+    """Next start or corner. Both are NOBODY if the target comes first."""
 
     step: float  # rise of the load, Pa
     starting_node: int
@@ -136,9 +136,10 @@ class Start(NamedTuple):
 def _find_slipping(
     state: SlipState, load: float, piece: NDArray[np.int64], q: Array
 ) -> tuple[int, bool]:
-    """Step 1: mark the slipping nodes, and write q and the diagonal of A.
+    """Step 1: mark the slipping nodes. Write q and the diagonal of A.
 
-    Returns the number of slipping nodes, and whether a node rests that slipped before.
+    Returns the number of slipping nodes, and whether a node that slipped before
+    rests.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     n_slipping = ZERO
@@ -174,7 +175,7 @@ def _substitute(state: SlipState, q: Array, first: int, n_slipping: int) -> None
 def _first_to_stop(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, endless: bool
 ) -> tuple[int, float]:
-    """Position in S of the node whose rate reaches zero first, and at which share of the move.
+    """Return the first node whose rate reaches zero (position in S), and the share of the move.
 
     Rates move from `v_nodes` to `new` (in S), or, if `endless`, along `new` without end.
     """
@@ -198,7 +199,7 @@ def _first_to_stop(
 def _move_rates(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
 ) -> None:
-    """Move the rates by a share of the way to `new` (in S), as in `_first_to_stop`."""
+    """Move the rates by a share of the way to `new` (in S). See `_first_to_stop`."""
     slipping = state.workspace.slipping
     for t in range(n_slipping):
         i = slipping[t]
@@ -208,7 +209,7 @@ def _move_rates(
 
 @jit_inside
 def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
-    """Take a node out of S, and return how many nodes slip on."""
+    """Remove a node from S. Return the number of nodes that still slip."""
     workspace = state.workspace
     node = workspace.slipping[position]
     workspace.is_slipping[node] = False
@@ -230,7 +231,7 @@ def _solve_rates(workspace: Workspace, n_slipping: int) -> None:
 def _stop_unloaded(
     state: SlipState, q: Array, n_slipping: int, v_nodes: Array
 ) -> tuple[int, bool]:
-    """Step 2, for (3): move the rates from `v_nodes` towards v, and stop nodes on the way.
+    """Step 2, for (3): move the rates from `v_nodes` towards v. Stop nodes on the way.
 
     Return the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
     then hold the solution of (2) for the slipping nodes.
@@ -253,7 +254,7 @@ def _stop_unloaded(
 
 @jit_inside
 def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
-    """Compute slip and K d anew from the factor."""
+    """Compute slip and K d again from the factor."""
     _, slip, Kd, workspace, _, _ = state
     solve_slip(workspace, n_slipping, load, workspace.solution)
     multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
@@ -267,7 +268,7 @@ def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
 def _next_event(
     state: SlipState, load: float, target: float, piece: NDArray[np.int64], n_slipping: int
 ) -> PathEvent:
-    """Step 3: the first event on the way to the target."""
+    """Step 3: return the first event on the way to the target."""
     sample, slip, Kd, workspace, _, _ = state
     p, corners = sample.profile, sample.pieces.ends
     step = target - load
@@ -294,7 +295,7 @@ def _next_event(
 
 @jit_inside
 def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: Array) -> int:
-    """Step 5: write the direction z after a pivot failed, and move the rates along it.
+    """Step 5: write the direction z after a pivot failed, and move the rates along z.
 
     Returns the position in S of the node whose rate reaches zero, or NOBODY if z is unbounded.
     """
@@ -329,7 +330,7 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
 
 @jit_inside
 def _some_rest(state: SlipState) -> bool:
-    """Return whether any node rests that slipped before."""
+    """Return whether any node that slipped before rests."""
     for i in range(state.slip.shape[0]):
         if state.slip[i] > 0.0 and not state.workspace.is_slipping[i]:
             return True
@@ -340,7 +341,7 @@ def _some_rest(state: SlipState) -> bool:
 def _pass_corner(
     state: SlipState, piece: NDArray[np.int64], q: Array, n_slipping: int, corner: int
 ) -> int:
-    """Step 4 at a corner: put the node on its next piece, and change L accordingly.
+    """Step 4 at a corner: move the node to its next piece, and update L.
 
     Returns how many nodes are factored: fewer than before if a pivot failed.
     """
@@ -368,7 +369,7 @@ def _pass_corner(
 def _start(
     state: SlipState, node: int, n_slipping: int, v_nodes: Array, direction: Array
 ) -> Start:
-    """Steps 4 and 5 at a start: append a node to S. The nodes that bound z stop."""
+    """Steps 4 and 5 at a start: append a node to S. Nodes that bound z stop."""
     workspace = state.workspace
     first_changed = n_slipping
     some_stopped = False
@@ -391,7 +392,7 @@ def _start(
 
 @jit_inside
 def all_slip(state: SlipState) -> bool:
-    """Return whether every node that can break slips or has slipped: a path or a jump ends."""
+    """Return whether every node that can break slips or has slipped. A path or jump then ends."""
     if state.held:
         return False
     for i in range(state.slip.shape[0]):
@@ -407,8 +408,8 @@ def follow_stable_path(
 ) -> PathEnd:
     """Follow the stable equilibria from a load to a target (Pa, not below it), as far as they go.
 
-    Slip and K d of the state move along. If the path ends unstable, the direction (n,) in which
-    slip jumps is written to `direction`.
+    Slip and K d of the state are updated. If the path ends unstable, the direction
+    (n,) in which slip jumps is written to `direction`.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     n, n_corners = slip.shape[0], sample.pieces.ends.shape[0]

@@ -1,6 +1,7 @@
-"""Onsets by Fourier transforms: planes, and long lines of which thousands of nodes slip.
+"""Onsets from Fourier transforms, for planes and for lines with thousands of slipping nodes.
 
-Read `plane`, which puts the parts together. `bracket` bounds the load from both
-sides, `turning_point` finds it, `relaxation` jumps beyond it, and `fold` follows
-the end of a stable path. All of them solve `held_equilibrium` again and again.
+Read `plane`, which puts the parts together. `bracket` bounds the onset load from
+both sides, and `turning_point` finds the load. `relaxation` follows the jump, and
+`fold` follows the end of a stable path. All of them solve `held_equilibrium`
+repeatedly.
 """

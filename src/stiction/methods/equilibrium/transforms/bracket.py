@@ -1,30 +1,29 @@
-"""Bracket of the onset load by transforms: stable loads from below, eigenvectors from above.
+"""Bracket the onset load with transforms: stable loads from below, eigenvectors from above.
 
 Problem
 -------
-With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength less initial stress s (Pa)
+With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength minus initial stress s (Pa)
 and load profile p > 0, the onset without corners is
 
     max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
-Any d >= 0 bounds it from below, by min (A d + s)/p. Any y >= 0 bounds it from
-above, after a multiple of a field z > 0 with A z < 0 has been added to make A y
-<= 0. This holds whatever d and y were computed with, and whatever the signs of
-the entries of K.
+Any d >= 0 gives the lower bound min (A d + s)/p. Any y >= 0 gives an upper bound,
+after a multiple of a field z > 0 with A z < 0 has been added to make A y <= 0. The
+bounds hold for any accuracy of d and y, and for any signs of the entries of K.
 
 Algorithm
 ---------
-`bisect` halves the interval between a stable and an unstable load. Each digit
-costs the same number of steps, so it only starts `turning_point`, which closes
-the bracket, and takes over if that fails.
+`bisect` halves the interval between a stable and an unstable load. Each digit costs
+the same number of steps. Therefore `bisect` only prepares for `turning_point`,
+which closes the bracket, and takes over if `turning_point` fails.
 
 1. Solve for the equilibrium at the middle of the interval, starting from the slip
    of the last stable load (`held_equilibrium`).
-2. If there is one, it gives a lower bound.
+2. If there is an equilibrium, it gives a lower bound.
 3. If a direction of negative curvature was met, the load is too high. The
    direction is the guess for the lowest eigenvector of A on the slipping nodes.
-   If the eigenvalue is not positive, the eigenvector gives an upper bound, and
-   lowers the upper end of the interval to it.
+   If the eigenvalue is not positive, the eigenvector gives an upper bound, which
+   becomes the upper end of the interval.
 """
 
 import numpy as np
@@ -58,11 +57,11 @@ border."""
 
 
 class TooSmallError(Exception):
-    """The part that can break is too small to become unstable at its weakening rates."""
+    """Error: the part that can break is too small to become unstable at its weakening rates."""
 
 
 def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Array, Array]:
-    """As `_lifting_field`, for a part that can break: the lowest eigenvector of A on it."""
+    """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A."""
     lifting = np.where(can_break, guess, 0.0)
     value, _ = lowest_eigenvector(
         operator, can_break, lifting, LIFTING_RTOL * float(operator.rate.max()),
@@ -78,9 +77,10 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     """Return a field z > 0 with A z < 0 at every node, and -A z (Pa/m), to lift multipliers.
 
-    If W > 0 everywhere, z is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g with
-    (K + w) g = w where W = 0 and zero elsewhere, w the smallest positive W: for a Z-matrix
-    0 <= g < 1, and -A z is 0.4 w (1 - g) where W = 0 and at least W - 0.4 (w + W) g > 0 elsewhere.
+    If W > 0 everywhere, z is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g.
+    Here (K + w) g is w at nodes with W = 0 and zero at other nodes, and w is the
+    smallest positive W. For a Z-matrix, 0 <= g < 1. Then -A z is 0.4 w (1 - g) at
+    nodes with W = 0, and at least W - 0.4 (w + W) g > 0 at other nodes.
     """
     lifting = np.ones(operator.rate.shape)
     free = operator.rate <= 0.0
@@ -95,14 +95,14 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
 
 
 class Bracket:
-    """Programme of a sample on a grid, with the best bounds of its solution so far.
+    """The programme for a sample on a grid, with the best bounds so far.
 
-    `lower` and `upper` are rigorous bounds of the onset load (Pa). The slip (m) proves the lower
-    bound, and the multiplier, with <p, y> = 1, the upper. The first proofs are that no node slips,
-    and that all nodes slide at once. K(k), W (Pa/m), strength less initial stress (Pa) and load
-    profile are fields (*shape).
-    Where the strength is infinite, slip and multiplier are zero. `lifting` is then a guess of the
-    lowest eigenvector on all other nodes.
+    `lower` and `upper` are rigorous bounds of the onset load (Pa). The slip (m)
+    proves the lower bound, and the multiplier, with <p, y> = 1, proves the upper
+    bound. The initial bounds are that no node slips, and that all nodes slide at
+    once. K(k), W (Pa/m), strength minus initial stress (Pa) and load profile are
+    fields (*shape). At nodes with infinite strength, slip and multiplier are zero.
+    `lifting` is then a guess of the lowest eigenvector on all other nodes.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class Bracket:
 
     @property
     def magnitude(self) -> float:
-        """Load to which relative gaps refer: the onset, unless it is close to zero."""
+        """Load to which relative gaps refer: the onset, unless the onset is close to zero."""
         return max(
             abs(self.upper),
             MIN_MAGNITUDE * float(np.abs(self.finite_excess).mean() / self.profile.mean()),
@@ -151,7 +151,7 @@ class Bracket:
         return self.magnitude * float(self.profile.mean())
 
     def raise_slip(self, slip: Array) -> None:
-        """Take a slip, cut at zero, if it proves a higher lower bound."""
+        """Accept a slip, cut off at zero, if it proves a higher lower bound."""
         trial = np.maximum(slip, 0.0)
         product(self.operator, trial, self.residual)
         load = float(((self.residual + self.excess) / self.profile).min())
@@ -159,9 +159,10 @@ class Bracket:
             self.lower, self.slip = load, trial
 
     def raise_multiplier(self, y: Array) -> float:
-        """Take a multiplier if it proves a lower upper bound, and return its bound.
+        """Accept a multiplier if it proves a lower upper bound. Return its bound.
 
-        The least multiple of z is added that makes A y <= 0; the bound is infinite without one.
+        The least multiple of z that makes A y <= 0 is added. If there is no such
+        multiple, the bound is infinite.
         """
         trial = np.maximum(y, 0.0)
         product(self.operator, trial, self.residual)
@@ -181,7 +182,7 @@ class Bracket:
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
-    """Narrow a bracket to a relative gap. Return the last unstable direction, of unit norm.
+    """Narrow a bracket to a relative gap. Return the last unstable direction, with unit norm.
 
     The accuracy is the largest residual stress as a share of the mean strength.
     """

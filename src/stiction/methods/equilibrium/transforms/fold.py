@@ -1,32 +1,32 @@
-"""The turn of a stable path on a plane, found by following the path from event to event.
+"""Find the turn of a stable path on a plane by following the path from event to event.
 
 Problem
 -------
-K is the stiffness (Pa/m), W the present weakening rates (Pa/m), A = K - diag(W),
-S the slipping nodes, p the load profile. Between events slip d grows with the
-load at the rate v, A_SS v = p_S, and A_SS is positive definite. An event is a
-node that begins to slip, or that reaches a corner of its law. The path turns at
-the first event after which A_SS is no longer positive definite. Find its load,
-and the direction y in which slip jumps.
+K is the stiffness (Pa/m), W are the present weakening rates (Pa/m), A = K -
+diag(W), S are the slipping nodes, and p is the load profile. Between events, slip d
+grows with the load at the rate v, with A_SS v = p_S, and A_SS is positive definite.
+At an event, a node begins to slip or reaches a corner of its law. The path turns at
+the first event after which A_SS is no longer positive definite. Find its load, and
+the direction y in which slip jumps.
 
 Algorithm
 ---------
-As `dense.stable_path`, with solutions by conjugate gradients (`solve_inside`)
-instead of a factor.
+The algorithm is the same as in `dense.stable_path`, but conjugate gradients
+(`solve_inside`) replace the factor.
 
 1. Solve for the slip at the first load, revising the pieces of the nodes, and for
    the rates v.
-2. Find the smallest rise of the load to an event, and go there. If the target
+2. Find the smallest rise of the load to an event, and raise the load. If the target
    comes first, end.
-3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. The change c
-   of W_j by its next piece, W before less W after, adds c to one diagonal entry,
-   so that A_SS stays positive definite if 1 + c y_j > 0, and v becomes v - c
+3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. On its next
+   piece, W_j falls by c (W before minus W after), which adds c to one diagonal
+   entry. A_SS remains positive definite if 1 + c y_j > 0. Then v becomes v - c
    v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
 4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other
-   slipping nodes. A stays positive definite if y'Ay = (A y)_j > 0. With c_j = p_j
+   slipping nodes. A remains positive definite if y'Ay = (A y)_j > 0. With c_j = p_j
    - (K v)_j, v becomes v + c_j/(y'Ay) y.
-5. If it does not stay positive definite, the path turns in the direction y.
-   Otherwise go to 2.
+5. If A does not remain positive definite, the path turns in the direction y.
+   Otherwise go to step 2.
 """
 
 from typing import NamedTuple
@@ -60,7 +60,7 @@ class Turn(NamedTuple):
 
 
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
-    """Solve A x = right on the nodes inside; `None` if A is not positive definite there."""
+    """Solve A x = right on the nodes inside. `None` if A is not positive definite there."""
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
     status, _ = solve_inside(operator, inside, x, residual, tolerance)
@@ -70,7 +70,7 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
 def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
-    """Step 1: improve a rough slip at a load; `None` if there is no equilibrium near it."""
+    """Step 1: improve a rough slip at a load. `None` if there is no equilibrium nearby."""
     tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)
@@ -86,7 +86,7 @@ def _equilibrium_near(
 def follow_to_turn(
     operator: Operator, sample: StaticSample, load: float, target: float, slip: Array
 ) -> Turn | None:
-    """Follow a stable path from a rough slip at a load to its turn, or to the target load.
+    """Follow a stable path, from a rough slip at a load, to its turn or to the target load.
 
     Returns `None` if the path is not stable at the first load, or after too many events.
     """

@@ -1,35 +1,35 @@
-"""Equilibrium at a fixed load, by conjugate gradients, optionally with a patch held by a spring.
+"""Find an equilibrium at a fixed load by conjugate gradients. A spring may hold a patch.
 
 Problem
 -------
-A = K - diag(W) (`elasticity.operator`), d >= 0 is the slip (m), s the strength
-less initial stress at zero slip (Pa), p the load profile, phi (|phi| = 1) the
-shape of a patch. Find
+Let A = K - diag(W) (`elasticity.operator`). d >= 0 is the slip (m), s is the
+strength minus initial stress at zero slip (Pa), p is the load profile, and phi
+(|phi| = 1) is the shape of a patch. Find
 
     d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
     mu = spring (alpha - <phi, d>),
 
-the stress mu of the spring being zero if the spring holds nothing. Without a
-spring, and if K has no positive entry off its diagonal, the solution is the least
-equilibrium at this load. With a spring there are solutions on both sides of the
-turning point. They are equilibria of the interface itself where mu = 0.
+The stress mu of the spring is zero if there is no spring. Without a spring, and if
+K has no positive off-diagonal entry, the solution is the least equilibrium at this
+load. With a spring there are solutions on both sides of the turning point. A
+solution with mu = 0 is an equilibrium of the interface without the spring.
 
 Algorithm
 ---------
-Active set with conjugate gradients inside, as in a projected method (J. Nocedal
-and S. Wright, Numerical Optimization, 2006, section 16.7), but with whole sets
-instead of a line search.
+The algorithm combines an active set with conjugate gradients, as in a projected
+method (J. Nocedal and S. Wright, Numerical Optimization, 2006, section 16.7), but
+it changes whole sets instead of using a line search.
 
 1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join, and nodes
    with d < 0 leave.
 2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the tolerance
    (`solve_inside`). If the curvature along a direction is negative, there is no
-   stable solution: stop.
-3. Compute r at all nodes and go to 1, until no node joins or leaves and r is
+   stable solution. Then stop.
+3. Compute r at all nodes and go to step 1, until no node joins or leaves, and r is
    small on the set.
 
-Without a spring and positive entries off the diagonal nodes only join, so that
-this ends. Otherwise only the number of iterations ends it.
+Without a spring and without positive off-diagonal entries, nodes only join, so the
+algorithm ends. Otherwise only the limit on iterations ends it.
 """
 
 from stiction.base.arrays import Array
@@ -78,8 +78,9 @@ def equilibrate(
 ) -> tuple[int, int]:
     """Solve (1) for right = load p - s + spring alpha phi. Return the status and iterations.
 
-    The nodes `inside`, and their slip, are a guess, then the solution. If it is solved, the
-    residual r is nowhere above the tolerance (Pa), and on the set within twice the tolerance.
+    On entry, the nodes `inside` and their slip are a guess. On return, they are the
+    solution. If (1) is solved, the residual r does not exceed the tolerance (Pa) at
+    any node, and on the set it is within twice the tolerance.
     """
     restrict(slip, inside)
     residual_of(operator, right, slip, residual)

@@ -1,22 +1,22 @@
-"""Equilibria of a plane, with transforms: which algorithm is used when.
+"""Choose the algorithm for equilibria of a plane, with transforms.
 
-`plane_onset` finds the onset without corners, also of long lines:
+`plane_onset` finds the onset without corners, also for long lines:
 
 1. Make coarser grids, each with half the nodes, as long as they resolve the
    nucleation length.
 2. On the coarsest grid, bisect the trivial bounds until Newton's method on the
    turning point succeeds (`_narrow`).
-3. On each finer grid start Newton's method (`turning_point.close`) from the slip
-   and the multiplier of the grid before. If it fails, go on as in step 2.
+3. On each finer grid, start Newton's method (`turning_point.close`) from the slip
+   and the multiplier on the previous grid. If it fails, continue as in step 2.
 
 `PlaneProgram` follows a sample from instability to instability:
 
 4. From rest, the next instability is the onset without corners, if no node
-   reaches a corner of its law before. A coarse grid shows most often whether a
-   node does.
-5. Otherwise, and after a jump, the path is followed in steps of the load, each of
-   which is proved to be stable (`relaxation.stable_equilibrium`). A step that is
-   not is shortened, until it is as short as the gap that was asked for.
+   reaches a corner of its law before. A coarse grid usually shows whether a node
+   reaches a corner.
+5. Otherwise, and after a jump, the path is followed in steps of the load. Each step
+   is proved to be stable (`relaxation.stable_equilibrium`). If the proof fails, the
+   step is shortened, down to the requested gap.
 6. The end of the path is then followed event by event (`fold`), to see whether it
    turns, and how.
 7. A jump goes to the least equilibrium a little above the load of the turn
@@ -85,7 +85,7 @@ BISECTED_RESIDUAL = 0.05
 
 
 def halved(fine: Array) -> Array:
-    """Return values on every other node, averaged with weights 1/4, 1/2, 1/4 along each axis."""
+    """Return values at every second node, averaged with weights 1/4, 1/2, 1/4 along each axis."""
     for axis in range(fine.ndim):
         even, odd = ((*(slice(None),) * axis, slice(first, None, 2)) for first in (0, 1))
         fine = 0.5 * fine[even] + 0.25 * (fine[odd] + np.roll(fine[odd], 1, axis))
@@ -93,7 +93,7 @@ def halved(fine: Array) -> Array:
 
 
 def doubled(coarse: Array) -> Array:
-    """Return values interpolated linearly to twice the nodes along each axis."""
+    """Return values interpolated linearly to twice as many nodes along each axis."""
     for axis in range(coarse.ndim):
         between = 0.5 * (coarse + np.roll(coarse, -1, axis))
         shape = tuple(n * (1 + (a == axis)) for a, n in enumerate(coarse.shape))
@@ -102,7 +102,7 @@ def doubled(coarse: Array) -> Array:
 
 
 def halved_strength(fine: Array) -> Array:
-    """Return `halved` of strengths, over the nodes of finite strength only."""
+    """Return `halved` for strengths, averaged only over nodes with finite strength."""
     finite = np.isfinite(fine)
     if finite.all():
         return halved(fine)
@@ -112,10 +112,10 @@ def halved_strength(fine: Array) -> Array:
 
 
 class PlaneOnset(NamedTuple):
-    """Onset of a sample: rigorous bounds of the load, and their proofs.
+    """Onset of a sample: rigorous bounds of the load and their proofs.
 
-    The bounds are loads (Pa). Slip (m) and multiplier, (*shape), prove them. `closed` tells whether
-    they are as close as required.
+    The bounds are loads (Pa). Slip (m) and multiplier, with shape (*shape), prove the
+    bounds. `closed` states whether the bounds are as close as required.
     """
 
     lower: float
@@ -128,7 +128,8 @@ class PlaneOnset(NamedTuple):
 def _narrow(bracket: Bracket, gap: float) -> float:
     """Step 2: close a bracket from its trivial bounds.
 
-    Returns the curvature found. The bounds of a stiffness that is no Z-matrix may not meet.
+    Returns the curvature. If the stiffness is not a Z-matrix, the bounds may not
+    meet.
     """
     share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
@@ -153,12 +154,13 @@ def plane_onset(
 ) -> PlaneOnset:
     """Return the largest load that has an equilibrium before a node reaches a corner of its law.
 
-    All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength less the
-    initial stress (Pa). `profile` is the load profile p > 0. `rate` is the weakening rate (Pa/m,
-    zero at residual nodes). `slip` (m) belongs to an equilibrium at a lower load, from which the
-    search starts instead of coarse grids. `corner` is the slip at the next corner (m, 0 without a
-    corner). The search stops when the bounds agree to a relative `gap`. If a node of a coarse grid
-    slips beyond its corner, the onset of this grid is returned.
+    All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength
+    minus the initial stress (Pa). `profile` is the load profile p > 0. `rate` is the
+    weakening rate (Pa/m, zero at residual nodes). `slip` (m) belongs to an equilibrium at a
+    lower load, from which the search starts instead of coarse grids. `corner` is the slip
+    at the next corner (m, 0 without a corner). The search stops when the bounds agree to a
+    relative `gap`. If a node of a coarse grid slips beyond its corner, the onset of this
+    grid is returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
@@ -213,7 +215,7 @@ def plane_onset(
 
 
 class PlaneProgram:
-    """Search for equilibria of a plane, to a relative distance of bounds; thread-safe."""
+    """Search for equilibria of a plane, to a relative gap between bounds. It is thread-safe."""
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces
@@ -228,7 +230,7 @@ class PlaneProgram:
         )
 
     def _onset(self, sample: StaticSample, corner: Array) -> PlaneOnset:
-        """Return the onset without corners, or of a coarse grid on which a node passes a corner."""
+        """Return the onset without corners, or on a coarse grid on which a node passes a corner."""
         fields = (sample.excess, sample.profile, sample.rate, corner)
         excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
         return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
@@ -236,7 +238,7 @@ class PlaneProgram:
     def next(
         self, sample: StaticSample, state: EquilibriumState | None = None
     ) -> EquilibriumState:
-        """Return the next instability on the path from a stable state or from rest (4 to 6).
+        """Return the next instability on the path from a stable state or from rest (steps 4 to 6).
 
         If the path was followed because of a coarse grid, and turns before any node reaches a
         corner, the onset is computed after all, with its certificate.
@@ -271,8 +273,8 @@ class PlaneProgram:
     ) -> EquilibriumState:
         """Steps 5 and 6: follow the stable path in steps of the load to its end.
 
-        A long step may look unstable only because nodes begin to slip in it before others reach
-        their corners.
+        A long step may look unstable only because some nodes begin to slip during the
+        step before other nodes reach their corners.
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
@@ -322,9 +324,10 @@ class PlaneProgram:
         passed: list[tuple[float, Array]],
         load_beyond: float,
     ) -> Turn | None:
-        """Step 6: follow the end of the path event by event; `None` if it is not found.
+        """Step 6: follow the end of the path event by event. `None` if the end is not found.
 
-        A rough slip may be beyond the turn. Then start from the step before it, and so on.
+        A rough slip may lie beyond the turn. Then start from the previous step, and
+        so on.
         """
         for load, slip in reversed(passed):
             turn = follow_to_turn(operator, sample, load, load_beyond, slip)
@@ -333,7 +336,7 @@ class PlaneProgram:
         return None
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the direction in which the path turns, (n,), or NaN if it is not found."""
+        """Return the direction (n,) in which the path turns, or NaN if the turn is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
         operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap

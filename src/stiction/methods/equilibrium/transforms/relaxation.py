@@ -1,18 +1,18 @@
-"""Equilibria of a plane at a fixed load, while nodes pass corners of their friction law.
+"""Equilibria of a plane at a fixed load, if nodes pass corners of their friction law.
 
 Problem
 -------
-K is the stiffness (Pa/m), d >= 0 the slip (m), p the load profile. On its present
-piece the strength of node i, less its initial stress, is q_i - W_i d_i. A node is
-overloaded if load p - K d is above its strength. An equilibrium at a load (Pa)
-satisfies
+K is the stiffness (Pa/m), d >= 0 is the slip (m), and p is the load profile. On its
+present piece, the strength of node i, minus its initial stress, is q_i - W_i d_i. A
+node is overloaded if load p - K d exceeds its strength. An equilibrium at a load
+(Pa) satisfies
 
     load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
 
-For given pieces this is linear, and `held_equilibrium` solves it with A = K -
-diag(W) by conjugate gradients, which also meet a direction of negative curvature
-if A is not positive definite. The pieces depend on the slip. Two questions are
-answered:
+For given pieces this problem is linear, and `held_equilibrium` solves it by
+conjugate gradients with A = K - diag(W). If A is not positive definite, conjugate
+gradients find a direction of negative curvature. The pieces depend on the slip. Two
+questions are answered:
 
 (a) Does a stable path lead from an equilibrium at a lower load to an equilibrium
     at this load (`stable_equilibrium`)?
@@ -22,33 +22,33 @@ answered:
 
 Algorithm for (a): Newton's method
 ----------------------------------
-1. Solve (1) for the pieces of the present slip. Repeat with the pieces of the
-   solution until they do not change. Until then solve to a rough residual only.
-2. Look for negative curvature of K less the steepest weakening of each node on
-   the way, on the nodes that slip at the end. If there is none, A is positive
-   definite in every state on the way. So the path is stable, and there is no
-   other equilibrium.
+1. Solve (1) for the pieces at the present slip. Repeat with the pieces at the
+   solution until they do not change. Until then, solve only to a rough residual.
+2. On the nodes that slip at the end, look for negative curvature of K minus the
+   steepest weakening of each node on the way. If there is no negative curvature, A
+   is positive definite in every state on the way. Therefore the path is stable, and
+   there is no other equilibrium.
 
 Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
-1. If the load exceeds the mean strength, the interface slides, since the mean of
+1. If the load exceeds the mean strength, the interface slides, because the mean of
    K d is zero.
-2. Step with bounds (`_bound`). Let nodes weaken by a share of their present rate
-   only, and no further than to their next corner. As this strength is nowhere
-   below the true strength, the solution of (1) with it is below the least
-   equilibrium. The share is 1 - `omitted`. The larger it is, the longer is the
-   step.
-3. If the share is 1 and all nodes are on the pieces that were assumed, the
-   solution is the least equilibrium, and the interface is arrested.
-4. If the step has a solution, slip moves to it. If hardly any node moves, the
-   next step has the share 1, as only this share can end at the equilibrium.
+2. Step with bounds (`_bound`). Let nodes weaken at only a share of their present
+   rate, and no further than to their next corner. This strength is not below the
+   true strength at any node. Therefore the solution of (1) with this strength lies
+   below the least equilibrium. The share is 1 - `omitted`. The larger it is, the
+   longer is the step.
+3. If the share is 1 and all nodes are on the assumed pieces, the solution is the
+   least equilibrium, and the interface is arrested.
+4. If the step has a solution, slip moves to it. If hardly any node moves, the next
+   step has the share 1, because only this share can end at the equilibrium.
 5. If a step has negative curvature with the share 1, or if the slip is at an
    instability, move with the true pieces to the first corner (`_step_to_corner`).
    Otherwise omit twice as much of the weakening. A step that omits all of it has
    a solution unless the interface slides.
 
-K of a plane has small positive entries off its diagonal. The bounds in (b) are
-strict without them.
+On a plane, K has small positive off-diagonal entries. Without such entries the
+bounds in (b) would be strict.
 """
 
 from typing import NamedTuple
@@ -105,7 +105,7 @@ CREEP = 0.02
 def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> float:
     """Return the largest residual stress, Pa, for an accuracy relative to the strength or load.
 
-    Strength beyond the load, such as the strength of barriers, does not count.
+    Strength above the load, such as the strength of barriers, does not count.
     """
     applied = abs(load) * sample.profile
     mean = np.minimum(np.abs(sample.excess), applied).mean() + applied.mean()
@@ -126,8 +126,8 @@ def solve_pieces(
 def _is_definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
     """(a) 2: return whether K - `rate` on the nodes that slip shows no negative curvature.
 
-    The search begins with the growth, which is close to the direction in which stability is lost,
-    and goes on in the directions of conjugate gradients.
+    The search begins with the growth of slip, which is close to the direction in
+    which stability is lost. It continues in the directions of conjugate gradients.
     """
     operator, inside = operator._replace(rate=rate), slip > 0.0
     solution, image = np.zeros_like(slip), np.empty_like(slip)
@@ -148,10 +148,11 @@ def stable_equilibrium(
     accuracy: float,
     guess: Array,
 ) -> Array | None:
-    """Return the slip at a load to which a stable path certainly leads, otherwise `None`.
+    """Return the slip at a load if a stable path certainly leads there, and otherwise `None`.
 
-    The path begins at an equilibrium with less slip at a lower load; the guess is a slip at its
-    end. The accuracy is the largest residual stress as a share of the mean strength or load.
+    The path begins at an equilibrium with less slip at a lower load. The guess is a
+    slip at the end of the path. The accuracy is the largest residual stress as a
+    share of the mean strength or load.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     pieces, start = sample.pieces, present_pieces(sample, slip)
@@ -183,7 +184,7 @@ def stable_equilibrium(
 
 
 class Bound(NamedTuple):
-    """Result of a step with bounds, (b) 2."""
+    """Result of a step with bounds (step (b) 2)."""
 
     status: int
     slip: Array
@@ -201,8 +202,9 @@ def _bound(
 ) -> Bound:
     """(b) 2: return the slip if nodes omit a share of their weakening and stop at their corner.
 
-    The assumed strength is the larger of two lines, and Newton's method finds on which of them each
-    node is. The drive is lowered by the residual allowed, so that a rough slip is a bound, too.
+    The assumed strength is the larger of two straight lines, and Newton's method
+    finds which line applies at each node. The drive is reduced by the allowed
+    residual, so that a rough slip is also a bound.
     """
     rate = (1.0 - omitted) * present.rate - omitted * DRAG * float(sample.rate.max())
     start = present.strength - (present.rate - rate) * slip
@@ -233,9 +235,10 @@ def _step_to_corner(
 ) -> Array:
     """(b) 5: move slip with the true pieces until the first node reaches a corner.
 
-    Only the nodes that slip or are overloaded move: towards their equilibrium or, without an
-    equilibrium, along y >= 0 with A y = lambda y, lambda < 0. Both keep every node that moves
-    overloaded or balanced, so that the next equilibrium is not passed.
+    Only the nodes that slip or are overloaded move: towards their equilibrium or,
+    without an equilibrium, along y >= 0 with A y = lambda y, lambda < 0. In both
+    cases every moving node remains overloaded or balanced, so that the next
+    equilibrium is not passed.
     """
     present = present_pieces(sample, slip)
     operator = operator._replace(rate=present.rate)
@@ -258,7 +261,7 @@ def _step_to_corner(
 
 
 class Relaxed(NamedTuple):
-    """Fate of the interface at a load, and its slip."""
+    """Outcome for the interface at a load, and its slip."""
 
     status: Outcome
     slip: Array
@@ -273,12 +276,13 @@ def least_equilibrium(
     is_unstable: bool = False,
     to_rest: bool = True,
 ) -> Relaxed:
-    """Return the least equilibrium at a load that is not below a given slip; see (b).
+    """Return the least equilibrium at a load that is not below a given slip (see (b)).
 
-    The slip is zero, or an equilibrium at a lower load, or beyond it along an unstable direction,
-    or (`is_unstable`) at an instability. The accuracy is the largest residual stress as a share of
-    the mean strength or load. An interface that ends slides once all slips that can break, unless
-    it is followed `to_rest`.
+    The given slip is zero, or belongs to an equilibrium at a lower load, or lies beyond
+    this equilibrium along an unstable direction, or (`is_unstable`) belongs to an
+    instability. The accuracy is the largest residual stress as a share of the mean strength
+    or load. If an interface ends, it slides when all nodes that can break slip, unless it
+    is followed `to_rest`.
     """
     can_break = np.isfinite(sample.excess)
     stops = not (to_rest or can_break.all())

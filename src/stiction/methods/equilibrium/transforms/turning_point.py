@@ -1,43 +1,45 @@
-"""The turning point of the load, at which stable and unstable equilibria of a patch meet.
+"""Find the turning point of the load, at which stable and unstable equilibria of a patch meet.
 
 Problem
 -------
-Close the bracket (1) of `bracket`. With A = K - diag(W), slip d, strength less
-initial stress s and load profile p, a spring holds a patch phi (|phi| = 1) at the
-amplitude a = <phi, d>, with a force mu (`held_equilibrium`). On the slipping
-nodes
+Close the bracket (1) in `bracket`. A = K - diag(W), d is the slip, s is the
+strength minus initial stress, and p is the load profile. A spring holds a patch phi
+(|phi| = 1) at the amplitude a = <phi, d>, with a force mu (`held_equilibrium`). On
+the slipping nodes
 
     A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
 
-where a dash is the derivative by a at a fixed load. The interface itself is in
-equilibrium where mu = 0, and its load turns where mu' = 0, too. Find (load, a)
-with mu = mu' = 0.
+where a dash is the derivative with respect to a at a fixed load. The interface
+without the spring is in equilibrium if mu = 0. Its load turns if also mu' = 0. Find
+(load, a) with mu = mu' = 0.
 
-Bounds: d is feasible at a load with mu >= 0, and bounds the onset from below. Let
-y combine two slopes d', of a state with mu' > 0 and one with mu' < 0, so that A y
-= 0 where both slip. It is a multiplier, and bounds the onset from above. A node
-that slips in one state only has A y <= 0 and hardly slips at the turning point,
-so that the error of this bound is of second order.
+Lower bound: if mu >= 0 at a load, d is feasible, and the load bounds the onset from
+below. Upper bound: let y combine the slopes d' of two states, with mu' > 0 and mu'
+< 0, so that A y = 0 at nodes that slip in both. Then y is a multiplier, which
+bounds the onset from above. A node that slips in only one state has A y <= 0, and
+hardly slips at the turning point, so the error of this bound is of second order.
 
 Algorithm
 ---------
-Our own: Newton's method for two equations. As nodes join, mu' falls in steps.
+The algorithm is our own: Newton's method for two equations. As nodes join, mu'
+falls in steps.
 
 1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and
-   take both bounds.
-2. If conjugate gradients meet negative curvature although the patch is held,
-   another patch became unstable. Hold this one instead, at a lower load.
-3. As long as mu' had only one sign, step in a by Newton's method with the slope
-   of mu' by secant, a little beyond the zero, to change its sign
+   compute both bounds.
+2. If conjugate gradients meet negative curvature although the patch is held, a
+   different patch became unstable. Hold this patch instead, at a lower load.
+3. As long as mu' had only one sign, change a by Newton's method, with a secant for
+   the slope of mu'. Step slightly beyond the zero, so that the sign changes
    (`_step_across`).
-4. With states of both signs, guess a between them, alternately as if mu' were
-   linear in a and as if it had one step (`_amplitude_between`).
+4. With states of both signs, guess an a between these states, alternately as if mu'
+   were linear in a and as if mu' had a single step (`_amplitude_between`).
 5. The next load is the load at which the spring would have no force at the next a
    (`_load_at`), kept below the upper bound.
-6. End once the bounds are close enough, or if states in a row hardly narrow them.
+6. End if the bounds are close enough, or if successive states hardly narrow the
+   bounds.
 
-If it fails, `bracket.bisect` takes over, so that no result rests on the constants
-below.
+If the algorithm fails, `bracket.bisect` takes over, so no result depends on the
+constants below.
 """
 
 from typing import NamedTuple
@@ -79,7 +81,7 @@ PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
 
 
 class Held(NamedTuple):
-    """Held equilibrium, or a guess."""
+    """A held equilibrium, or a guess."""
 
     load: float
     amplitude: float  # a
@@ -91,10 +93,10 @@ class Held(NamedTuple):
 
 
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
-    """Step 1: return the equilibrium with a patch phi held; `None` if another patch is unstable.
+    """Step 1: return the equilibrium with a held patch phi. `None` if another patch is unstable.
 
-    The guess gives the amplitude at which the spring has no force; the accuracy is the largest
-    residual stress as a share of the mean strength.
+    The guess gives the amplitude at which the spring has no force. The accuracy is
+    the largest residual stress as a share of the mean strength.
     """
     excess, profile = bracket.excess, bracket.profile
     load, amplitude = guess.load, guess.amplitude
@@ -130,7 +132,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """Step 2: return the unstable patch beside the held patch (unit norm); `None` without any."""
+    """Step 2: return the unstable patch (unit norm) beside the held patch, or `None`."""
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
@@ -148,7 +150,7 @@ def _other_patch(bracket: Bracket) -> Array | None:
 
 
 def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
-    """Step 5: return the load (Pa) without a spring force at an amplitude, from a state near it."""
+    """Step 5: return the load (Pa) without spring force at an amplitude, from a state nearby."""
     step = amplitude - state.amplitude
     force = state.force + (state.slope_of_force + 0.5 * curvature * step) * step
     return state.load - force / state.force_by_load
@@ -173,8 +175,9 @@ def _amplitude_between(below: Held, above: Held, turn: int) -> float:
 def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
     """Step 3: return a step of the amplitude that is likely to change the sign of mu'.
 
-    `step` and `last` are the step before and mu' before it. Since mu' falls in steps, as nodes
-    join, it goes a little beyond Newton's, and twice as far as before if mu' hardly changed.
+    `step` is the previous step, and `last` is mu' before this step. Because mu' falls
+    in steps as nodes join, the new step is slightly longer than Newton's. It is twice
+    as long as the previous step if mu' hardly changed.
     """
     longest = MAX_STEP * state.amplitude
     if curvature >= 0.0:
