@@ -2,31 +2,32 @@
 
 Problem
 -------
-Blocks of length L and height H are mirror images at the interface, free at their ends and driven in
-opposite directions, so that slip d does not change the normal stress. Per unit depth, with the
-force F of the drive on a block (N/m), its travel U (m), the distance dx of the nodes and the mean
-stress F/L,
+Two blocks of length L and height H are mirror images at the interface. They have
+free ends and are driven in opposite directions, so that slip d does not change the
+normal stress. Let F be the force of the drive on a block per unit depth (N/m), U
+the travel of the drive (m), and dx the distance between nodes. F/L is the mean
+stress. Then
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 
-K holds for a given force: a uniform slip is free of stress. `block_response`
+K applies to a given force: uniform slip causes no stress. `block_response`
 returns K, q and C.
 
 Algorithm
 ---------
-1. Take K of two free ends that do not feel each other, averaged over the cells of the nodes
-   (`stiffness_between_ends`).
-2. Add the effect of the top, on rollers, and of the other end. It is a smooth function, in closed
-   form apart from a few harmonics (`_rollers_correction`).
-3. With a pusher, q and C of a block on rollers have closed forms, too (`_pushed`).
+1. Compute K for two free ends that do not interact, averaged over the cells of the
+   nodes (`stiffness_between_ends`).
+2. Add the effect of the top, which is on rollers, and of the other end. This is a
+   smooth function, in closed form except for a few harmonics
+   (`_rollers_correction`).
+3. With a pusher, q and C of a block on rollers also have closed forms (`_pushed`).
 4. With a platen, find the shear traction t that holds the top in place (`glued_top`). With the
    compliance G of the top and the stress A t on the interface, A' d/2 is the
-   displacement of the top that slip d causes (Betti's theorem). For a platen that
-   is held,
+   displacement of the top that slip d causes (Betti's theorem). If the platen is held,
 
        K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1.
 
-   Subtract the stress of the platen's motion at a given force (`_glued`).
+   At a given force, subtract the stress due to the motion of the platen (`_glued`).
 5. Repeat steps 2 to 4 with a coarser resolution. The largest change is the `error`.
 
 Mode III has closed forms throughout.
@@ -48,7 +49,7 @@ Side: TypeAlias = Literal["left", "right"]
 
 
 class Resolution(NamedTuple):
-    """Resolution of the response."""
+    """Resolution with which the response is computed."""
 
     max_decay: float  # harmonics below exp(-max_decay) are left out
     step: float  # distance of the points of a glued top, in z
@@ -67,9 +68,10 @@ strengths.
 
 
 class Pushes(NamedTuple):
-    """Uniform traction on a side, over a width (m) around a height (m) above the interface.
+    """Uniform traction on a side, over a width (m), centred at a height (m) above the interface.
 
-    With two sides each block is pushed at one end and pulled at the other, by half of the force.
+    With two sides, each block is pushed at one end and pulled at the other end, each
+    by half of the force.
     """
 
     sides: tuple[Side, ...]
@@ -83,7 +85,7 @@ class Pushes(NamedTuple):
 
 
 class BlockResponse(NamedTuple):
-    """Response of two blocks with nodes at (i + 1/2) dx."""
+    """Response of two blocks. Nodes are at (i + 1/2) dx."""
 
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
     shear: Array  # (n,): q, shear stress of the drive, divided by its mean
@@ -177,7 +179,7 @@ def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> A
 
 
 def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
-    """Step 4: return the addition of glue to K (Pa/m), the shear stress of unit travel, and C."""
+    """Step 4: return what glue adds to K (Pa/m), the shear stress at unit travel, and C."""
     spacing = top.harmonics.length / nodes
     on_interface = top.shear((np.arange(nodes) + 0.5) * spacing)
     tractions = top.solve(np.column_stack([np.ones(top.x.size), on_interface.T]))
@@ -190,7 +192,7 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
 def _pushed(
     harmonics: Harmonics, pushes: Pushes, nodes: int, resolution: Resolution
 ) -> tuple[Array, float]:
-    """Step 3: return the shear stress of a pushed block at 1 N/m, and 2 G* times its travel.
+    """Step 3: return the shear stress in a pushed block at 1 N/m, and 2 G* times the travel.
 
     The push has the harmonics 2/H `mean_sine`, and phi = mean_sine 2/H/k² at the clamp.
     """
@@ -213,8 +215,8 @@ def _pushed(
 def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) -> float:
     """Return the sum over k of m_k²/k, where m_k is the mean of sin(k y) over low < y < high.
 
-    It is a double integral of logarithms of y - y' and of y + y', which a substitution reduces to a
-    single integral.
+    The sum is a double integral of logarithms of y - y' and y + y'. A substitution
+    reduces it to a single integral.
     """
     width = high - low
 
@@ -230,7 +232,7 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) 
 
 
 def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[Array, float]:
-    """Return stress and travel of a drive from the stress of a force at the left end.
+    """Return the stress and travel of a drive from the stress due to a force at the left end.
 
     `near` and `far` are the displacements at the force and at the same height of the other end.
     """
@@ -242,8 +244,9 @@ def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[A
 def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
     """Return the pressure between blocks glued to rigid platens, divided by its mean, (n,).
 
-    Below rollers the pressure would be uniform, 1, and the top would widen by (3 - kappa)/(8 G) of
-    its length. Glue prevents this by a shear traction without a resultant.
+    With rollers the pressure would be uniform, 1, and the top would widen by the
+    share (3 - kappa)/(8 G) of its length. Glue prevents this through a shear traction
+    without resultant.
     """
     with one_blas_thread():
         harmonics = Harmonics(length, height, RESOLUTION.max_decay, pressed=True)
@@ -300,10 +303,11 @@ def _anti_plane(
 def lattice_symbol(angle: Array) -> Array:
     """Return the symbol |k| dx of the lattice for angles k dx.
 
-    |k| dx is 2 arcsin(s) = 2 s (1 + s²/6 + ...), with s = |sin(k dx/2)|. The exact symbol has a
-    kink at the shortest wave, and its entries are zero at every other distance. A smooth
-    correction, as by a finite block, would make these entries positive. All entries of this symbol
-    but the diagonal are negative.
+    |k| dx is 2 arcsin(s) = 2 s (1 + s²/6 + ...), with s = |sin(k dx/2)|. The exact
+    symbol has a kink at the shortest wave, and its entries vanish at every second
+    distance. A smooth correction, such as for a finite block, would make these
+    entries positive. All entries of the lattice symbol except the diagonal are
+    negative.
     """
     s = np.abs(np.sin(0.5 * angle))
     symbol: Array = 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
@@ -322,12 +326,13 @@ def lattice_entries(count: int) -> Array:
 
 
 def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
-    """Return K of an interface with two free ends that do not feel each other, (n, n), Pa/m.
+    """Return K (n, n), Pa/m, for an interface with two free ends that do not interact.
 
     Nodes lie at (i + 1/2) dx. A free end x = 0 adds (G*/2 pi)(12 x s/(x + s)^4 - 1/(x + s)²) to
     the shear stress of slip at s (N. Muskhelishvili, Some Basic Problems of the Mathematical Theory
-    of Elasticity, 1953). The lattice and its mirror images at both ends hold 1/(x + s)² of it. The
-    rest is averaged over the cells of x and s: it is the mixed derivative of (G*/pi) x s/(x + s)².
+    of Elasticity, 1953). The lattice and its mirror images at both ends account for 1/(x +
+    s)². The remaining term is averaged over the cells of x and s: it is the mixed
+    derivative of (G*/pi) x s/(x + s)².
     """
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i

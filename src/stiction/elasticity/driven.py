@@ -1,4 +1,4 @@
-"""Two blocks behind the machine that drives them: stiffness, shear profile, travel and windows.
+"""Two blocks and the machine that drives them: stiffness, shear profile, travel and windows.
 
 The block with its drive and the machine are springs in series. With the force F
 per unit depth, the drive's travel U, the travel X at the machine's far end, and
@@ -6,9 +6,9 @@ the machine's stiffness k,
 
     F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 
-The second equation is Betti's theorem: C is the stiffness of the block against
-its drive without slip, and slip d at the interface moves the drive by its average
-with q. Eliminating U gives
+The second equation is Betti's theorem. C is the stiffness of the block against its
+drive without slip. Slip d at the interface moves the drive by the average of d
+weighted by q. Eliminating U gives
 
     tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
 
@@ -36,7 +36,7 @@ MIN_SHEAR = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Two blocks behind their machine, an `Elasticity`. Do not write to its arrays."""
+    """Two blocks and their machine, as an `Elasticity`. Do not write to its arrays."""
 
     stiffness: Array  # (n, n): K, Pa/m
     shear: Array  # (n,): q, with mean 1
@@ -48,12 +48,12 @@ class Driven:
 
     @cached_property
     def entries(self) -> DenseEntries:
-        """K as kernels take it."""
+        """K in the form that kernels need."""
         return DenseEntries(self.stiffness.reshape(-1), len(self.stiffness), self.relief)
 
     @cached_property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, as a share of it; 0 within the error."""
+        """Largest positive off-diagonal entry of K over the diagonal. 0 if within the error."""
         off = self.stiffness - np.diag(np.diag(self.stiffness))
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
@@ -72,7 +72,7 @@ class Driven:
         return _windows_at(self, low)
 
     def travel(self, force: Any, slip: Array) -> Any:
-        """Return the travel of both drives together (m) at a force per unit depth (N/m)."""
+        """Return the total travel of both drives (m) at a force per unit depth (N/m)."""
         moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
         return moved
 
@@ -92,7 +92,8 @@ def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
 
     1. Lengthen the run until it is unstable.
     2. Shorten it from its end as long as it remains unstable, and keep it.
-    3. Move on by a share of its width, and go to 1. The last run ends with the specimen.
+    3. Move on by a share of the width, and go to step 1. The last run ends with the
+       specimen.
     """
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
@@ -142,10 +143,11 @@ def driven(
     glued: bool,
     machine: float,
 ) -> Driven:
-    """Return the response of blocks behind a machine, with the arguments of `block_response`.
+    """Return the response of blocks with a machine. For arguments see `block_response`.
 
-    If the blocks are `glued` while they are pressed, the pressure is not uniform. `machine` is the
-    stiffness of the machine for a block, half of the specimen, per unit depth (Pa).
+    If the blocks are `glued` while they are pressed, the pressure is not uniform.
+    `machine` is the stiffness of the machine per unit depth (Pa), for one block,
+    which is half of the specimen.
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)

@@ -1,9 +1,9 @@
-"""A block with its top glued to a rigid platen, from the same block with its top on rollers.
+"""A block with its top glued to a rigid platen, computed from a block with its top on rollers.
 
 Problem
 -------
-On rollers the top has v = 0, and with glue u is given, too. This needs a shear traction t(s) on the
-top with
+On rollers the top has v = 0. With glue, u is also given. This requires a shear
+traction t(s) on the top with
 
     int G(x, s) t(s) ds = u(x),   0 < x < L,                                                   (1)
 
@@ -15,10 +15,9 @@ exponents, most of them complex (M. L. Williams, Journal of Applied Mechanics 19
 Algorithm
 ---------
 1. Map the line -inf < z < inf to the top so that x falls as exp(z) towards the corner and grows
-   evenly between corners (`GluedTop`). For any exponents t dx/dz is smooth and
-   falls exponentially at both ends, so that trapezoidal sums converge
-   exponentially (F. Stenger, Numerical Methods Based on Sinc and Analytic
-   Functions, 1993).
+   evenly between corners (`GluedTop`). For any exponents, t dx/dz is smooth and falls
+   exponentially at both ends, so that trapezoidal sums converge exponentially (F. Stenger,
+   Numerical Methods Based on Sinc and Analytic Functions, 1993).
 2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|, where P is the range of z. Its
    integrals with trigonometric polynomials are known (R. Kress, Linear Integral
    Equations, 2014, section 12.3).
@@ -42,10 +41,10 @@ HEIGHTS_PER_UNIT = 0.5
 
 
 class GluedTop:
-    """Points of a glued top, and the response of the block to shear traction there.
+    """Points on a glued top, and the response of the block to shear traction at these points.
 
-    Between the corners of a flat block dx/dz is `HEIGHTS_PER_UNIT` heights, since
-    its kernels vary over a height.
+    Between the corners of a flat block, dx/dz is `HEIGHTS_PER_UNIT` heights, because
+    the kernels vary over a height.
 
     Parameters
     ----------
@@ -57,7 +56,7 @@ class GluedTop:
         Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane
         stress.
     step : float
-        Distance of the points in z.
+        Distance between the points in z.
     """
 
     def __init__(self, harmonics: Harmonics, modulus: float, kappa: float, step: float) -> None:
@@ -83,7 +82,7 @@ class GluedTop:
         self.compliance = self._compliance()
 
     def _compliance(self) -> Array:
-        """Return the matrix of (1), by which values of t dx/dz at the points are multiplied."""
+        """Return the matrix of (1), which multiplies values of t dx/dz at the points."""
         harmonics, kappa, count = self.harmonics, self.kappa, self.x.size
         distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         apart = np.abs(np.subtract.outer(self.x, self.x))
@@ -120,12 +119,12 @@ class GluedTop:
         return scaled
 
     def solve(self, displacement: Array) -> Array:
-        """Step 3: return t dx/dz (Pa m) for displacements u (m) at the points, (points, cases)."""
+        """Step 3: return t dx/dz (Pa m) for displacements u (m) with shape (points, cases)."""
         traction: Array = scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
         return traction
 
     def shear(self, x: Array) -> Array:
-        """Return the shear stress at places on the interface per unit of t at a point, 1/m."""
+        """Return the shear stress at places on the interface due to unit t at a point, 1/m."""
         harmonics, kappa = self.harmonics, self.kappa
         apart = np.abs(np.subtract.outer(x, self.x))
         sums = harmonics.sums_at_top(apart)
@@ -143,9 +142,9 @@ class GluedTop:
         return scaled
 
     def normal(self, x: Array) -> Array:
-        """Return s_yy on the interface of a pressed block per unit of t at a point, 1/m.
+        """Return s_yy on the interface of a pressed block due to unit t at a point, 1/m.
 
-        It holds for tractions without a resultant.
+        The result applies to tractions without a resultant.
         """
         harmonics, kappa = self.harmonics, self.kappa
         towards = np.subtract.outer(x, self.x)

@@ -1,4 +1,4 @@
-"""Harmonics of a block 0 <= x <= L, 0 <= y <= H with free sides: plane elasticity in closed form.
+"""Harmonics of a block 0 <= x <= L, 0 <= y <= H with free sides, in closed form.
 
 Problem
 -------
@@ -10,29 +10,30 @@ Elasticity, article 24) as a sum of independent harmonics,
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
 
 If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead. Then sin
-and cos change places, and k = pi/H, 2 pi/H, ... Free sides clamp Phi_k: it
-vanishes there with its slope. All fields follow from a function g_k(x, s), the
+and cos are exchanged, and k = pi/H, 2 pi/H, ... At free sides Phi_k is clamped:
+Phi_k and its slope vanish. All fields follow from a function g_k(x, s), the
 deflection of a clamped beam,
 
     (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
 
-For example slip d on the interface makes the shear stress -(E*/H) sum k² int
-(d²g_k/dx ds) d ds on it, with E* = 8 G/(kappa + 1).
+For example, slip d on the interface causes the shear stress -(E*/H) sum k² int
+(d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
-1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r, less two parts:
-   the reflection of each clamp by itself, (1 + k (x + s) + 2 k² x s) exp(-k (x +
-   s))/(4 k³) for the left clamp, and a `remainder`, the reflections between the
-   clamps.
+1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r,
+   minus two parts: the single reflection at each clamp, (1 + k (x + s) + 2 k² x s)
+   exp(-k (x + s))/(4 k³) for the left clamp, and a `remainder`, the reflections
+   between the clamps.
 2. Sum the beam without ends and the single reflections over k in closed form (`sums`).
-3. The remainder falls as exp(-k L), so that few harmonics give it to round-off (`reflected`). It is
-   a combination of the four solutions of (2) without a load, exp(-k x), k x
-   exp(-k x) and the same in L - x. The conditions at the clamps fix their
-   coefficients.
+3. The remainder falls as exp(-k L), so that few harmonics give it to round-off
+   (`reflected`). The remainder is a combination of the four solutions of (2)
+   without load: exp(-k x), k x exp(-k x) and the same functions of L - x. The
+   conditions at the clamps determine the coefficients.
 
-Derivatives of the four solutions follow from polynomials: an operator P(d/dx), in units of k,
-turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k x P(-1)) exp(-k x).
+Derivatives of the four solutions follow from polynomials. An operator P(d/dx), in
+units of k, turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k
+x P(-1)) exp(-k x).
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ SLOPE, CURVATURE, THIRD = (Polynomial.basis(order) for order in (1, 2, 3))
 
 
 class Sums(NamedTuple):
-    """Sums over k of k^j exp(-k z), with an array for each power j from -1 to 3."""
+    """Sums of k^j exp(-k z) over k, with an array for each power j from -1 to 3."""
 
     inverse: Array
     plain: Array
@@ -61,7 +62,7 @@ class Sums(NamedTuple):
 class Harmonics:
     """Harmonics of a block: sums in closed form, and the reflections between its sides.
 
-    In a pressed block the sums include half of the constant harmonic, k = 0.
+    In a pressed block, the sums include half of the constant harmonic, k = 0.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ class Harmonics:
         """Coefficients of the solution that is 1, without a slope, at the left clamp."""
 
     def sums(self, z: Array) -> Sums:
-        """Return the sums over k of k^j exp(-k z), for z with a positive real part."""
+        """Return the sums of k^j exp(-k z) over k, for z with a positive real part."""
         c = 0.5 * np.pi / self.height
         q, w = np.exp(-c * z), -np.expm1(-2.0 * c * z)
         coth, square = (2.0 - w) / w, 4.0 * q * q / (w * w)  # and 1/sinh²
@@ -127,12 +128,12 @@ class Harmonics:
         )
 
     def sums_at_top(self, x: Array) -> Sums:
-        """Return the sums over k of +-k^j exp(-k x), with the signs of harmonics at the top."""
+        """Return the sums of +-k^j exp(-k x) over k, with the signs of the harmonics at the top."""
         turn = 1.0 if self.pressed else 1j
         return Sums(*((turn * values).real for values in self.sums(x + 1j * self.height)))
 
     def solutions(self, operator: Polynomial, x: Array) -> Array:
-        """Return the four solutions with an operator applied, (harmonics, points, 4)."""
+        """Apply an operator to the four solutions. Return an array (harmonics, points, 4)."""
         value, slope = operator(-1.0), operator.deriv()(-1.0)
         parity = operator(1.0) / value  # -1 for odd derivatives: towards the right end x falls
         parts = []
@@ -145,7 +146,7 @@ class Harmonics:
     def reflected(
         self, weights: Array, along_x: Polynomial, x: Array, along_s: Polynomial, s: Array
     ) -> Array:
-        """Return the sum over k of weights times 4 k³ P(d/dx) Q(d/ds) remainder, (x, s)."""
+        """Return the sum (x, s) of weights times 4 k³ P(d/dx) Q(d/ds) remainder over k."""
         left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
         total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))
         return total

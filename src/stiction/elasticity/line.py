@@ -1,4 +1,4 @@
-"""Half-spaces that meet on a line: K on the nodes in closed form, and its critical windows.
+"""Half-spaces that meet on a line: K at the nodes in closed form, and critical windows.
 
 Problem
 -------
@@ -7,12 +7,11 @@ its Fourier series gives, for an even number n of nodes, the first column
 
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 
-and K_j = 0 for even j > 0. Even nodes act on odd nodes only and the reverse,
-which halves the cost of products. A window is a run of nodes on which the
-smallest eigenvalue of the block of K is at most the weakening rate W: with all
-other nodes held, it is unstable. Its eigenvector bounds the load of the first
-instability (`protocol.Windows`), and the narrowest window gives the closest
-bound.
+and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice versa, which
+halves the cost of products. A window is a run of nodes on which the smallest
+eigenvalue of the block of K is at most the weakening rate W. If all other nodes are
+held, the window is unstable. Its eigenvector bounds the load of the first
+instability (`protocol.Windows`), and the narrowest window gives the closest bound.
 
 Algorithm
 ---------
@@ -20,9 +19,10 @@ Algorithm
    width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R. Rice, J.
    Geophys. Res. 108, 2003), and move to the narrowest unstable width. If rates
    vary, use a ladder of widths.
-2. Compute the smallest eigenvalue of each width with its eigenvector (`window_mode`): by a dense
-   matrix up to `MAX_DENSE_WIDTH` nodes, above by inverse iteration with a solver
-   for Toeplitz matrices. Cache them, as all samples use them.
+2. Compute the smallest eigenvalue and its eigenvector for each width
+   (`window_mode`), with a dense matrix up to `MAX_DENSE_WIDTH` nodes, and above by
+   inverse iteration with a solver for Toeplitz matrices. The results are cached,
+   because all samples use them.
 """
 
 import bisect
@@ -55,7 +55,7 @@ MODE_RTOL = 1e-14
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
-    """Return the first column of K, (nodes,), Pa/m, for the period (m) and G* (Pa).
+    """Return the first column of K, Pa/m, with shape (nodes,), for a period (m) and G* (Pa).
 
     The number of nodes is even.
     """
@@ -70,13 +70,13 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
 
 
 def circular_entries(column: Array) -> CircularEntries:
-    """Return K with a given first column, as kernels take it."""
+    """Return K with a given first column, in the form that kernels need."""
     return CircularEntries(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Half-spaces that meet on a line of nodes, an `Elasticity`; read-only."""
+    """Half-spaces that meet on a line of nodes, as a read-only `Elasticity`."""
 
     half_spaces: HalfSpaces
     nodes: int
@@ -154,9 +154,9 @@ def _continuous_width(nodes: int, rate: float) -> int:
 def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
     """Step 1: return the widths for weakening rates from `lowest` to `highest`.
 
-    The last is the first width that is unstable at `lowest`. For a single rate there is a single
-    width, or no width if it would be much wider than `MAX_WIDTH`. Otherwise the widths come from a
-    ladder, which is the same for all samples.
+    The last width is the first that is unstable at `lowest`. For a single rate there
+    is a single width, or no width if it would be much larger than `MAX_WIDTH`.
+    Otherwise the widths come from a ladder, which is the same for all samples.
     """
     widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)

@@ -1,10 +1,10 @@
-"""The elastodynamic memory kernel of half-spaces, as a quadrature and as a short sum.
+"""The elastodynamic memory kernel of half-spaces, as a quadrature and as a sum of exponentials.
 
 Problem
 -------
-Let T = |k| c_s t. A Fourier mode of slip D and slip rate V transfers this stress along the
-interface between two identical half-spaces (velocity form, M. S. Breitenfeld and P. H. Geubelle,
-International Journal of Fracture 93, 1998):
+Let T = |k| c_s t. A Fourier mode with slip D and slip rate V transfers this stress
+along the interface between two identical half-spaces (velocity form, M. S.
+Breitenfeld and P. H. Geubelle, International Journal of Fracture 93, 1998):
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
@@ -16,31 +16,31 @@ s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode III, in mode II
     [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
 
 Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to
-a tolerance on 0 <= T <= `T_MAX`. They turn the convolution with the whole history
-into a recursion for each pair.
+a tolerance on 0 <= T <= `T_MAX`. The pairs turn the convolution with the whole
+history into a recursion for each pair.
 
 Algorithm (`fit_exponentials`)
 ------------------------------
-1. Take the inverse transform along arcs in Re s < 0 that join the branch points -i a and i a,
-   a = 1 and eta. The integrand is smooth there and decays, so that the same
-   tanh-sinh nodes (H. Takahasi and M. Mori, Publications of RIMS 9, 1974) are
-   accurate for every T (`arc_quadrature`). The result is a sum of some 280
-   exponentials. (The closed forms by Bessel functions lose digits by cancellation
+1. Compute the inverse transform along arcs in Re s < 0 that join the branch points
+   -i a and i a, a = 1 and eta. The integrand is smooth there and decays, so that
+   the same tanh-sinh nodes (H. Takahasi and M. Mori, Publications of RIMS 9, 1974)
+   are accurate for every T (`arc_quadrature`). The result is a sum of some 280
+   exponentials. (The closed forms with Bessel functions lose digits by cancellation
    above T = 7.)
 2. Shorten the sum by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
-   26, 1981). Its Gramians are Cauchy matrices, which are factorised to high
-   relative accuracy (J. Demmel, Accurate Singular Value Decompositions of
-   Structured Matrices, 1999). Before, all poles are damped by a common decay,
-   which is removed afterwards (`balanced_truncation`).
+   26, 1981). The Gramians are Cauchy matrices, which are factorised to high relative
+   accuracy (J. Demmel, Accurate Singular Value Decompositions of Structured Matrices,
+   1999). First, all poles are damped by a common decay, which is removed afterwards
+   (`balanced_truncation`).
 3. Polish the poles by variable projection: the poles move by Levenberg-Marquardt, and the
    weights follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on
    Numerical Analysis 10, 1973).
-4. Level the error: give more emphasis to times with a large error, as in Lawson's algorithm
-   (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968), and
-   polish again (`_attempt`).
-5. Accept the fit only if its error on a denser set of times is below the tolerance, and its terms
-   do not cancel (`_acceptable`). Otherwise try another common decay, then a
-   further pair.
+4. Level the error: increase the weight of times with a large error, as in Lawson's
+   algorithm (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968),
+   and polish again (`_attempt`).
+5. Accept the fit only if its error at a denser set of times is below the tolerance,
+   and its terms do not cancel (`_acceptable`). Otherwise try a different common
+   decay, and then one more pair.
 """
 
 import contextlib
@@ -85,12 +85,12 @@ _FILE_FORMAT = 2  # raise it when the fit or the file layout changes, to ignore 
 
 
 def static_stiffness(mode: str, eta: float) -> float:
-    """Return D(0) = G*/G (1): 2 (1 - 1/eta^2) in mode II, 1 in mode III."""
+    """Return D(0) = G*/G: 2 (1 - 1/eta^2) in mode II, and 1 in mode III."""
     return 1.0 if mode == "III" else 2.0 * (1.0 - 1.0 / eta**2)
 
 
 def _half_arc() -> tuple[Floats, Floats]:
-    """Step 1: return angles from the upper branch point, and weights, of half an arc."""
+    """Step 1: return angles from the upper branch point, and weights, for half an arc."""
     t = np.arange(0.0, _RULE_END, _RULE_STEP)
     angle = np.pi / (1.0 + np.exp(np.pi * np.sinh(t)))
     weight = (np.pi**2 / 4.0) * _RULE_STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
@@ -101,8 +101,8 @@ def _half_arc() -> tuple[Floats, Floats]:
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     """Step 1: return nodes s, Re s < 0, and weights w with C(T) = Re sum w exp(s T).
 
-    An arc has some 140 nodes. Only the parts of the transform that are odd across an arc
-    contribute: the shear root at |s| = 1 and the dilatational root at |s| = eta.
+    An arc has about 140 nodes. Only the parts of the transform that are odd across an
+    arc contribute: the shear root at |s| = 1 and the dilatational root at |s| = eta.
     """
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)
@@ -127,7 +127,7 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
 
 
 def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats:
-    """Return Re sum_p w_p exp(s_p T) at the dimensionless times T (any shape)."""
+    """Return Re sum_p w_p exp(s_p T) at dimensionless times T with any shape."""
     t = np.asarray(time, dtype=np.float64)
     flat, result = t.ravel(), np.empty(t.size)
     for start in range(0, t.size, _TIMES_PER_CHUNK):  # in chunks, to bound memory
@@ -137,7 +137,7 @@ def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats
 
 
 def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
-    """Return the kernel C(T) of the velocity form at times T >= 0, any shape, to about 2e-15.
+    """Return the kernel C(T) of the velocity form at times T >= 0 (any shape), to about 2e-15.
 
     C(0) = G*/G. The kernel falls so slowly, like T^-1/2 in mode II and T^-3/2 in mode III, that it
     must not be truncated.
@@ -147,10 +147,10 @@ def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
 
 @dataclasses.dataclass(frozen=True)
 class ExponentialSum:
-    """Poles and weights of a fit, with its measured error.
+    """Poles and weights of a fit, with the measured error.
 
-    `poles` (Re s < 0) and `weights` are (pairs,) arrays in units of |k| c_s. `error` is the largest
-    |C - sum| that was measured on 0 <= T = |k| c_s t <= T_MAX.
+    `poles` (Re s < 0) and `weights` are (pairs,) arrays in units of |k| c_s. `error`
+    is the largest measured |C - sum| for 0 <= T = |k| c_s t <= T_MAX.
     """
 
     poles: Complex
@@ -163,7 +163,7 @@ class ExponentialSum:
 
 
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
-    """Return times on [0, T_MAX], dense at first, and with random phases on later scales."""
+    """Return times on [0, T_MAX]. They are dense at first, with random phases on later scales."""
     rng = np.random.default_rng(seed)
     scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
@@ -174,7 +174,8 @@ def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
 def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
     """Step 2: return the pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)).
 
-    Updates are products only, so that small pivots keep their relative accuracy.
+    Updates consist only of products, so that small pivots keep their relative
+    accuracy.
     """
     a, columns = b.copy(), []
     diagonal = np.abs(a) ** 2 / (-2.0 * s.real)
@@ -192,7 +193,7 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
-    """Step 2: return the poles of a short model for sum w exp(s T) by balanced truncation."""
+    """Step 2: return the poles of a short model for sum w exp(s T), from balanced truncation."""
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)
@@ -258,7 +259,7 @@ class _Polish:
 
 
 def _acceptable(poles: Complex, weights: Complex) -> bool:
-    """Step 5: return whether weights are small, poles decay and no two terms nearly cancel."""
+    """Step 5: return whether weights are small, poles decay, and no two terms nearly cancel."""
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
     gap = np.abs(poles[:, None] - poles[None, :]) / np.abs(poles)[:, None]
@@ -269,7 +270,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
 def _attempt(
     arcs: tuple[Complex, Complex], pairs: int, fit: _Polish, tolerance: float, decay: float
 ) -> tuple[Complex, Complex]:
-    """Steps 2 to 4: return the best fit with a number of pairs and a common decay."""
+    """Steps 2 to 4: return the best fit with a given number of pairs and a common decay."""
     # 2. The first poles.
     shift = _MIN_DECAY_RATE * decay / _MIN_DECAY
     poles = balanced_truncation(arcs[0] - shift, arcs[1], pairs) + shift
@@ -292,9 +293,10 @@ def _attempt(
 
 
 def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
-    """Return a short sum of exponentials whose measured error is below the tolerance.
+    """Return a short sum of exponentials with a measured error below the tolerance.
 
-    `eta` is c_d/c_s, which mode III does not use. The tolerance is absolute, and C(0) = G*/G.
+    `eta` is c_d/c_s. Mode III does not use it. The tolerance is absolute, and C(0) =
+    G*/G.
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
@@ -325,7 +327,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
 
 @cache
 def kernel_sum(mode: str, eta: float, tolerance: float = 1e-6) -> ExponentialSum:
-    """Return the sum of `fit_exponentials` from memory, from disk, or by a fit (about 1 s)."""
+    """Return the sum from `fit_exponentials`: from memory, from disk, or from a fit (about 1 s)."""
     eta = 1.0 if mode == "III" else float(eta)
     text = f"{_FILE_FORMAT} {mode} {eta.hex()} {float(tolerance).hex()} {T_MAX.hex()}"
     folder = private_folder(cache_folder() / "fitted")

@@ -1,18 +1,18 @@
-"""K - W of an interface by fast Fourier transform: products, conjugate gradients, eigenvectors.
+"""K - W on an interface by fast Fourier transforms: products, linear solver, eigenvectors.
 
 Problem
 -------
-K is given by its symbol (`protocol`), W >= 0 is the weakening rate of each node (Pa/m), and
-A = K - diag(W). `inside` marks a set S of nodes, and x is zero outside. Two problems are solved
-without a matrix in memory:
+K is given by its symbol (`protocol`), W >= 0 is the weakening rate at each node
+(Pa/m), and A = K - diag(W). `inside` marks a set S of nodes, and x is zero outside
+S. Two problems are solved without a matrix in memory:
 
     (A + spring phi phi')_SS x_S = right_S,                                                   (1)
     A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
 
 In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff
 spring the matrix is positive definite even if A has a single direction of
-negative curvature, close to phi. States on and beyond the turning point of the
-load can be computed in this way (`turning_point`). Kernels take flat arrays, so
+negative curvature, close to phi. In this way, states at and beyond the turning
+point of the load can be computed (`turning_point`). Kernels take flat arrays, so
 that the same code serves lines and planes.
 
 Algorithm for (1), `solve_inside`
@@ -20,14 +20,15 @@ Algorithm for (1), `solve_inside`
 Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimization, 2006,
 algorithm 5.3) with the textbook's r, alpha and beta. z is the preconditioned residual.
 
-1. Precondition the residual: z = M r, cut to S, with M = 1/(K(k) + W/2) on Fourier modes and the
-   mean W. If a soft mode y is given, with y'Ay about 1, add y y' to M. Close to a
-   turning point an eigenvalue of A is much smaller than the others. With its
-   eigenvector as y it does not cost iterations.
-2. Take the direction z + beta times the former direction, and multiply it by the matrix.
+1. Precondition the residual: z = M r, restricted to S. M is 1/(K(k) + W/2) on
+   Fourier modes, with the mean W. If a soft mode y is given, with y'Ay about 1, add
+   y y' to M. Close to a turning point, one eigenvalue of A is much smaller than the
+   others. If y is its eigenvector, no extra iterations are needed.
+2. The new direction is z + beta times the previous direction. Multiply it by the
+   matrix.
 3. If the curvature along the direction is not positive, stop: A is not positive definite on S.
-4. Step to the minimum along the direction, and go to 1. Stop once no residual exceeds the
-   tolerance.
+4. Step to the minimum along the direction, and go to step 1. Stop when no residual
+   exceeds the tolerance.
 
 Departure: the residual is measured by its largest entry, which is a stress.
 
@@ -37,8 +38,9 @@ LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific Computing 23
 
 1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x - lambda x| is small.
 2. Make x, the preconditioned residual and the last direction orthonormal.
-3. Solve the eigenproblem in the space of these three. The combination with the smallest lambda is
-   the next x, and its part without x the next direction. Go to 1.
+3. Solve the eigenproblem in the space of these three. The combination with the
+   smallest lambda is the next x. Its part without x is the next direction. Go to
+   step 1.
 """
 
 import math
@@ -65,7 +67,7 @@ Mask = NDArray[np.bool_]
 
 
 class Transform(NamedTuple):
-    """Shapes and axes of an interface's transform; read-only, shared by threads."""
+    """Shapes and axes for the transform on an interface. It is read-only and shared by threads."""
 
     shape: tuple[int, int]  # of a profile; (1, nodes) on a line, so that a kernel serves both
     half: tuple[int, int]  # of its real transform
@@ -75,7 +77,7 @@ class Transform(NamedTuple):
 
 
 def make_transform(shape: tuple[int, ...]) -> Transform:
-    """Return the transform of profiles with a shape."""
+    """Return the transform for profiles with a given shape."""
     rows, columns = shape if len(shape) == 2 else (1, *shape)
     axes = np.arange(len(shape))
     return Transform((rows, columns), (rows, columns // 2 + 1), axes, axes[:-1], axes[-1:])
@@ -113,7 +115,7 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
 def convolve(
     transform: Transform, multiplier: Array, field: Array, spectrum: Array, out: Array
 ) -> None:
-    """Write a field with its Fourier modes multiplied to `out`. `spectrum` is a workspace."""
+    """Multiply the Fourier modes of a field and write it to `out`. `spectrum` is a workspace."""
     forward(transform, field, spectrum)
     for i in range(spectrum.size):
         spectrum[i] *= multiplier[i]
@@ -121,7 +123,7 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W of an interface with workspaces for its solvers, for a single thread at a time."""
+    """K - W on an interface, with workspaces for solvers. Only one thread may use it at a time."""
 
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m
@@ -137,7 +139,7 @@ class Operator(NamedTuple):
 
 
 def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
-    """Return the operator of a symbol and a weakening rate (Pa/m), a number or on the nodes."""
+    """Return the operator for a symbol and a weakening rate (Pa/m), a number or an array."""
     rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), shape).flatten()
     typical = float(rates[rates > 0.0].mean()) if (rates > 0.0).any() else float(symbol.max())
     flat = symbol.flatten()
@@ -168,7 +170,7 @@ def product(operator: Operator, field: Array, out: Array) -> None:
 def dot(first: Array, second: Array, count: int) -> float:
     """Return the inner product of the first `count` entries, in a single thread.
 
-    The sum by numpy depends on the number of its threads.
+    A sum by numpy depends on its number of threads.
     """
     a = zeros()
     b = zeros()
@@ -253,9 +255,10 @@ def solve_inside(
 ) -> tuple[int, int]:
     """Solve (1) by conjugate gradients.
 
-    x is a guess, then the solution, and `residual` its residual, as by `residual_of`. Both are zero
-    outside. Returns SOLVED (no residual above the tolerance, Pa), NEGATIVE_CURVATURE (along
-    `operator.direction`) or EXHAUSTED, and the number of iterations.
+    On entry x is a guess, and on return the solution. `residual` is the residual of
+    x, as in `residual_of`. Both are zero outside the set. Returns SOLVED (no residual
+    above the tolerance, Pa), NEGATIVE_CURVATURE (along `operator.direction`) or
+    EXHAUSTED, and the number of iterations.
     """
     z, direction, image = operator.z, operator.direction, operator.image
     restrict(residual, inside)
@@ -298,8 +301,8 @@ def solve_inside(
 def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
     """Step 3: combine the vectors of a basis into the next x and the next direction.
 
-    basis[0] becomes the combination of all vectors, basis[2] and `out` the combination without the
-    first.
+    basis[0] becomes the combination of all vectors. basis[2] and `out` become the
+    combination without the first vector.
     """
     for i in range(out.size):
         total = 0.0
@@ -313,10 +316,11 @@ def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
 def lowest_eigenvector(
     operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
 ) -> tuple[float, int]:
-    """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m), and iterations.
+    """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m) and iterations.
 
-    The vector is a guess, then the eigenvector, with unit norm, positive sum, and zero outside. The
-    search stops once the norm of A y - lambda y is below the tolerance.
+    On entry the vector is a guess. On return it is the eigenvector, with unit norm
+    and positive sum, and is zero outside the set. The search stops when the norm of A
+    y - lambda y is below the tolerance.
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction

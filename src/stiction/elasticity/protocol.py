@@ -1,17 +1,17 @@
-"""The elasticity that methods need of the solids on both sides of an interface.
+"""The elasticity of the solids on both sides of an interface, as methods need it.
 
-`Line` (half-spaces that meet on a line) and `Driven` (two blocks behind a
-machine) are complete. `HalfSpaces` on a plane have the symbol of K only, as K
-itself would not fit in memory, and slip does not relieve the load. This file
-holds records. Their kernels are in `stiffness` and `weakest`.
+`Line` (half-spaces that meet on a line) and `Driven` (two blocks and their machine)
+are complete. `HalfSpaces` on a plane provide only the symbol of K, because K would
+not fit in memory, and slip does not relieve the load. This file defines records.
+The kernels for these records are in `stiffness` and `weakest`.
 
-Slip has one component, along x, the direction of the load. With a wave vector
-(kx, ky) of length k and a = (kx/k)^2 the stiffness between half-spaces is
+Slip has one component, along x, the direction of the load. For a wave vector (kx,
+ky) with length k and a = (kx/k)^2, the stiffness between half-spaces is
 
     K(k) = (G* a + G (1 - a)) k/2,
 
-mode II along x and mode III along y (P. Geubelle and J. Rice, Journal of the Mechanics and Physics
-of Solids 43, 1995). A line has the modulus of its mode.
+with mode II along x and mode III along y (P. Geubelle and J. Rice, Journal of the
+Mechanics and Physics of Solids 43, 1995). A line has the modulus of its mode.
 """
 
 import functools
@@ -29,7 +29,7 @@ SMALLEST_EIGENVALUE = 0.5788869418506
 
 
 class HalfSpaces(NamedTuple):
-    """Half-spaces, by their periods (m) and moduli (Pa) along each direction.
+    """Half-spaces, described by periods (m) and moduli (Pa) along each direction.
 
     A line has the modulus G* of its mode, and a plane the moduli G* and G.
     """
@@ -42,7 +42,7 @@ class HalfSpaces(NamedTuple):
         return _symbol(*self, shape)
 
     def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
-        """Return h_n of a weakening rate (Pa/m) in each direction, m."""
+        """Return h_n, m, in each direction, for a weakening rate (Pa/m)."""
         return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in self.moduli)
 
 
@@ -63,13 +63,14 @@ def _symbol(
 
 
 class Windows(NamedTuple):
-    """Runs of nodes that are just unstable by themselves.
+    """Runs of nodes that are just unstable in isolation.
 
-    The smallest eigenvalue of the block of K on a run is at most the weakening rate W in it. If K
-    has no positive entry off its diagonal, the eigenvector y is positive, and K y <= W y. Therefore
-    <s, y>/<p, y> bounds the load of the first instability from above, where s is the strength less
-    initial stress and p the load profile. This is the criterion of Uenishi and Rice (2003) in a
-    form that is strict on the grid.
+    On a run, the smallest eigenvalue of the block of K is at most the weakening rate
+    W. If K has no positive off-diagonal entry, the eigenvector y is positive, and K y
+    <= W y. Therefore <s, y>/<p, y> bounds the load of the first instability from
+    above. Here s is the strength minus initial stress, and p is the load profile.
+    This is the criterion of Uenishi and Rice (2003) in a form that is strict on the
+    grid.
     """
 
     rates: Array  # (count,): smallest unstable weakening rate of each, Pa/m, never rising
@@ -83,7 +84,7 @@ NONE = Windows(np.empty(0), _NO_NODES, _NO_NODES, np.empty((1, 1)))
 
 
 class CircularEntries(NamedTuple):
-    """K of a periodic line: its first column (n,), and its odd entries three times in a row, Pa/m.
+    """K of a periodic line, Pa/m: the first column (n,), and the odd entries three times in a row.
 
     With the strip, products need no index arithmetic.
     """
@@ -93,7 +94,7 @@ class CircularEntries(NamedTuple):
 
 
 class DenseEntries(NamedTuple):
-    """K of two blocks, row by row in a flat array, and the relief of the drive.
+    """K of two blocks, row by row in a flat array, and the relief by slip.
 
     Slip d lowers the mean stress by relief <q, d>/n. `relief` is in Pa/m, and 0 under a dead load.
     """
@@ -104,25 +105,25 @@ class DenseEntries(NamedTuple):
 
 
 class Elasticity(Protocol):
-    """Protocol of the elasticity of two solids that meet on nodes."""
+    """Protocol for the elasticity of two solids that meet at nodes."""
 
     @property
     def entries(self) -> Any:
-        """K as kernels take it: `CircularEntries` or `DenseEntries`."""
+        """K in the form that kernels need: `CircularEntries` or `DenseEntries`."""
 
     @property
     def half_spaces(self) -> HalfSpaces | None:
-        """The half-spaces, which give the symbol of K; `None` for blocks, which have no symbol."""
+        """The half-spaces, which give the symbol of K. `None` for blocks, which have no symbol."""
 
     @property
     def relief(self) -> float:
-        """Relief h of the load per mean of p d, Pa/m; 0 without a machine."""
+        """Relief h of the load per mean of p d, Pa/m. 0 without a machine."""
 
     @property
     def positive(self) -> float:
-        """Largest positive entry of K off its diagonal, as a share of the diagonal.
+        """Largest positive off-diagonal entry of K, as a share of the diagonal.
 
-        If it is not zero, slip at one node can stop another.
+        If it is not zero, slip at one node can stop slip at other nodes.
         """
 
     def block(self, nodes: NDArray[np.int64]) -> Array:
@@ -131,6 +132,6 @@ class Elasticity(Protocol):
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 
-        For a single rate they are exact. Otherwise they give a bound, and are the same for all
-        samples.
+        For a single rate the windows are exact. Otherwise they give a bound, and are
+        the same for all samples.
         """

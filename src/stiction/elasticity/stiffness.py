@@ -2,19 +2,20 @@
 
 Problem
 -------
-Kernels need K d for a slip d that is zero except at some nodes, and single entries K_ij (Pa/m), for
-lines and blocks alike. numba compiles a kernel for each type of entries (`CircularEntries` of a
-line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and `apply_outside` are
-placeholders whose Python bodies are never run: numba replaces them by the overload for the type of
-entries. If a type has no overload, the compilation of a kernel raises an error.
+For lines and for blocks, kernels need single entries K_ij (Pa/m), and K d for a slip d that
+is zero except at some nodes. numba compiles a kernel for each type of entries
+(`CircularEntries` of a line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and
+`apply_outside` are placeholders whose Python bodies are never run: numba replaces them by
+the overload for the type of entries. If a type has no overload, the compilation of a kernel
+raises an error.
 
 Algorithm
 ---------
-`apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so that nodes of even
-number act on nodes of odd number only, and the reverse.
+`apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so
+even nodes act only on odd nodes, and vice versa.
 
-1. For each parity, take the slipping nodes of this parity. They act on n/2 targets, the nodes of
-   the other parity.
+1. For each parity, take the slipping nodes with this parity. They act on n/2
+   targets, which are the nodes with the other parity.
 2. The entries of K from a node to its targets are n/2 consecutive numbers of `strip`, the odd
    entries of the first column three times over. Add them, times the slip, for
    four nodes at once, so that each target is read and written once for four
@@ -45,14 +46,14 @@ def entry(entries: Any, i: int, j: int) -> float:
 
 
 def mean_relief(entries: Any, profile: Array, slip: Array) -> float:
-    """Return by how much slip lowers the mean stress of the interface, Pa; 0 under a dead load."""
+    """Return the amount, Pa, by which slip lowers the mean stress. 0 under a dead load."""
     raise NotImplementedError
 
 
 def apply(
     entries: Any, nodes: Array, count: int, values: Array, halves: Array, product: Array
 ) -> None:
-    """Multiply K by a field with `values` at the first `count` of the `nodes`, zero elsewhere.
+    """Multiply K by a field: `values` at the first `count` of the `nodes`, and zero elsewhere.
 
     The result is written to `product` (n,). `halves` (2, n/2) is a workspace.
     """
@@ -68,9 +69,10 @@ def apply_outside(
     halves: Array,
     product: Array,
 ) -> None:
-    """Multiply as `apply` does, but for blocks write the nodes that do not slip only.
+    """Multiply as `apply` does, but for blocks write only the nodes that do not slip.
 
-    On a line a part of the product costs as much as all of it, so it is written at all nodes.
+    On a line, a part of the product costs as much as the whole product, so all nodes
+    are written.
     """
     raise NotImplementedError
 
@@ -79,7 +81,7 @@ def apply_outside(
 def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add the contribution by four nodes to half of a product."""
+    """Add the contribution of four nodes to half of a product."""
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values
@@ -103,7 +105,7 @@ def apply_circular(
     halves: Array,
     product: Array,
 ) -> None:
-    """Multiply K of a line as `apply` does."""
+    """Multiply by K of a line, as `apply` does."""
     strip = entries.strip
     half = halves.shape[1]
     for parity in range(2):

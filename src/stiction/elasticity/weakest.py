@@ -1,22 +1,23 @@
-"""The lowest upper bound of the load by critical windows, with its multiplier.
+"""The lowest upper bound of the load from critical windows, with its multiplier.
 
 Problem
 -------
 A window (`protocol.Windows`) is a run of nodes with weights y > 0 for which K y <= W y if all its
-nodes weaken at the rate W or faster. Then <s, y>/<p, y> bounds the load of the first instability
-from above, where s is the strength less initial stress (Pa) and p the load profile. Find the lowest
-of these bounds over all windows and all places.
+nodes weaken at the rate W or faster. Then <s, y>/<p, y> bounds the load of the first
+instability from above. Here s is the strength minus initial stress (Pa), and p is the load
+profile. Find the lowest bound over all windows and all places.
 
 Algorithm
 ---------
 1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
-   weakening rate than any node has. Stop once a narrower window is unstable
-   anywhere, since wider windows bound the load less closely.
+   weakening rate than any node has. Stop if a narrower window is unstable anywhere, because
+   wider windows give a looser bound.
 2. If the rate varies, count for each node how many nodes in a row weaken fast enough.
-3. A window with a fixed place (on blocks) has a single bound. A window that may lie anywhere (on a
-   line) is tried at every sixteenth of its width, because a weighted mean hardly
-   changes over this distance, and then at all nodes around the best place. The
-   lowest minimum may be missed, but every place gives a valid bound.
+3. A window with a fixed place (on blocks) has a single bound. A window that may lie
+   anywhere (on a line) is first tried at steps of a sixteenth of its width, because
+   a weighted mean hardly changes over this distance. It is then tried at all nodes
+   around the best place. The lowest minimum may be missed, but every place gives a
+   valid bound.
 4. Compare with sliding of the whole interface: y = 1 everywhere.
 """
 
@@ -33,14 +34,14 @@ NOWHERE = -1  # no place is better
 
 @jit_inside
 def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
-    """Return the weighted sum of a field over a window, on the circle."""
+    """Return the weighted sum of a field over a window on the circle."""
     first = min(width, values.shape[0] - start)
     return dot(values[start:], mode, first) + dot(values, mode[first:], width - first)
 
 
 @jit_inside
 def _count_fast(rate: Array, threshold: float, length: Array) -> None:
-    """Step 2: write how many nodes in a row, from each node on, weaken at the threshold rate."""
+    """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
     n = rate.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -53,10 +54,10 @@ def _count_fast(rate: Array, threshold: float, length: Array) -> None:
 def weakest_window(
     excess: Array, profile: Array, rate: Array, windows: Windows, bound: float, allowed: Array
 ) -> tuple[float, int, int]:
-    """Steps 1 to 3: return the lowest bound (Pa), its window and the window's first node.
+    """Steps 1 to 3: return the lowest bound (Pa), its window, and the first node of the window.
 
-    If no window gives a lower bound than `bound`, it returns `bound`, `NO_WINDOW` and 0. `allowed`
-    (n,) is a workspace.
+    If no window gives a bound below `bound`, return `bound`, `NO_WINDOW` and 0.
+    `allowed` (n,) is a workspace.
     """
     n = rate.shape[0]
     best, window, start = bound, NO_WINDOW, 0
@@ -116,7 +117,7 @@ def weakest_window(
 def window_bound(
     excess: Array, profile: Array, rate: Array, windows: Windows, allowed: Array, y: Array
 ) -> float:
-    """Return the lowest bound by windows and by sliding as a whole, Pa, and write its multiplier.
+    """Return the lowest bound from windows and from sliding as a whole, Pa. Write its multiplier.
 
     The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
     """

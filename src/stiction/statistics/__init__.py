@@ -1,9 +1,9 @@
 """Statistics of samples: densities, quantiles, agreement with tests.
 
-`densities` smooths a sample within its bounds. `estimates` has means, standard deviations and
-quantiles with their errors. `moments` has the exact moments of the nucleation stress, which are
-public in `stiction.theory`. `agreement` comes from `stiction.inference`. Each function is imported
-on first use.
+`densities` smooths a sample within its bounds. `estimates` computes means, standard
+deviations and quantiles with errors. `moments` computes the exact moments of the
+nucleation stress, which are public in `stiction.theory`. `agreement` is imported
+from `stiction.inference`. Each function is imported on first use.
 """
 
 from difflib import get_close_matches

@@ -1,4 +1,4 @@
-"""Probability densities within bounds, by a kernel that is reflected at the bounds.
+"""Probability densities within bounds, from a kernel that is reflected at the bounds.
 
 Problem: estimate the density of N independent values, without crossing given bounds.
 
@@ -7,9 +7,10 @@ and Data Analysis, 1986:
 
 1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
 2. Count the values in the cells of the grid.
-3. Choose the bandwidth h by his Eq. 3.31, 0.9 min(standard deviation, interquartile
-   range/1.34) N^(-1/5), at least half a cell.
-4. Smooth the counts by a Gaussian kernel with the standard deviation h, reflected at the ends.
+3. Choose the bandwidth h with Eq. 3.31 of this book, 0.9 min(standard deviation,
+   interquartile range/1.34) N^(-1/5), but at least half a cell.
+4. Smooth the counts with a Gaussian kernel of standard deviation h, reflected at
+   the ends.
 5. Compute the sampling error from the integral of the squared kernel, 1/(2 sqrt(pi) h).
 """
 
@@ -56,7 +57,7 @@ class Density(Result):
 
 @checked
 def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, None)) -> Density:
-    """Estimate the density of independent values, smoothed without crossing the bounds.
+    """Estimate the density of independent values. Smoothing does not cross the bounds.
 
     Parameters
     ----------
@@ -67,9 +68,10 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
 
     Notes
     -----
-    A Gaussian kernel with the bandwidth of Silverman (1986, Eq. 3.31) smooths the values on a fine
-    grid and is reflected at the bounds. It smooths a density with two peaks more than necessary,
-    and the slope at a bound is zero. Without a bound, the grid extends beyond the sample.
+    A Gaussian kernel with the bandwidth of Silverman (1986, Eq. 3.31) smooths the
+    values on a fine grid, and is reflected at the bounds. A density with two peaks is
+    smoothed more than necessary, and the slope at a bound is zero. Without a bound,
+    the grid extends beyond the sample.
 
     Examples
     --------

@@ -17,14 +17,14 @@ from stiction.base.representation import Result, Row, Summary
 
 @dataclass(frozen=True)
 class WithError:
-    """Estimated number and its standard error, zero if it is exact."""
+    """Estimated number and its standard error, which is zero if the number is exact."""
 
     value: float
     error: float = 0.0
 
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
-    """Return finite values, at least `fewest`, as a flat array."""
+    """Return finite values as a flat array with at least `fewest` entries."""
     array = check("values", values, Numbers).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
@@ -35,7 +35,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
 
 
 def mean(values: Any) -> WithError:
-    """Estimate the mean of independent values (samples,), in their unit."""
+    """Estimate the mean of independent values (samples,), in the unit of the values."""
     sample = as_sample(values)
     return WithError(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
 
@@ -43,8 +43,8 @@ def mean(values: Any) -> WithError:
 def standard_deviation(values: Any) -> WithError:
     """Estimate the standard deviation of independent values (samples,), in their unit.
 
-    The error follows from the fourth moment by the delta method, sqrt((m_4 - s^4)/N)/(2 s). It does
-    not assume a Gaussian distribution.
+    The error, sqrt((m_4 - s^4)/N)/(2 s), follows from the fourth moment with the
+    delta method. A Gaussian distribution is not assumed.
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))
@@ -63,7 +63,7 @@ class Quantiles(Result):
     value : (m,) array
         Quantiles of the sample, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of their 95 % confidence intervals. Infinite if the sample is too
+        Ends of the 95 % confidence intervals. An end is infinite if the sample is too
         small to bound a quantile.
     unit : str
         Unit of the values, if they state a unit, as an `xarray.DataArray` does.
@@ -93,15 +93,16 @@ def quantiles(values: Any, probability: Numbers) -> Quantiles:
     Parameters
     ----------
     values : (samples,) array
-        Values, for example critical stresses by `monte_carlo`, Pa.
+        Values, for example critical stresses from `monte_carlo`, Pa.
     probability : float or (m,) array
         Probabilities of the quantiles, between 0 and 1, exclusive.
 
     Notes
     -----
-    The number of values below the p-quantile is binomial (N, p). The interval ends at the order
-    statistics between whose ranks this number lies with a probability of 95 % (David and Nagaraja,
-    2003, Sec. 7.1). The coverage is exact for continuous distributions, rounded up to whole ranks.
+    The number of values below the p-quantile is binomial (N, p). The ends of the interval
+    are order statistics. The number lies between their ranks with a probability of 95 %
+    (David and Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous
+    distributions, rounded up to whole ranks.
 
     Examples
     --------

@@ -17,7 +17,7 @@ from stiction.random.fields import RandomField
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NucleationStatistics(Result):
-    """Mean and variance of the nucleation stress tau_n at a point, as a load tau_0.
+    """Mean and variance of the nucleation stress tau_n at a point. tau_n is a load tau_0.
 
     Attributes
     ----------
@@ -68,12 +68,13 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     Notes
     -----
     Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
-    integral of the correlation of tau_p and the weights. On a periodic interface it is a sum over
-    wave vectors, the spectrum of tau_p times the squared transform of the weight. The correlation
-    of tau_p follows by Hermite expansion (Grigoriu, 1995).
+    integral of the correlation of tau_p and the weights. On a periodic interface, the
+    integral is a sum over wave vectors of the spectrum of tau_p times the squared transform
+    of the weight. The correlation of tau_p follows from a Hermite expansion (Grigoriu,
+    1995).
 
     On a plane tau_n is the average over the middle ellipse of `LocalCriterion`.
-    The method takes the least over several ellipses, which has no closed-form
+    The method takes the minimum over several ellipses, which has no closed-form
     moments.
 
     Examples
@@ -100,7 +101,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 
 
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
-    """Return the share of Var[tau_p] at each wave of `Interface.transform`; the sum is 1."""
+    """Return the share of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
     interface = problem.interface
     # The spectrum is the transform of the correlation. A mode stands for its
     # conjugate, too.
@@ -110,7 +111,7 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
-    """Return unit of the strength (Pa), load profile and initial stress, if all are uniform.
+    """Return the unit of the strength (Pa), the load profile and initial stress if all are uniform.
 
     The unit of friction coefficients is the normal pressure. Raises an `InputError` if any of them
     varies along the interface.
