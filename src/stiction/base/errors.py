@@ -28,13 +28,13 @@ class InputError(ValueError):
     Parameters
     ----------
     problems : str or iterable of str
-        A text for each mistake, with the key or argument, the value given and the
+        A message for each mistake, with the key or argument, the given value and the
         valid values.
 
     Attributes
     ----------
     problems : tuple of str
-        The same texts.
+        The same messages.
     """
 
     def __init__(self, problems: str | Iterable[str]) -> None:
@@ -46,7 +46,7 @@ class InputError(ValueError):
 
 
 def printable(text: str) -> str:
-    """Return a text with escapes for all letters that could steer a terminal."""
+    """Return text with escapes for all characters that could control a terminal."""
     return "".join(
         char if char.isprintable() or char in "\n\t" else repr(char)[1:-1] for char in text
     )
@@ -57,7 +57,7 @@ class AccuracyWarning(UserWarning):
 
 
 class UnitWarning(UserWarning):
-    """A value that no solid has. It is probably in another unit than assumed."""
+    """A value that no solid has. It is probably not in the assumed unit."""
 
 
 class RunError(RuntimeError):
@@ -73,7 +73,7 @@ class WorkerError(RunError):
 
 
 def unknown(given: str, valid: Iterable[str]) -> str:
-    """Return a text that refuses a name and offers the nearest valid name."""
+    """Return a message that refuses a name and suggests the nearest valid name."""
     names = list(valid)
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     near = nearest(given, names)
@@ -82,20 +82,20 @@ def unknown(given: str, valid: Iterable[str]) -> str:
 
 
 def nearest(given: str, valid: Sequence[str]) -> str:
-    """Return the valid name that is most like a given name, in any case, or ''."""
+    """Return the valid name that is most similar to a given name, ignoring case, or ''."""
     by_case = {name.lower(): name for name in reversed(valid)}
     near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
     return by_case[near[0]] if near else _SYMBOLS.get(given, "")
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
-    """Return the same text after the purpose of the name."""
+    """Return the same message, preceded by the purpose of the name."""
     return f"{what}: {unknown(given, valid)}"
 
 
 @contextmanager
 def prefixed(name: str, mark: str = ": ") -> Iterator[None]:
-    """Put a name before all mistakes that are found inside."""
+    """Put a name before all mistakes that are found inside the context."""
     try:
         yield
     except InputError as error:
@@ -126,11 +126,11 @@ class Warned(NamedTuple):
         return self.text.format(samples=shown, worst=self.worst)
 
     def after(self, first: int) -> Warned:
-        """Return the warning with the numbers of its samples, where `first` is the first number."""
+        """Return the warning with the numbers of its samples. `first` is the first number."""
         return self._replace(numbers=tuple(first + number for number in self.numbers))
 
     def unnumbered(self) -> Warned:
-        """Return the warning without numbers of samples, which count within a part only."""
+        """Return the warning without numbers of samples, which are valid only within a part."""
         return self._replace(numbers=())
 
 
@@ -139,10 +139,10 @@ _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=No
 
 @contextmanager
 def collect_warnings() -> Iterator[list[Warned]]:
-    """Collect the warnings of this package in this thread, and in those that run in its context.
+    """Collect the package's warnings in this thread, and in threads that run in its context.
 
-    `warnings.catch_warnings` changes the whole process: two threads would take each
-    other's.
+    `warnings.catch_warnings` changes the whole process, so two threads would catch
+    each other's warnings.
     """
     warned: list[Warned] = []
     token = _collected.set(warned)
@@ -154,7 +154,7 @@ def collect_warnings() -> Iterator[list[Warned]]:
 
 @contextmanager
 def merge_warnings() -> Iterator[list[Warned]]:
-    """Collect warnings and issue them at the end, a single warning for each doubt."""
+    """Collect warnings. At the end, issue a single warning for each doubt."""
     caught: list[Warned] = []
     try:
         with collect_warnings() as caught:
@@ -167,8 +167,8 @@ def merge_warnings() -> Iterator[list[Warned]]:
 def merged(caught: Iterable[Warned]) -> list[Warned]:
     """Return warnings without repetition.
 
-    Texts that differ only in numbers become a single text with ranges. Warnings about
-    samples become a single warning that counts all samples.
+    Messages that differ only in numbers become a single message with ranges. Warnings
+    about samples become a single warning that counts all samples.
     """
     groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
     for warning in caught:
@@ -188,12 +188,12 @@ def merged(caught: Iterable[Warned]) -> list[Warned]:
 
 
 def texts_of(caught: Iterable[Warned]) -> list[str]:
-    """Return the texts of collected warnings, without repetition."""
+    """Return the messages of collected warnings, without repetition."""
     return [str(one) for one in merged(caught) if one.affected or not one.total]
 
 
 def _with_ranges(texts: Sequence[str]) -> str:
-    """Return texts that differ only in numbers as one: '3 to 5 m' for '3 m' and '5 m'."""
+    """Merge messages that differ only in numbers: '3 to 5 m' for '3 m' and '5 m'."""
     between, text = _NUMBER.split(texts[0]), ""
     for start, *numbers in zip(between, *map(_NUMBER.findall, texts), strict=False):
         ends = sorted(
@@ -206,7 +206,7 @@ def _with_ranges(texts: Sequence[str]) -> str:
 
 
 def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
-    """Issue an `AccuracyWarning` about some of the samples that are computed together.
+    """Issue an `AccuracyWarning` about some of the samples that were computed together.
 
     Call it even if it concerns no sample, because all computed samples are counted.
 

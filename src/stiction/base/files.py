@@ -1,8 +1,8 @@
-"""Files that are whole or absent, archives of arrays, and the folders of the cache.
+"""Files that are complete or absent, archives of arrays, and folders of the cache.
 
-Files may come from strangers. Every reader of the package takes its bytes from
-`read_regular` or from `content_of`, and looks at the size of its result before it takes
-memory.
+Files may come from strangers. Every reader in the package gets its bytes from
+`read_regular` or `content_of`, and checks the size of its result before it
+allocates memory.
 """
 
 import atexit
@@ -45,15 +45,15 @@ def read_regular(
 ) -> bytes:
     """Return the content of a regular file.
 
-    An `InputError` refuses a file of another kind, or a file that is too large. Other
-    errors of the system (an OSError) pass. The steps are:
+    Raises an `InputError` if the file is not regular or is too large. Other errors of
+    the system (OSError) are passed on. The steps are:
 
-    1. Look at the kind of the file before it is opened, because opening a device may act
-       on it.
-    2. Open the file without waiting, and look again, because another file may have taken
-       its place.
-    3. Read as many bytes as the file had then. Files that the system makes up, as in
-       /proc, have 0.
+    1. Check the type of the file before opening it, because opening a device may act
+       on the device.
+    2. Open the file without waiting, and check again, because the file may have been
+       replaced.
+    3. Read as many bytes as the file had then. Files that the system generates, such
+       as in /proc, have size 0.
     """
     extra = getattr(os, "O_NONBLOCK", 0)
     if not follow_links:
@@ -85,7 +85,7 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def _near_file(path: Path) -> str:
-    """Return a question that offers a file of the same name in another case, or ''."""
+    """Return a question that suggests a file whose name differs only in case, or ''."""
     with suppress(OSError):
         for name in os.listdir(path.parent):
             if name.casefold() == path.name.casefold():
@@ -102,7 +102,7 @@ def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
 
 @contextmanager
 def refuse_damage(kind: str) -> Iterator[None]:
-    """Turn every error that a library raises on a broken file into an `InputError`."""
+    """Turn every error that a library raises for a broken file into an `InputError`."""
     try:
         yield
     except InputError:
@@ -113,9 +113,9 @@ def refuse_damage(kind: str) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
-    """Write a file aside, sync it and rename it, so that an old file stays until the new is whole.
+    """Write a temporary file, sync it and rename it. An old file stays until the new is complete.
 
-    The new file has the permissions of the old file from the first byte on. The content is
+    From its first byte on, the new file has the permissions of the old file. The content is
     bytes, or a function that writes to a given path. If writing fails (a `StoreError`), the
     unfinished file is removed.
     """
@@ -151,7 +151,7 @@ def cannot(what: str, path: Path, error: BaseException) -> StoreError:
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    """Write an .npz archive, whole or not at all, with the errors of `write_whole`."""
+    """Write an .npz archive, completely or not at all. Errors are the same as in `write_whole`."""
 
     def write(aside: Path) -> None:
         with open(aside, "wb") as stream:  # np.savez would append .npz to a path
@@ -163,9 +163,9 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
 
 
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an .npz as `write_arrays` writes it, or raise an error in `UNREADABLE`.
+    """Return the arrays in an .npz file from `write_arrays`, or raise an error in `UNREADABLE`.
 
-    Compressed members are refused, and members that together are larger than the archive.
+    Refuses compressed members, and members that together are larger than the archive.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -187,7 +187,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def cache_folder() -> Path:
-    """Return `STICTION_CACHE_DIR` if set, else the user's cache folder of the platform."""
+    """Return `STICTION_CACHE_DIR` if set, or else the platform's cache folder for the user."""
     given = os.environ.get("STICTION_CACHE_DIR")
     return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
 
@@ -204,7 +204,7 @@ def _warn_of_no_cache(folder: Path, reason: str) -> None:
 
 
 def private_folder(folder: Path) -> Path:
-    """Return a folder in which only this user can have put anything, and make it if needed.
+    """Return a folder to which only this user can have written. Make the folder if needed.
 
     Compiled kernels are pickles, so whoever can replace a kernel can run code as
     the user who loads it. If the folder is not private, a warning says why, and a
@@ -228,7 +228,7 @@ def private_folder(folder: Path) -> Path:
 
 
 def _weakness(folder: Path) -> str:
-    """Return who besides this user and root could write into a folder, '' if nobody could."""
+    """Return who, besides this user and root, could write to a folder, or ''."""
     inside = {
         Path(top) / name for top, *names in os.walk(folder) for name in (*names[0], *names[1])
     }
@@ -246,7 +246,7 @@ def _weakness(folder: Path) -> str:
 
 @cache
 def _stand_in(weakness: str, name: str) -> Path:
-    """Return a temporary folder of this process, and warn why it is needed."""
+    """Return a temporary folder for this process, and warn why it is needed."""
     _warn_of(weakness)
     folder = _temporary_folder() / name
     folder.mkdir(mode=0o700, exist_ok=True)

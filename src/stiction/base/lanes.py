@@ -54,7 +54,7 @@ def zeros(typing_context: Any) -> Any:
 
 @intrinsic
 def load(typing_context: Any, array: Any, index: Any) -> Any:
-    """Entries index .. index + 3 of a contiguous float64 array."""
+    """Entries index to index + 3 of a contiguous float64 array."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         place = _place(context, builder, signature.args, *values)

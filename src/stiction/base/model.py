@@ -50,7 +50,7 @@ NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or as
 
 
 def as_number(value: Any) -> float:
-    """Return a number of any library as a float. Texts and truth values are refused."""
+    """Return a number from any library as a float. Strings and Booleans are refused."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, str):
@@ -69,7 +69,7 @@ def _real(value: Any, info: pydantic.ValidationInfo) -> float:
 
 
 def in_si(value: Any, name: str) -> Any:
-    """Return the number of a quantity in the SI unit of the argument, and other values as given."""
+    """Return a quantity as a number in the argument's SI unit. Return other values unchanged."""
     if not is_quantity(value):
         return value
     try:
@@ -79,7 +79,7 @@ def in_si(value: Any, name: str) -> Any:
 
 
 def as_count(value: Any) -> int:
-    """Return a whole number of any library as an int. 1e4 is a whole number."""
+    """Return a whole number from any library as an int. 1e4 is a whole number."""
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
     if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
@@ -104,7 +104,7 @@ def is_finite(value: Any) -> bool:
 
 
 def real_array(value: Any) -> Array:
-    """Return `value` as a float64 array, or raise a TypeError that names its kind."""
+    """Return `value` as a float64 array, or raise a TypeError that names its data type."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise TypeError("got a masked array; fill it, as in np.ma.filled(values, np.nan)")
     try:
@@ -206,10 +206,10 @@ Given = TypeVar("Given", contravariant=True)
 
 
 class Converted(Generic[Held, Given]):
-    """Annotation of a field of a model that holds another type than it is given.
+    """Annotation for a field of a model whose stored type differs from the given type.
 
-    Type checkers read it as a descriptor. At runtime only the type that is held, with its
-    validators, is left.
+    Type checkers treat the annotation as a descriptor. At runtime only the stored
+    type, with its validators, remains.
     """
 
     if TYPE_CHECKING:
@@ -223,7 +223,7 @@ class Converted(Generic[Held, Given]):
 
 
 class Labelled(Protocol):
-    """An array of any library, with or without labels and a unit."""
+    """An array from any library, with or without labels and a unit."""
 
     @property
     def shape(self) -> Any: ...
@@ -257,7 +257,7 @@ MISSING = "missing"
 
 
 class Mistakes(InputError):
-    """Mistakes inside a model, as pairs of a path and a text."""
+    """Mistakes inside a model, as pairs of a path and a message."""
 
     def __init__(self, places: list[tuple[str, str]]) -> None:
         super().__init__(_joined(path, text, by=": ") for path, text in places)
@@ -273,14 +273,14 @@ def describe(value: Any) -> str:
 
 
 def keys_of(cls: Any) -> dict[str, str]:
-    """Return the keys of a model in a study file, and the field that each stands for."""
+    """Return the keys for a model in a study file, and the field for each key."""
     known = getattr(cls, "__pydantic_fields__", {})
     names = [field.name for field in dataclasses.fields(cls) if field.init]
     return {(name in known and known[name].alias) or name: name for name in names}
 
 
 def valid_keys(cls: Any) -> list[str]:
-    """Return all keys that a model takes, `instead_of_fields` included."""
+    """Return all keys that a model accepts, including `instead_of_fields`."""
     return [*keys_of(cls), *getattr(cls, "instead_of_fields", ())]
 
 
@@ -291,16 +291,17 @@ MAX_MISTAKES = 100
 def mistakes(
     error: pydantic.ValidationError, valid: Sequence[str], call: bool
 ) -> list[tuple[str, str]]:
-    """Return the mistakes that pydantic found in a model or call, each with its path.
+    """Return the mistakes that pydantic found in a model or call, with their paths.
 
     `valid` are the names of the keys or arguments. Each item of pydantic is put into words:
 
     1. The path gets names in place of positions. In a call, and where another model explained
        the mistake, pydantic adds members of unions to the path. They are left out.
-    2. An `InputError` has texts of its own, from another model with their paths.
-    3. Otherwise the kind of the item decides about the text.
-    4. A union has an item for each member. Their texts are joined by 'or'.
-    5. A key that is missing is left out if another key is its misspelling.
+    2. An `InputError` from another model already contains messages with paths.
+    3. Otherwise the type of the item determines the message.
+    4. A union has an item for each member. The messages of the items are joined by
+       'or'.
+    5. A missing key is not reported if a given key is a misspelling of it.
     """
     # Members of a union by path, text and given value.
     texts: dict[tuple[str, str, str], list[str]] = {}
@@ -351,7 +352,7 @@ def _joined(*steps: str, by: str = ".") -> str:
 
 
 def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
-    """Return a text for each mistake that pydantic found, with its path below `root`."""
+    """Return a message for each mistake that pydantic found, with its path below `root`."""
     places = mistakes(error, (), True)
     return [_joined(_joined(root, path), text, by=": ") for path, text in places]
 
@@ -375,9 +376,9 @@ def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """Class decorator: a frozen pydantic dataclass that reports invalid values as `InputError`.
 
-    Objects compare by value (arrays too) and hash by value. Consistency checks go into a
-    method decorated with ``pydantic.model_validator(mode="after")`` that raises
-    `InputError`.
+    Objects, including arrays, are compared and hashed by value. Consistency checks go
+    into a method decorated with ``pydantic.model_validator(mode="after")`` that
+    raises `InputError`.
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
@@ -412,7 +413,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 def to_plain(value: Any) -> Any:
     """Return the object as plain dictionaries, lists and numbers for TOML and JSON.
 
-    An `InputError` refuses parts that exist in Python only, such as a function.
+    Raises an `InputError` for parts that exist only in Python, such as a function.
     """
     try:
         return pydantic.TypeAdapter(type(value)).dump_python(
@@ -427,10 +428,10 @@ def to_plain(value: Any) -> Any:
 
 
 def checked(function: Function) -> Function:
-    """Decorator of a public function: check its arguments by their annotations.
+    """Decorator for a public function: check its arguments against their annotations.
 
-    A class in an annotation takes its own instances only, not the tables of a study file.
-    An `InputError` lists all mistakes.
+    A class in an annotation accepts only instances, not tables of a study file. An
+    `InputError` lists all mistakes.
     """
     written = function.__annotations__
     function.__annotations__ = {
@@ -470,7 +471,7 @@ class _Plain:
 
 
 def plain_name(hint: Any) -> str:
-    """Return an annotation in plain words: the text among its metadata, else the type."""
+    """Return an annotation in plain words: the text among its metadata, or else the type."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     metadata = getattr(hint, "__metadata__", ())
     if metadata:
@@ -505,7 +506,7 @@ def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
 
 
 def _instances(hint: Any) -> Any:
-    """Return the annotation, with model classes that take instances only."""
+    """Return the annotation with model classes that accept only instances."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         return functools.reduce(operator.or_, map(_instances, typing.get_args(hint)))
     is_model = dataclasses.is_dataclass(hint)
@@ -515,7 +516,7 @@ def _instances(hint: Any) -> Any:
 def check(name: str, value: Any, annotation: Any) -> Any:
     """Validate a value by an annotation, or raise an `InputError` that begins with `name`.
 
-    It serves values that `checked` does not see, such as entries of a mapping.
+    Use this for values that `checked` does not see, such as entries of a mapping.
     """
     try:
         return _adapter(annotation).validate_python(value)

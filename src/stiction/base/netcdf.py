@@ -1,20 +1,20 @@
-"""NetCDF files from anywhere: only numbers that the file itself holds, and no more than expected.
+"""Read NetCDF files from any source: only numbers stored in the file, and of limited size.
 
 A NetCDF-4 file is an HDF5 file. While HDF5 reads, it follows names of other files
 (external storage, external links, virtual datasets), and it unpacks data without
 a limit. The steps are:
 
-1. Take the bytes of the file, so that nobody can change the file between a look and a use.
+1. Read all bytes of the file first, so that it cannot change between check and use.
 2. Walk through all groups. Refuse links that are not hard, data outside the file, too
    many values for the size of the file, filters other than shuffle, zlib and
    checksum, and chunks that unpack to more than their shape states.
-3. Read the attributes, lists of texts and numeric variables of the root. All attributes
-   and texts together may be as large as the file.
+3. Read the attributes, lists of strings and numeric variables at the root. All
+   attributes and strings together must not be larger than the file.
 4. Name the dimensions as NetCDF does.
 5. Decode the variables as xarray does: missing values, scale and offset, but no times.
 
-The same library, h5py, looks and reads, so that a file has a single meaning. Files of
-classic NetCDF contain no names of files, and scipy reads them.
+The same library, h5py, checks and reads the file, so that the file has a single
+meaning. Files of classic NetCDF contain no names of files, and scipy reads them.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ NOT_A_SCALE = "_nc4_non_coord_"
 
 
 def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
-    """Return the numbers and texts at the root of a NetCDF file, without `unwanted` names.
+    """Return the numbers and strings at the root of a NetCDF file, without `unwanted` names.
 
-    An `InputError` says why a file cannot be read.
+    Raises an `InputError` that states why a file cannot be read.
     """
     import xarray as xr
 
@@ -71,7 +71,7 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
 
 
 def _from_hdf5(content: bytes, unwanted: Collection[str]) -> tuple[dict[str, Any], Any]:
-    """Return the variables of an HDF5 file as they are stored, and the attributes of the file."""
+    """Return the variables in an HDF5 file as stored, and the attributes of the file."""
     import h5py
     import xarray as xr
 
@@ -135,13 +135,13 @@ def _datasets(file: Any) -> Iterator[Any]:
 
 
 def _padded_size(dataset: Any) -> int:
-    """Return the number of values in all chunks, which may reach beyond the ends."""
+    """Return the number of values in all chunks. Chunks may extend beyond the array."""
     sizes = zip(dataset.shape or (), dataset.chunks or dataset.shape or (), strict=True)
     return math.prod(-(-size // chunk) * chunk for size, chunk in sizes)
 
 
 def _check_storage(dataset: Any) -> None:
-    """Refuse data that lie outside the file or are packed by other filters."""
+    """Refuse data that lie outside the file, or that are packed with other filters."""
     kept = dataset.id.get_create_plist()
     if kept.get_layout() == VIRTUAL or kept.get_external_count():
         raise InputError(
@@ -159,7 +159,7 @@ def _filters(dataset: Any) -> list[int]:
 
 
 def _check_chunks(dataset: Any) -> None:
-    """Refuse chunks that unpack to another size than their shape states: HDF5 has no limit."""
+    """Refuse chunks whose unpacked size differs from their shape, because HDF5 has no limit."""
     filters, chunks = _filters(dataset), list[Any]()
     if DEFLATE not in filters:
         return
@@ -181,9 +181,10 @@ def _check_chunks(dataset: Any) -> None:
 
 
 def _texts(dataset: Any, budget: list[int]) -> Any:
-    """Return a list of texts, such as names of stations, within the budget of the attributes.
+    """Return a list of strings, such as names of stations, within the budget for attributes.
 
-    Texts are read one by one, because many of them may refer to one long text in the file.
+    Strings are read one by one, because many of them may refer to one long string in
+    the file.
     """
     texts: list[str] = []
     for number in range(dataset.shape[0]):
@@ -211,9 +212,10 @@ def _dims(
 
 
 def _attributes(item: Any, budget: list[int]) -> dict[str, Any]:
-    """Return the attributes that are a text or numbers, and take their size from the budget.
+    """Return the attributes that are strings or numbers, and deduct their size from the budget.
 
-    Lists of texts are left out, because they may refer to one long text many times.
+    Lists of strings are left out, because they may refer to one long string many
+    times.
     """
     import h5py
 

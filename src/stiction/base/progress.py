@@ -1,7 +1,8 @@
-"""Progress of long work, by the same mechanism everywhere.
+"""Report the progress of long work, with the same mechanism everywhere.
 
-After a second, a terminal shows a bar (rich), a notebook shows an output that is updated,
-and a pipe gets a line now and then. The working code reports its progress with `advance`.
+After a second, a terminal shows a bar (rich), a notebook shows an output that is
+updated, and a pipe receives a line now and then. The working code reports its
+progress with `advance`.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Context manager for the progress of a computation, of `total` units if that is known."""
+    """Context manager for the progress of a computation. `total` is its size, if known."""
 
     def __init__(
         self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
@@ -46,7 +47,7 @@ class Meter:
         self._begun = time.monotonic()
 
     def stage(self, what: str, total: int | None = None) -> None:
-        """Begin another part of the work. The clock goes on."""
+        """Begin the next part of the work. The clock continues."""
         self.what, self.total, self.done, self.note = what, total, 0, ""
         self._first: tuple[float, int] | None = None
 
@@ -107,7 +108,7 @@ _compiling: list[Any] = []
 
 
 def _watch(ended: threading.Event) -> None:
-    """Show one of the meters that run until the outermost has ended."""
+    """Show one of the running meters until the outermost meter has ended."""
     display = shown = None
     while not ended.wait(TICK):
         if "numba" in sys.modules:
@@ -154,7 +155,7 @@ def _display() -> Callable[[Meter, bool], None]:
 
 
 def _in_terminal() -> Callable[[Meter, bool], None]:
-    """Show a bar, which goes away at the end. Printed lines appear above it."""
+    """Show a bar that disappears at the end. Printed lines appear above the bar."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress
 

@@ -1,7 +1,7 @@
-"""How objects show themselves, compare, and become JSON.
+"""How objects are shown, compared and converted to JSON.
 
-A model shows its fields. A result shows the number that was asked for, its interval, its
-unit and what it rests on (`Summary`), as text and as an HTML table.
+A model shows its fields. A result shows the requested number with its interval and
+unit, and its basis (`Summary`), as text and as an HTML table.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Row(NamedTuple):
 
     @property
     def texts(self) -> tuple[str, str, str, str, str]:
-        """Name, value, interval, unit and remark; numbers in the unit that suits the value."""
+        """Name, value, interval, unit and remark as text. The unit suits the value."""
         if not isinstance(self.value, int | float | np.number) or isinstance(self.value, bool):
             text = self.value if isinstance(self.value, str) else shown(self.value)
             return self.name, text, "", self.unit, self.remark
@@ -42,7 +42,7 @@ class Row(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What an object says: a title, rows, the meaning of their intervals, and notes."""
+    """Summary of an object: a title, rows, the meaning of their intervals, and notes."""
 
     title: str
     rows: Sequence[Row]
@@ -97,7 +97,7 @@ def _public(value: Any) -> dict[str, Any]:
 
 
 def given_fields(value: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass that are not at their default, by name."""
+    """Return, by name, the fields of a dataclass that differ from their default."""
     given = {}
     for field in dataclasses.fields(value):
         entry = getattr(value, field.name)
@@ -108,13 +108,13 @@ def given_fields(value: Any) -> dict[str, Any]:
 
 
 def brief(self: Any) -> str:
-    """Use as `__repr__` of a dataclass: its fields that are not at their default, shortened."""
+    """Use as `__repr__` of a dataclass: show fields that differ from their default, shortened."""
     parts = [f"{name}={shown(value)}" for name, value in given_fields(self).items()]
     return f"{type(self).__name__}({', '.join(parts)})"
 
 
 def shown(value: Any) -> str:
-    """Return a value as text; of a long array the shape and the range."""
+    """Return a value as text. For a long array, return the shape and the range."""
     if isinstance(value, np.ndarray):
         if value.size <= MAX_NUMBERS:
             return str(value.tolist())
@@ -128,7 +128,7 @@ def shown(value: Any) -> str:
 
 
 def rows_of(value: Any, prefix: str = "") -> Iterator[Row]:
-    """Yield a row for each given field of a dataclass, and of those inside it by dotted keys."""
+    """Yield a row for each given field of a dataclass, and of nested dataclasses by dotted keys."""
     for name, entry in given_fields(value).items():
         if dataclasses.is_dataclass(entry):
             yield Row(prefix + name, type(entry).__name__)
@@ -138,12 +138,12 @@ def rows_of(value: Any, prefix: str = "") -> Iterator[Row]:
 
 
 def html_of(self: Any) -> str:
-    """Use as `_repr_html_` of a dataclass: a table of its fields that are not at their default."""
+    """Use as `_repr_html_` of a dataclass: a table of fields that differ from their default."""
     return Summary(type(self).__name__, list(rows_of(self))).html
 
 
 def equal(self: Any, other: object) -> bool:
-    """Use as `__eq__`: objects of one class are equal if their public fields are, arrays too."""
+    """Use as `__eq__`: objects of a class are equal if all public fields are equal."""
     return _key(self) == _key(other) if type(self) is type(other) else NotImplemented
 
 
@@ -157,7 +157,7 @@ def _key(self: Any) -> tuple[Any, ...]:
 
 
 def _comparable(value: Any) -> Any:
-    """Return a value by which another is compared and hashed; NaN equals itself."""
+    """Return a value with which a given value is compared and hashed. NaN equals itself."""
     if value is None or isinstance(value, str | float):
         return value if value == value else "nan"  # most are, and hashes stand in many calls
     if isinstance(value, np.ndarray):
@@ -185,7 +185,7 @@ class Result:
         return self._summary().html
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the public fields as dicts, lists and numbers, for JSON; NaN is None."""
+        """Return the public fields as dicts, lists and numbers for JSON. NaN becomes None."""
         plain: dict[str, Any] = to_jsonable_python(
             _public(self), by_alias=True, inf_nan_mode="null", fallback=_plain
         )

@@ -1,4 +1,4 @@
-"""Units of measured data, their factors to SI, and quantities of other packages.
+"""Units of measured data, their factors to SI, and quantities from other packages.
 
 A unit is read from its text, and no unit is guessed. The page `docs/measured-profiles.md`
 has a table of the values that users may pass.
@@ -75,7 +75,7 @@ _POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
 
 
 def _symbol(text: str) -> str:
-    """Return the symbol of a unit in words, and any other text as it is."""
+    """Return the symbol for a unit in words. Return any other text unchanged."""
     match = _WORD.match(text)
     return _PREFIX_NAMES[match[1].lower()] + _NAMES[match[2].lower()] if match else text
 
@@ -154,10 +154,10 @@ def in_words(units: str, value: float) -> str:
 
 
 def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
-    """Return SI values in one unit that suits them, with digits that tell them apart; and the unit.
+    """Return SI values in one suitable unit, with digits that distinguish them, and the unit.
 
-    A value alone has six digits, a value with an interval two more than the interval
-    resolves.
+    A value alone has six digits. A value with an interval has two digits more than
+    the interval resolves.
     """
     factor, unit = unit_for(units, values)
     finite = [value for value in values if math.isfinite(value)]
@@ -177,7 +177,7 @@ def is_quantity(value: Any) -> bool:
 
 
 def magnitude(value: Any, si: str) -> Any:
-    """Return the number of a quantity in an SI unit, and other values as given."""
+    """Return a quantity as a number in an SI unit. Return other values unchanged."""
     if not is_quantity(value):
         return value
     text = re.sub(r"(-\d)", r"**\1", si).replace(" ", "*")  # Pa m-1: Pa*m**-1
@@ -191,7 +191,7 @@ def magnitude(value: Any, si: str) -> Any:
 
 
 def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
-    """Return the number of a quantity in the first SI unit that fits, and that unit.
+    """Return a quantity as a number in the first SI unit that fits, and the unit.
 
     A value without a unit is returned as given.
     """

@@ -1,4 +1,4 @@
-"""Names, units and meaning of given, drawn and computed quantities."""
+"""Names, units and meanings of given, drawn and computed quantities."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Variable:
-    """Unit, meaning and dimensions of a variable of a result.
+    """Unit, meaning and dimensions of a variable in a result.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "no
 
 
 def unit_of_key(key: str, of_field: str) -> str:
-    """Return the unit of a parameter by its dotted key, in a field in the unit `of_field`."""
+    """Return the unit of a parameter with a dotted key, for a field in the unit `of_field`."""
     *before, last = key.split(".")
     if {"between", "correlation"} & {*before}:
         return "1"
@@ -104,13 +104,13 @@ FORCES: dict[str, tuple[str, str]] = {
 
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
-    """Return the variables of the forces, N, that accompany the stresses among some variables."""
+    """Return the variables for the forces, N, that accompany the stresses among some variables."""
     dims = {name: known.dims for name, known in variables.items() if name in FORCES}
     return {FORCES[name][0]: Variable("N", FORCES[name][1], dims[name]) for name in dims}
 
 
 def forces(values: Mapping[str, Any], area: float) -> dict[str, Any]:
-    """Return the forces, N, of the stresses among some values, for an area in m²."""
+    """Return the forces, N, for the stresses among some values, with an area in m²."""
 
     return {FORCES[name][0]: one * area for name, one in values.items() if name in FORCES}
 

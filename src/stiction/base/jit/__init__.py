@@ -1,4 +1,4 @@
-"""Compiled kernels: the decorators, numba's private parts, and the folder of compiled forms."""
+"""Compiled kernels: decorators, use of numba's private parts, and the folder of compiled code."""
 
 from stiction.base.jit.decorators import ZERO as ZERO
 from stiction.base.jit.decorators import jit as jit

@@ -35,7 +35,7 @@ _announced: set[str] = set()
 
 
 def _foreign_classes(kind: Any) -> set[Any]:
-    """Return the classes from outside the package that numba types name."""
+    """Return the classes from outside the package that are named in numba types."""
     kinds = kind if isinstance(kind, tuple | list) else getattr(kind, "types", ())
     classes: set[Any] = set().union(*map(_foreign_classes, kinds))
     named = getattr(kind, "instance_class", None)
@@ -67,7 +67,7 @@ def _parts(value: Any) -> Iterator[str]:
 
 
 def _state_of(classes: Iterable[Any]) -> str | None:
-    """Return a digest of friction laws from elsewhere; None if they may change unnoticed."""
+    """Return a digest of external friction laws. None if they may change unnoticed."""
     state = hashlib.sha256()
     for law in sorted(classes, key=str):
         try:
@@ -81,7 +81,7 @@ def _state_of(classes: Iterable[Any]) -> str | None:
 
 
 class _Guard:
-    """A cache that keeps what is compiled for a friction law from elsewhere by the law's state.
+    """A cache that keeps code compiled for an external friction law, by the state of the law.
 
     Such a law is part of the kernels that are compiled for it. numba would not notice
     that the law was edited, and could not read its index where the law's module is
@@ -97,7 +97,7 @@ class _Guard:
         return getattr(self._cache, name)
 
     def _cache_of(self, signature: Any) -> Any:
-        """Return the cache for types of arguments; None if nothing may be kept for them."""
+        """Return the cache for types of arguments. None if compiled code must not be kept."""
         foreign = _foreign_classes(signature)
         if not foreign:
             return self._cache
@@ -134,7 +134,7 @@ def _announce(part: list[str], kept: bool) -> None:
 
 
 def _compile(function: Kernel, options: str) -> Kernel:
-    """Compile on first call, cached on disk where that is possible."""
+    """Compile at the first call. The result is cached on disk if possible."""
     if internals is None:
         return _plain(function)
     compiled: Any = numba.njit(**_ANYWHERE, **getattr(internals, options))(function)

@@ -1,8 +1,8 @@
 """The folder in which the compiled kernels of a module are kept.
 
-Kernels are code. The package or the environment choose their folder, never a file where
-somebody stands: numba also reads `.numba_config.yaml` in the current folder, which may
-come from a stranger.
+Kernels are code, so only the package or the environment choose their folder. numba
+also reads `.numba_config.yaml` in the current folder, but this file may come from a
+stranger.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?",
 
 @cache
 def _kernel_sources() -> dict[str, bytes]:
-    """Return the text of every file that may hold a part of a kernel, by module.
+    """Return, by module, the text of every file that may hold a part of a kernel.
 
     Files that refuse input hold no part of a kernel, unless they hold one themselves: an
     edited message recompiles nothing.
@@ -45,12 +45,13 @@ def _kernel_sources() -> dict[str, bytes]:
 
 @cache
 def kernel_folder(module: str, compiler: str) -> Path:
-    """Return the folder of the kernels of a module that a `compiler` (any name) compiled.
+    """Return the folder for a module's kernels that a `compiler` (any name) compiled.
 
-    numba takes a compiled kernel for current as long as the kernel's own file is: it does
-    not notice that a function or a constant of another file has changed. So every state
-    of the files that a module imports, directly or not, has a folder of its own. Friction
-    laws are resolved by type inside kernels and belong to every state.
+    numba treats a compiled kernel as current if the file of the kernel has not
+    changed. It does not notice changes of functions or constants in other files.
+    Therefore every state of the files that a module imports, directly or not, has a
+    separate folder. Friction laws are resolved by type inside kernels and belong to
+    every state.
     """
     texts = _kernel_sources()
     waiting = [

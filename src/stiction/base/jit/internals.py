@@ -1,10 +1,10 @@
-"""Compile kernels in two thirds of the time, with numba's private parts.
+"""Compile kernels in two thirds of the time by using numba's private parts.
 
 1. Compiled forms are kept on disk by the text of their file, not by its place and
    time (`_Locator`).
-2. What only other kernels call is a draft (`_Draft`). It is stored, but becomes
-   machine code only as a part of the kernels that call it. They also take over its
-   environment (`Cache.save_overload`).
+2. A function that only other kernels call is a draft (`_Draft`). A draft is stored,
+   but becomes machine code only as a part of the kernels that call it. They also
+   take over its environment (`Cache.save_overload`).
 3. Options are compared by those that were set (`_Flags`).
 4. Kernels that make no arrays count no references (`OPTIONS`).
 

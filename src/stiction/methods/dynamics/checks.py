@@ -1,4 +1,4 @@
-"""Errors and warnings of a run: coarse grids, loading rates, loads that reverse."""
+"""Errors and warnings for a run: coarse grids, fast loading, and loads that reverse."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -34,7 +34,7 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
 
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
-    """Warn of nodes that weaken too steeply for the grid, and of stress that would reverse slip."""
+    """Warn about nodes that weaken too steeply for the grid, or whose stress would reverse slip."""
     rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
@@ -56,7 +56,7 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
 def at_first_slip(run: Run) -> RuptureState | None:
     """Return the state of rest at the first slip, or `None` if the load never causes slip.
 
-    Loading too fast for the grid gives an `InputError` or a warning.
+    If loading is too fast for the grid, raise an `InputError` or issue a warning.
     """
     time, step = run.first_slip(), run.medium.step
     if not time < run.setting.thresholds.end_time:
@@ -97,7 +97,7 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 
 
 def warn_of_fast_loading(run: Run, results: Sequence[Any]) -> None:
-    """Warn if the load rises too fast for arrested events to be those of a slow load."""
+    """Warn if the load rises so fast that arrested events differ from events at a slow load."""
     arrested = sum(int(np.nan_to_num(result["arrested_events"])) for result in results)
     lengths = run.medium.problem.nucleation_lengths(run.steepest_rate)
     crossing = lengths[0] / run.medium.problem.solid.shear_wave_speed

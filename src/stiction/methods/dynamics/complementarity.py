@@ -1,36 +1,38 @@
-"""The slip increments of an implicit step, with the stress nowhere above the strength.
+"""Find the slip increments in an implicit step, so that no stress exceeds the strength.
 
 Problem
 -------
-Find the increments u >= 0 of slip (m) of a step, such that at every node
+Find the slip increments u >= 0 (m) in a step, such that at every node
 
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
 g is the stress at the end of a step without slip (`tables.trial_stress`). M is a
 circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity,
-memory and radiation. The strength of a node follows a straight line, b - w u, and
-with u it may pass to another line. w is the rate at which the node weakens
+memory and radiation. The strength of a node follows a straight line, b - w u. As u
+grows, the node may pass to a different line. w is the weakening rate of the node
 (`tables.falling`), and g - b is `tables.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
-A semismooth Newton iteration, in the form of a primal-dual active set (M.
-Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13, 2002):
+The algorithm is a semismooth Newton iteration in the form of a primal-dual active
+set (M. Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13,
+2002):
 
-1. Begin with the set S of nodes that slip already or whose trial stress is above
-   their strength, on the straight lines of the first guess.
+1. Begin with the set S of nodes that already slip or whose trial stress exceeds
+   their strength. Use the straight lines of the first guess.
 2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`).
-   This uses the conjugate gradients by M. Hestenes and E. Stiefel (Journal of
-   Research of the National Bureau of Standards 49, 1952), preconditioned with
-   M^-1, cut to S. Letters are theirs: residual r, direction p, z = M^-1 r.
-3. Nodes outside S whose stress is above their strength join S, and nodes with u <
-   0 leave it. Every node takes the straight line that belongs to its u.
-4. Repeat from 2 until no node changes.
+   This uses conjugate gradients (M. Hestenes and E. Stiefel, Journal of Research of
+   the National Bureau of Standards 49, 1952), preconditioned with M^-1 restricted
+   to S. The letters are the same as in this source: residual r, direction p, z =
+   M^-1 r.
+3. Nodes outside S whose stress exceeds their strength join S, and nodes with u < 0
+   leave S. Every node moves to the straight line that belongs to its u.
+4. Repeat from step 2 until no node changes.
 
-Departures: a direction of negative curvature (a patch that is unstable at this
-size of the step) ends the search without a result, and so do too many iterations.
-For a curved law a node counts as changed only if its strength moves by more than
-a bound.
+Departures: the search ends without a result after too many iterations, or at a
+direction of negative curvature (a patch is then unstable at this step size). With a
+curved law, a node counts as changed only if its strength changes by more than a
+bound.
 """
 
 from typing import Any

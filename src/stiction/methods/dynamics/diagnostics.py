@@ -1,9 +1,8 @@
-"""Diagnostics after every step: maxima of the mean stress, instabilities, arrivals of the front.
+"""Diagnostics after every step: maxima of the mean stress, instabilities, and front arrivals.
 
 Problem
 -------
-Waves carry the stress that is out of balance, so the mean stress of the interface
-is
+Waves carry away the unbalanced stress, so the mean stress on the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
@@ -13,8 +12,8 @@ means over the nodes that can break (`mean_stress`).
 
 An instability is slip that the load does not drive: after a maximum of <tau>,
 waves lower <tau> by `EVENT_DROP` of the stress scale (`docs/theory.md`). The
-instability began at that maximum. A falling load lowers <tau>, too, but without
-an instability. So the fall that counts is
+instability began at that maximum. A falling load also lowers <tau>, but without an
+instability. Therefore the relevant fall is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
@@ -30,24 +29,25 @@ Algorithm, after each step of a run (`observe`)
 -----------------------------------------------
 1. Compute the fall (2).
 2. While <tau> is practically at its maximum, the fastest node is the place of the
-   maximum. At slow loading all creeping patches are about equally slow at the
-   maximum. Only just after it is the unstable patch faster.
+   maximum. At slow loading, all creeping patches are about equally slow at the
+   maximum. The unstable patch is faster only just after the maximum.
 3. An instability ends when <tau> rises above the maximum at which it began. It
    was arrested if a node slipped faster than `Thresholds.unstable_rate`, which
    the waves of an earlier instability do not reach. The present <tau> is the next
-   maximum. (Explicit steps also end an instability when all is calm, see
-   `explicit`.)
+   maximum. (Explicit steps also end an instability when the interface is calm (see
+   `explicit`).)
 4. Between instabilities a higher <tau> is the next maximum, and a fall by
    `EVENT_DROP` begins an instability. The onset is the instability with the
    highest maximum so far.
 5. Note <tau> once all nodes that can break are at their residual strength. From
-   then on no instability can begin. Reaching this state is no instability by
-   itself, as the last nodes beside the end of an extent may creep to it. If they
-   do, the interface slid in the last instability before, which is not arrested.
+   then on no instability can begin. Reaching this state is not an instability by
+   itself, because the last nodes beside the end of an extent may creep to this
+   state. If they do, the interface slid in the previous instability, which then
+   does not count as arrested.
 
-Two consequences. A maximum without such a fall after it, such as the largest load
-or the stress that returns when slip dies, is no instability. If the stress is
-above the strength at the start, the maximum is the mean stress before the first
+This has two consequences. A maximum without such a fall, for example the largest
+load or the stress that returns when slip ends, is not an instability. If the stress
+is above the strength at the start, the maximum is the mean stress before the first
 slip, with which a run begins (`Run.start`).
 """
 
@@ -76,7 +76,7 @@ _AT_MAXIMUM = 1e-5  # distance from its maximum at which the mean stress counts 
 
 
 class TakenStep(NamedTuple):
-    """Step that was taken."""
+    """The step that was taken."""
 
     time: float  # at its end, s
     size: float  # s
@@ -88,13 +88,13 @@ class TakenStep(NamedTuple):
 def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     """Return the stress scale as a function of the load, both Pa.
 
-    It is the mean over nodes of
+    The scale is the mean over nodes of
 
         max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
     The second term is the drop that the load provides. If strengths are similar, the scale is the
-    mean of tau_p - tau_r. Nodes far stronger than the load, or unbreakable, do not raise it. It
-    grows with the load as the load comes to break them.
+    mean of tau_p - tau_r. Nodes far stronger than the load, or unbreakable, do not raise
+    it. The scale grows as the load becomes able to break them.
     """
     peak, residual = nodes.peak, nodes.residual
     profile, initial = nodes.profile, nodes.initial
@@ -113,7 +113,7 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
 @jit_inside
 def _set_maximum(now: Any, radiated: float) -> None:
-    """Take the present mean stress as the last maximum."""
+    """Record the present mean stress as the last maximum."""
     now.maximum_stress, now.maximum_radiated = now.whole_stress, radiated
     now.maximum_strength, now.largest_fall = now.strength_change, 0.0
     now.maximum_breakable = now.mean_stress
@@ -138,7 +138,7 @@ def _begin_event(now: Any) -> None:
 
 @jit_inside
 def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
-    """Step 3: end an event, as the mean stress is as high as before or all is calm."""
+    """Step 3: end an event, because the mean stress has recovered or the interface is calm."""
     if now.in_event:
         now.in_event = 0
         # Once all nodes have broken the event cannot have been arrested.

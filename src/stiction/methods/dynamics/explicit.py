@@ -1,4 +1,4 @@
-"""Explicit predictor-corrector steps of fixed size and second order, in a compiled loop.
+"""Explicit predictor-corrector steps with fixed size and second order, in a compiled loop.
 
 Problem
 -------
@@ -16,15 +16,15 @@ strength s(d):
 
 Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
 ----------------------------------------------------------------------------------
-1. Predict: the present rate V_0 acts for the step (`_transfer`), and (2) gives V*
-   at its end (`_predict`).
+1. Predict: the present rate V_0 acts for the whole step (`_transfer`), and (2)
+   gives the rate V* at the end (`_predict`).
 2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows
    by h times this mean, and (2) gives the rate and the stress at the end
    (`_correct`).
 3. Advance slip and memory of the modes by the same mean
    (`memory.advance_memory`).
-4. Update the diagnostics (`diagnostics`). Return if the run ends here, or if all
-   is so calm that implicit steps can take over (`_calm`).
+4. Update the diagnostics (`diagnostics`). Return if the run ends, or if the
+   interface is so calm that implicit steps can take over (`_calm`).
 
 The step is stable below the limit of `medium.largest_step`. By (2) a node cannot
 slip backwards.
@@ -81,7 +81,7 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
 def _predict(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
-    """Step 1: write the rate at the end, if the present rate acts all along, to `predicted`."""
+    """Step 1: write to `predicted` the rate at the end if the present rate acts all the time."""
     nodes, law = setting.nodes, setting.law
     slip, rate, transfer, predicted = state.slip, state.rate, tables.transfer, tables.predicted
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
@@ -97,7 +97,7 @@ def _predict(
 def _correct(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Step 2: update slip, rate and stress, and write strength and increments of slip.
+    """Step 2: update slip, rate and stress. Write strength and slip increments.
 
     Return the work (without the cell) and the sum of V.
     """
@@ -123,9 +123,10 @@ def _correct(
 
 @jit_inside
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
-    """Step 4: count calm steps in a row. Return whether they suffice for implicit steps.
+    """Step 4: count successive calm steps. Return whether they suffice for implicit steps.
 
-    Waves make slip rates come and go. Creep is slow, or as fast as it was when the row began.
+    Slip rates due to waves come and go. Creep is slow, or as fast as when the count
+    began.
     """
     scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step

@@ -1,18 +1,18 @@
-"""Implicit steps of adaptive size while the interface creeps, in a compiled loop.
+"""Implicit steps with adaptive size while the interface creeps, in a compiled loop.
 
 Problem
 -------
 Advance equations (1) and (2) of `state` by a step h. The unknowns are the slip
-increments u >= 0. Let u/h be the mean slip rate of this step, V' the mean rate of
-the step before it, h' the size of that step, and r = h/(h + h'). To second order
-the slip rate at the end of the step is
+increments u >= 0. Let u/h be the mean slip rate in this step, V' the mean rate in
+the previous step, h' the size of the previous step, and r = h/(h + h'). To second
+order the slip rate at the end of the step is
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
 as in the two-step backward differences of C. F. Curtiss and J. O. Hirschfelder
-(Proceedings of the National Academy of Sciences 38, 1952). In the step the rate
-changes linearly, with the slope a = 2 r (u/h - V')/h. Without an earlier step r =
-0, and the step is of first order. The stress at the end is, mode by mode,
+(Proceedings of the National Academy of Sciences 38, 1952). In the step, the rate
+changes linearly with the slope a = 2 r (u/h - V')/h. If there is no previous step,
+r = 0, and the step is of first order. The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
         + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
@@ -22,13 +22,13 @@ problem of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
-1. Choose a size: as proposed, smaller if the load would rise too much, or cut
-   short at a turning point of the load or at the end time (`_choose_size`).
+1. Choose a size: as proposed, but smaller if the load would rise too much. The step
+   is cut short at a turning point of the load or at the end time (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
-4. Go to 1 with half the size if no u is found (a patch is unstable at this size),
-   if a node weakens too much (`_effect`), or if the interface accelerates too
-   much (`_accelerates`). If half the size is below the smallest size, explicit
+4. Go to step 1 with half the size if no u is found (a patch is unstable at this
+   size), if a node weakens too much (`_effect`), or if the interface accelerates
+   too much (`_accelerates`). If half the size is below the smallest size, explicit
    steps take over.
 5. Take the step (`_accept`), and update the diagnostics (`diagnostics`).
 6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes
@@ -76,7 +76,7 @@ _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
 class _Attempt(NamedTuple):
-    """Step that is tried."""
+    """A step that is tried."""
 
     size: float  # h, s
     time: float  # at its end, s
@@ -87,7 +87,7 @@ class _Attempt(NamedTuple):
 
 @jit_inside
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
-    """Step 1: return (size to try, size to go on with, whether cut short, whether the last)."""
+    """Step 1: return (size to try, size for later steps, whether cut short, whether the last)."""
 
     thresholds, time, clipped, size = setting.thresholds, now.time, False, step
     smallest = thresholds.smallest_step
@@ -158,7 +158,7 @@ def _assemble(
 def _effect(
     state: RuptureState, setting: Setting, u: Array, impedance: float, attempt: _Attempt
 ) -> Any:
-    """Step 4: return (largest weakening of a node, total slip, Z <V>) by slip increments u.
+    """Step 4: return (largest weakening of a node, total slip, Z <V>) due to slip increments u.
 
     Weakening is a share of tau_p - tau_r. Creep at the residual strength counts if it is fast.
     """
@@ -244,7 +244,7 @@ def _accept(
 
 @jit_inside
 def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
-    """Step 6: return the next size, for a weakening of `asked` in a step."""
+    """Step 6: return the next size, at which a step weakens nodes by `asked`."""
     root = np.sqrt(2.0)
     if largest > asked:
         return size / root

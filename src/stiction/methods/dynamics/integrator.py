@@ -1,4 +1,4 @@
-"""A run: implicit and explicit steps, the switch between them, and the end.
+"""A run: implicit and explicit steps, switches between them, and the end.
 
 A run goes through phases (`Run.take_steps`):
 
@@ -6,11 +6,11 @@ A run goes through phases (`Run.take_steps`):
    Implicit steps come first, unless the stress is above the strength by more than
    round-off.
 2. Implicit steps follow creep until their size falls below
-   `Thresholds.smallest_step`. Then the memory is rescaled and explicit steps go
-   on (`_to_explicit`).
-3. Explicit steps follow waves until all has been calm for a while. Then implicit
-   steps go on, the first of them of first order (`_to_implicit`).
-4. The run ends for one of the reasons of `Run.ending`.
+   `Thresholds.smallest_step`. Then the memory is rescaled and explicit steps take
+   over (`_to_explicit`).
+3. Explicit steps follow waves until the interface has been calm for a while. Then
+   implicit steps take over. The first of these is of first order (`_to_implicit`).
+4. The run ends for one of the reasons in `Run.ending`.
 """
 
 import dataclasses
@@ -63,7 +63,7 @@ NO_RECORD = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
 
 @dataclasses.dataclass(eq=False)
 class Run:
-    """Constants of a run, an interface under a load history, with its tables of steps."""
+    """Constants of a run (an interface with a load history), with tables for steps."""
 
     medium: Medium
     setting: Setting
@@ -98,7 +98,7 @@ class Run:
         return strength
 
     def scale_at(self, load: float) -> float:
-        """Return the stress scale of a load, Pa, or of `least_load` if it is larger."""
+        """Return the stress scale, Pa, at a load, or at `least_load` if it is larger."""
         return float(value_at(self.setting.scale, max(load, self.least_load)))
 
     @property
@@ -108,7 +108,7 @@ class Run:
         return float(np.min((nodes.peak - nodes.initial) / nodes.profile))
 
     def first_slip(self) -> float:
-        """Return when the first node reaches its strength, s, or infinity."""
+        """Return the time, s, at which the first node reaches its strength, or infinity."""
         (times, values), target = self.setting.load, self.first_load
         if values[0] >= target:
             return 0.0
@@ -118,7 +118,7 @@ class Run:
         return float(times[last - 1] + missing / slope) if slope > 0.0 else np.inf
 
     def slope(self, time: float) -> float:
-        """Return the size of the loading rate just after a time, Pa/s."""
+        """Return the absolute loading rate just after a time, Pa/s."""
         times, values = self.setting.load
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
@@ -126,7 +126,8 @@ class Run:
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
         """Return the state at rest, or in equilibrium with a slip, with an empty memory.
 
-        If any stress is above the strength by more than round-off, explicit steps come first.
+        If any stress exceeds the strength by more than round-off, explicit steps come
+        first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
@@ -215,7 +216,7 @@ class Run:
         return "rest" if self.stop != "time" and resting else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
-        """Go on to the end of the run, or to `max_steps` in all. Return (ending, `Reason`).
+        """Continue to the end of the run, or to `max_steps` in total. Return (ending, `Reason`).
 
         The ending is `None` if the run has not ended. The reason is then NOT_FINITE or DONE.
         """
@@ -254,10 +255,11 @@ class Run:
         return taken, Reason.DONE
 
     def _follow_event(self, state: RuptureState, rests: bool) -> None:
-        """Keep the open event if it has come to rest, and open the one that has just begun.
+        """Keep the open event if it has come to rest. Open the event that has just begun.
 
-        An event comes to rest when all is calm (`rests`). If the next one begins before, it ends
-        at the maximum of the mean stress at which the next one begins.
+        An event comes to rest when the interface is calm (`rests`). If the next event
+        begins before, the open event ends at the maximum of the mean stress at which
+        the next event begins.
         """
         now, slip, load, work = state.now, state.maximum_slip, "maximum_load", "maximum_work"
         if rests:

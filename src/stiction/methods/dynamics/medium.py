@@ -1,12 +1,12 @@
-"""Data shared by all runs of a problem: stiffness, memory kernel, explicit time step.
+"""Data shared by all runs for a problem: stiffness, memory kernel and explicit time step.
 
 Problem of the time step (`largest_step`)
 -----------------------------------------
-An interface that slides freely carries undamped Rayleigh waves, and the shortest
-of them limit the explicit step h. Let the state of a mode be |k| slip, V/c_s and
-the memory variables. Then a step of `explicit` is a matrix that depends on kappa
-= |k| c_s h only (`amplification`). Find the largest kappa up to which no
-eigenvalue of the matrix is larger than 1.
+An interface that slides freely carries undamped Rayleigh waves. The shortest waves
+limit the explicit step h. Let the state of a mode be |k| slip, V/c_s and the memory
+variables. A step in `explicit` is then a matrix that depends only on kappa = |k|
+c_s h (`amplification`). Find the largest kappa up to which no eigenvalue of the
+matrix is larger than 1.
 
 Algorithm: our own
 ------------------
@@ -16,8 +16,8 @@ Algorithm: our own
 2. Bisect between the last two values of kappa.
 3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the
    rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in
-   their share of mode II. The waves on the axes and in the corner are the first
-   to grow, so take the smallest of their steps.
+   their share of mode II. The waves on the axes and in the corner grow first, so
+   take the smallest of their steps.
 """
 
 import dataclasses
@@ -43,7 +43,7 @@ _KAPPA_STEP, _MAX_KAPPA, _BISECTIONS = 0.1, 6.0, 12
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Medium:
-    """Elastic half-spaces on a grid, with a fixed explicit step. Read-only, shared by threads."""
+    """Read-only elastic half-spaces on a grid, with a fixed explicit step, shared by threads."""
 
     problem: Problem
     grid: Grid
@@ -65,7 +65,7 @@ class Medium:
 
 
 def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium:
-    """Return the tables of a problem, or raise an `InputError` if no step is stable.
+    """Return the tables for a problem, or raise an `InputError` if no step is stable.
 
     The error names the solid or the tolerance of the memory kernel.
     """
@@ -131,7 +131,7 @@ def largest_step(
 ) -> float:
     """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
 
-    It is 0 if the error of the kernel makes waves grow at any step.
+    The result is 0 if the error of the kernel makes waves grow at any step.
     """
     kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
     static = static_stiffness(modes[0], eta)
@@ -149,7 +149,7 @@ def largest_step(
 
 
 def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Floats:
-    """Return the matrix of an explicit step for a frictionless mode, kappa = |k| c_s dt."""
+    """Return the matrix of an explicit step for a frictionless mode with kappa = |k| c_s dt."""
     pairs = kernel.poles.size
     z = kernel.poles * kappa
     decay, gain = np.exp(z), kappa * phi(z)
@@ -188,7 +188,7 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
 
 
 def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
-    """Return the kernel of a wave vector on a plane with a share of mode II of (kx/k)²."""
+    """Return the kernel for a wave vector on a plane, with the share (kx/k)² of mode II."""
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
     return ExponentialSum(

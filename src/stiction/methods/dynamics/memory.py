@@ -1,4 +1,4 @@
-"""The memory of past slip rates: memory variables of each mode, and their time steps.
+"""Memory of past slip rates: memory variables for each mode, and their time steps.
 
 Problem
 -------
@@ -6,21 +6,20 @@ Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the convoluti
 
     S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
 
-It is therefore enough to know a memory variable for each pair (s_p, w_p) and
-mode,
+It is therefore enough to store a memory variable for each pair (s_p, w_p) and mode,
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
-The real and the imaginary part of V are two real signals, each with its own
-complex psi_p. On a plane the pairs before `Grid.split` have the weight (kx/k)²
-w_p. The pairs of mode III follow, with the weight (1 - (kx/k)²) w_p.
+The real and the imaginary part of V are two real signals. Each signal has a complex
+psi_p. On a plane the pairs before `Grid.split` have the weight (kx/k)² w_p. The
+pairs of mode III follow, with the weight (1 - (kx/k)²) w_p.
 
 Algorithm
 ---------
-Exponential time differencing (S. M. Cox and P. C. Matthews, Journal of
-Computational Physics 176, 2002): psi' = z/h psi + V is integrated exactly for a
-slip rate that is a polynomial in a step h. With z = s_p |k| c_s h, E = exp(z),
-and phi(z) = (exp(z) - 1)/z:
+The method is exponential time differencing (S. M. Cox and P. C. Matthews, Journal
+of Computational Physics 176, 2002): psi' = z/h psi + V is integrated exactly if the
+slip rate is a polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and
+phi(z) = (exp(z) - 1)/z:
 
 1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h phi(z). The
    variables are stored as y = psi/B, which saves a multiplication in each pass:
@@ -37,8 +36,9 @@ and phi(z) = (exp(z) - 1)/z:
    (`advance_with_ramp`, with the tables of `tabulate`). Before that
    `fading_memory` sums Re sum_p w_p E psi, the part of S at the end of the step
    that is already known.
-3. Between the two kinds of steps `to_explicit` divides by B and `to_implicit` multiplies by B.
-   They set `Phase`, which tells the form of `RuptureState.memory`.
+3. Between the two types of steps, `to_explicit` divides by B and `to_implicit`
+   multiplies by B. Both set `Phase`, which states the form of
+   `RuptureState.memory`.
 
 Layout
 ------
@@ -48,9 +48,9 @@ on a plane kx >= 0 and ky >= 0, because (kx, ky) and (-kx, ky) have the same |k|
 and share of mode II. On a plane an entry therefore has multiplicity 2. Entries
 are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier
 arrays as [block][copy][real, imaginary][64] and memory variables as
-[block][copy][pair][4][64]. The four rows are the memory that belongs to the real
-signal (real and imaginary part), then to the imaginary signal. The constant row
-length lets the compiler vectorise without run-time checks for overlap.
+[block][copy][pair][4][64]. The four rows hold the memory of the real signal (real
+and imaginary part), and then the memory of the imaginary signal. Because the row
+length is constant, the compiler can vectorise without run-time checks for overlap.
 """
 
 from typing import Any
@@ -88,7 +88,7 @@ def phi(z: Spectrum) -> Spectrum:
 
 
 def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
-    """Return entry and offset for each mode, and the multiplicity of entries."""
+    """Return the entry and offset for each mode, and the multiplicity of entries."""
     if len(half) == 1:
         entry = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
         copy, multiplicity = np.zeros_like(entry), 1
@@ -107,7 +107,7 @@ def blocks(entries: int) -> int:
 
 
 def zeros(size: int, kind: type = float) -> NDArray[Any]:
-    """Return zeros that begin at a cache line, so that no vector of a pass lies across two lines.
+    """Return zeros that begin at a cache line, so that no vector in a pass crosses two lines.
 
     NumPy's arrays may begin 16 bytes later. Every second load would then touch two lines, which
     makes a pass a third slower.
@@ -118,11 +118,11 @@ def zeros(size: int, kind: type = float) -> NDArray[Any]:
 
 
 def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
-    """Return work arrays whose distance is not a multiple of a page, so that loads do not wait.
+    """Return work arrays whose distance is not a multiple of a page, to avoid waiting loads.
 
     If two addresses are equal modulo 4096 bytes, processors assume that a load from the first
-    depends on an earlier store to the second. On grids of powers of two, steps would take half as
-    long again.
+    depends on an earlier store to the second. On grids with a power of two nodes, steps
+    would take 50 % longer.
     """
     distance = -(-size // 8) * 8 + 80
     buffer = zeros(count * distance, kind)
@@ -155,7 +155,7 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
 
 
 def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) -> ExplicitTables:
-    """Return the tables of `step_table` with the work arrays of a run."""
+    """Return the tables from `step_table`, with work arrays for a run."""
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     packed = zeros(blocks(grid.frequency.size) * grid.multiplicity * 2 * ENTRIES)
     spectra, fields = work_arrays(2, modes, complex), work_arrays(4, nodes, float)
@@ -164,7 +164,7 @@ def explicit_tables(grid: Grid, step: float, table: Floats, response: Floats) ->
 
 @jit_inside
 def pack(offset: Array, spectrum: Array, packed: Array) -> None:
-    """Write all modes of a transform but the mean in packed order."""
+    """Write all modes of a transform, except the mean, in packed order."""
     for q in range(1, spectrum.size):
         o = offset[q]
         packed[o] = spectrum[q].real
@@ -177,7 +177,7 @@ def advance_memory(
 ) -> None:
     """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
-    `e` has four rows for each pair: the real and imaginary part of E, then of w E B.
+    `e` has four rows for each pair: the real and imaginary parts of E, and of w E B.
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):
@@ -216,7 +216,7 @@ def advance_memory(
 def to_explicit(
     grid: Grid, state: RuptureState, step: float, table: Floats, memory_sum: Floats
 ) -> None:
-    """Step 3: divide psi by B of explicit steps h, and write Re sum w E psi to `memory_sum`."""
+    """Step 3: divide psi by B for explicit steps h. Write Re sum w E psi to `memory_sum`."""
     _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
@@ -228,7 +228,7 @@ def to_explicit(
 
 
 def to_implicit(grid: Grid, state: RuptureState, step: float) -> None:
-    """Step 3: multiply psi/B of explicit steps h by B."""
+    """Step 3: multiply psi/B by B for explicit steps h."""
     _scale_memory(grid, state.memory, step, divide=False)
     state.now["phase"] = Phase.IMPLICIT
 
@@ -282,10 +282,11 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
     """Step 2: write E, B and R of (4) for a step h, and their weighted sums.
 
-    `table`, [block][pair][4][64], gets E and B, and `ramp`, [block][pair][2][64], gets R.
-    `response` and `ramp_response` get Re sum w B and Re sum w R. On a line |k| c_s is j + 1
-    times the lowest frequency, so the exponentials of a pole are powers of the same number. Each
-    takes a product, with a relative error of 1e-16 j.
+    E and B are written to `table` with the layout [block][pair][4][64], and R to `ramp`
+    with [block][pair][2][64]. Re sum w B and Re sum w R are written to `response` and
+    `ramp_response`. On a line |k| c_s is j + 1 times the lowest frequency, so the
+    exponentials for a pole are powers of the same number. Each takes one product, and
+    has a relative error of 1e-16 j.
     """
     table, ramp = tables.table, tables.ramp
     response, ramp_response = tables.response, tables.ramp_response
@@ -326,7 +327,7 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
 
 @jit_inside
 def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Step 2: write Re sum w E psi of all modes to `tables.memory_sum`."""
+    """Step 2: write Re sum w E psi for all modes to `tables.memory_sum`."""
     pairs, multiplicity, split = grid.poles.size, grid.multiplicity, grid.split
     sums = tables.sums  # over the pairs before `split`, and over the pairs of mode III
     for block in range(memory.size // (FOUR_ROWS * pairs)):
@@ -389,7 +390,7 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
 def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
     """Set psi = V/(growth - s |k| c_s) for a slip rate that has always grown as exp(growth t).
 
-    Returns Re sum w psi, (modes,).
+    Returns Re sum w psi for all modes.
     """
     total = np.zeros(rate_hat.size, dtype=np.complex128)
     rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size

@@ -1,4 +1,4 @@
-"""A finite-element mesh of a block, 0 < x < L and 0 < y < H, on the nodes of its interface.
+"""A finite-element mesh for a block, 0 < x < L and 0 < y < H, on the nodes of its interface.
 
 Problem
 -------
@@ -8,7 +8,7 @@ the interface. The static response must agree with the closed form of
 
 Grid
 ----
-Columns lie at the nodes x = (i + 1/2) dx, so that each has a cell of the
+Columns lie at the nodes x = (i + 1/2) dx, so that each column has a cell of the
 interface. Beyond the outer columns half a cell remains, in which s_xx and s_xy
 vanish: a strip that only resists stretching along y. Rows are dx apart at the
 interface and up to five times as much above.
@@ -17,18 +17,18 @@ Elements (`_elements`)
 ----------------------
 Elements are bilinear. An element with the sides a and b has mean strains and two
 hourglass modes. Exact integration gives the energy of the means as a b (s . e)/2,
-and the energy of an hourglass as (c_11 b/a + G a/b)/24 times the square of u_00 -
-u_10 - u_01 + u_11, likewise for v. In mode III there is only u: c_11 is G, and
-the other coefficients are zero.
+and the energy of an hourglass mode as (c_11 b/a + G a/b)/24 times the square of
+u_00 - u_10 - u_01 + u_11, and likewise for v. In mode III there is only u. Then
+c_11 is G, and the other coefficients are zero.
 
 Algorithm (`make_mesh`)
 -----------------------
-1. Place the rows, and find elements, masses and the stencils that move nodes.
+1. Place the rows. Compute elements, masses and the stencils that move nodes.
 2. Condense the static response: eliminate the rows from the top downwards
    (`condensed`).
-3. Correct it: the difference of K between the closed form and the mesh acts on
-   the slip of the interface.
-4. Find the stable step of mesh, viscosity and correction (`_limit`).
+3. Correct the static response: the K of the closed form minus the K of the mesh
+   acts on the slip of the interface.
+4. Find the stable step for mesh, viscosity and correction together (`_limit`).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ GRID_VISCOSITY = 0.05
 
 
 class Mesh(NamedTuple):
-    """Block, its drive and its time step. Forces and masses are per unit depth."""
+    """A block with its drive and time step. Forces and masses are per unit depth."""
 
     spacing: float
     heights: Array
@@ -88,7 +88,7 @@ class Mesh(NamedTuple):
 
 
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
-    """Return the mesh of a problem's block, whose step is `courant` times the stability limit."""
+    """Return the mesh for a problem's block. Its step is `courant` times the stability limit."""
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
 
@@ -148,7 +148,7 @@ def _mesh(
 
 
 def row_heights(height: float, spacing: float) -> Array:
-    """Return the y of the rows, m. The first two are `spacing` apart."""
+    """Return the heights y of the rows, m. The first two are `spacing` apart."""
     steps = spacing * np.minimum(
         ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
     )
@@ -160,7 +160,7 @@ def row_heights(height: float, spacing: float) -> Array:
 
 
 def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Array]:
-    """Return the stiffness of elements with the heights b, and of the strips at their ends."""
+    """Return the stiffness of elements with heights b, and of the strips at their ends."""
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
@@ -213,7 +213,7 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return the share of a uniform traction on each row. The interface takes no share."""
+    """Return each row's share of a uniform traction. The interface takes no share."""
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
@@ -226,7 +226,7 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
 def _limit(
     speed: float, shear_speed: float, mesh: Mesh, correction: Array, viscous: float
 ) -> float:
-    """Return the largest stable step of mesh, viscosity and correction together, s."""
+    """Return the largest stable step, s, for mesh, viscosity and correction together."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     # Bound of the squared frequency of an element, then of the correction on the
     # interface.
@@ -242,7 +242,7 @@ def _limit(
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of an element row, for u and v at the lower, then the upper nodes."""
+    """Return the stiffness of an element row, for u and v at the lower and then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))
@@ -256,9 +256,10 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
 
 
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
-    """Return K of the mesh under a given force (Pa/m), q, and C (Pa); see `elasticity.blocks`.
+    """Return K of the mesh at a given force (Pa/m), q, and C (Pa). See `elasticity.blocks`.
 
-    Even and odd motion about the middle of the block are independent, which halves the matrices.
+    Motions that are even and odd about the middle of the block are independent, which
+    halves the matrices.
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)

@@ -1,4 +1,4 @@
-"""Ruptures with inertia as a method: options, solver, and thresholds of a run."""
+"""Ruptures with inertia as a method: options, solver, and thresholds for a run."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNKNOWN_AT_ONSET = (
 
 
 def _load_history(load: Any) -> PiecewiseLinear | None:
-    """Return the load history of samples (times, values), in s and Pa, or raise an `InputError`."""
+    """Return the load history for samples (times, values) in s and Pa, or raise an `InputError`."""
     if load is None:
         return None
     try:
@@ -76,19 +76,19 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, explicit steps its
-    rupture. Initial stress may be above the strength: such a patch breaks at
-    once, at zero load.
+    Adaptive implicit steps follow the creeping interface, and explicit steps follow
+    its rupture. Initial stress may exceed the strength. Such a patch breaks at once,
+    at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
         d tau_0/dt, Pa/s, positive. Between half-spaces, give either this or `load`.
     kernel_tolerance : float
-        Largest error (1) of the memory kernel, a sum of exponentials. The sum is
-        fitted once for each solid and stored on disk. The fit takes 1 s at 1e-6
-        (22 pairs) or half a minute at 1e-8 (35 pairs). Above about 1e-3 waves may
-        grow at any time step, which raises an error.
+        Largest error (1) of the memory kernel. The kernel is a sum of exponentials,
+        which is fitted once for each solid and stored on disk. The fit takes 1 s at
+        1e-6 (22 pairs) or half a minute at 1e-8 (35 pairs). Above about 1e-3, waves
+        may grow at any time step. This raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     slip_step : float
@@ -105,14 +105,13 @@ class Rupture:
         first instability, on planes, with curved friction laws, with an extent,
         and with stress above the strength.
     end_time : float, optional
-        Latest end of a run, s. It may be exceeded by a part of the last explicit
-        step.
+        Latest end of a run, s. The last explicit step may exceed it.
     load : (times, values), optional
         Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate. They
         are interpolated linearly, and the last slope continues.
     arrival : float
-        Share of tau_p - tau_r that a node has lost when the front arrives, in (0,
-        1]. The middle of the cohesive zone is 0.5, its tip 1e-3.
+        Share of tau_p - tau_r that a node has lost when the front arrives, in (0, 1].
+        Use 0.5 for the middle of the cohesive zone, and 1e-3 for its tip.
     stop : {"sliding", "onset", "rest", "time"}
         End of a run. "sliding": every node that can break is at its residual
         strength and, if the interface has an extent, has come to rest. "onset":
@@ -122,14 +121,15 @@ class Rupture:
         explicit steps until then. Every run but "time" also ends when no node
         slips and the load has stopped rising.
     implicit : bool
-        False takes explicit steps only. Slow loading then needs a million steps.
+        If false, only explicit steps are taken. Slow loading then needs a million
+        steps.
     max_steps : int
         Number of steps after which a run, or an event on a specimen, is abandoned.
     events : int
-        Also return the first so many events of each sample over 'event', and NaN
-        if there are fewer, with the variables of `equilibrium_path` and
-        `event_duration` (s). Between half-spaces they also have `event_time` (s)
-        and `event_radiated_energy` (J/m).
+        Also return this number of events for each sample over 'event', padded with
+        NaN. Events have the variables of `equilibrium_path` and `event_duration` (s).
+        Between half-spaces they also have `event_time` (s) and
+        `event_radiated_energy` (J/m).
 
     Raises
     ------
@@ -139,11 +139,11 @@ class Rupture:
     Notes
     -----
     **Specimens.** Loading is slow. The path follows `Equilibrium` up to each instability. Then
-    waves run through the blocks until they are at rest, and the path continues from there. The
-    options `courant`, `arrival`, `max_steps` and `events` have an effect, and so do the attenuation
-    and the masses of the specimen (`Blocks.quality_factor`, `Platen.mass`, `Pusher.mass`). The
-    result has the variables of `Equilibrium`, and `rupture_speed` and `median_rupture_speed` of
-    the sliding event.
+    waves run through the blocks until they are at rest, and the path continues from there.
+    The options `courant`, `arrival`, `max_steps` and `events` have an effect. The
+    attenuation and the masses of the specimen (`Blocks.quality_factor`, `Platen.mass`,
+    `Pusher.mass`) also have an effect. The result has the variables of `Equilibrium`, and
+    `rupture_speed` and `median_rupture_speed` for the sliding event.
 
     **Instabilities between half-spaces.** An instability is slip that the load
     does not drive. It begins when the mean shear stress has a maximum, after
@@ -158,16 +158,16 @@ class Rupture:
     radiate. Events that did not happen have the value NaN, with a warning. An
     overstressed start has no `critical_load`.
 
-    **Speeds.** `median_rupture_speed` is the speed of a rupture. `rupture_speed`,
-    the largest apparent speed, exceeds all wave speeds where a part as long as
-    twice the nucleation length breaks almost at once.
+    **Speeds.** Use `median_rupture_speed` as the speed of a rupture. `rupture_speed`
+    is the largest apparent speed. It exceeds all wave speeds if a part twice as long
+    as the nucleation length breaks almost at once.
 
     **Arrested events.** `arrested_events` counts instabilities in which Z V at a
     node exceeds 7.5 % of the median tau_p - tau_r before the mean stress is as
     high again or all is calm. `Equilibrium` also counts smaller jumps. If the
     last nodes beside the end of an extent creep to their residual strength, the
-    interface slides in the last instability before, which is not arrested. A run
-    that stops at "rest" ends before it can know.
+    interface slides in the last instability before, which is not arrested. A run that
+    stops at "rest" ends before this can be known.
 
     **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three
     times the drop tau_0 p + tau_i - tau_r at the largest load so far, so that
@@ -247,7 +247,7 @@ class Rupture:
         return self
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time of a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s."""
         shape = problem.interface.shape
         if problem.specimen is not None:
             drive = problem.specimen.drive
@@ -289,11 +289,11 @@ class Rupture:
         return variables
 
     def medium(self, problem: Problem) -> Medium:
-        """Return memory kernel and tables of a problem between half-spaces."""
+        """Return the memory kernel and tables for a problem between half-spaces."""
         return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return the solver for samples of a problem, with the memory kernel fitted once."""
+        """Return a solver for samples of a problem. The memory kernel is fitted once."""
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.program(problem))
         medium, rate = self.medium(problem), self.loading_rate
@@ -315,7 +315,7 @@ class Rupture:
         return solve
 
     def program(self, problem: Problem) -> specimens.RuptureProgram:
-        """Return the search for equilibria of a specimen, with waves between them."""
+        """Return the search for equilibria of a specimen, with waves between equilibria."""
         if reasons := refusals(problem, self):
             raise InputError(reasons)
         return specimens.RuptureProgram(problem, self)
@@ -355,7 +355,7 @@ def make_run(
     sample: int,
     stations: NDArray[np.int64] | None = None,
 ) -> Run:
-    """Return the run of a sample, which records every step at the nodes `stations`."""
+    """Return the run for a sample. It records every step at the nodes `stations`."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     friction, finite = medium.problem.friction, np.isfinite(strength)
@@ -392,7 +392,7 @@ def make_run(
 
 
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
-    """Return the mean load at which the weakest nodes of half a nucleation length slip, Pa."""
+    """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
     interface = medium.interface
     # Half the nucleation length of a line. On a plane, half the lengths along x
     # and y multiplied.
@@ -409,8 +409,9 @@ def _thresholds(
 ) -> Thresholds:
     """Return the thresholds at which steps change or end.
 
-    A run is calm if, while shear waves cross the interface, no node slips faster than a crack of
-    half the length of the interface driven by the load alone, or no node faster than before.
+    A run is calm if, while shear waves cross the interface, no node slips faster than
+    in a crack with half the length of the interface that only the load drives, or if
+    no node slips faster than before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()

@@ -123,7 +123,7 @@ Folder: TypeAlias = Converted[HeldPath | None, FilePath | None]
 
 @model
 class Save:
-    """Results that `simulate_rupture` keeps, and the place where it stores them.
+    """Results that `simulate_rupture` keeps, and the folder in which it stores them.
 
     Parameters
     ----------
@@ -140,10 +140,9 @@ class Save:
     to : path, optional
         Folder to write to during the run. Memory then stays bounded, and the
         result holds no fields; read them with
-        `stiction.methods.dynamics.save.open_rupture`. If the folder holds the
-        same run, interrupted, the run resumes from the last state written, with
-        results equal to the bit. If it holds the same run, finished, the run is
-        read.
+        `stiction.methods.dynamics.save.open_rupture`. If the folder holds a part of
+        the same run, the run resumes from the last written state, and the results are
+        equal to the bit. If the folder holds the finished run, the run is read.
 
     Examples
     --------
@@ -164,9 +163,10 @@ class Save:
         return self
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
-        """Return the flat node numbers of the stations, which must lie on the interface.
+        """Return the flat node numbers of stations, which must lie on the interface.
 
-        Places that are nearly zero, and stations where nothing can break, are doubted.
+        Warn about positions that are nearly zero, and about stations at nodes that
+        cannot break.
         """
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
@@ -269,7 +269,7 @@ class Recorder:
         return to_dataset(data, self.variables, coordinates, self.attributes)
 
     def begin(self, state: RuptureState) -> bool:
-        """Open the folder, and return whether it holds the same run, finished.
+        """Open the folder. Return whether it holds the same run in its finished state.
 
         If it holds a part of the same run, the state takes the values that were written last.
         """
@@ -296,7 +296,7 @@ class Recorder:
         return False
 
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
-        """Write frames and steps, once there are enough or `at_once`, and the checkpoint.
+        """Write frames and steps if there are enough, or `at_once`. Also write the checkpoint.
 
         With `last` there is no checkpoint: a run that resumes with more steps may have no frame at
         the step at which `max_steps` ended it.
@@ -312,7 +312,7 @@ class Recorder:
             write_checkpoint(folder / _CHECKPOINT, self.run, state, self._saved)
 
     def finish(self, dataset: xr.Dataset, stopped: str) -> None:
-        """Write the variables of the whole run beside its frames, unless the run can go on."""
+        """Write the variables of the whole run beside its frames, unless the run can continue."""
         if self.save.to is not None and stopped != "max_steps":
             without_time = dataset.drop_dims(["time", "step"], errors="ignore")
             _write(self.save.to / _SUMMARY, without_time)

@@ -1,4 +1,4 @@
-"""Ruptures as text files of the SCEC code comparison: one for each station, and rupture times."""
+"""Ruptures as text files for the SCEC code comparison: stations and rupture times."""
 
 from pathlib import Path
 from typing import Any
@@ -143,14 +143,14 @@ def write_scec(
 
 
 def _first_onset(run: Any) -> float:
-    """Return the time of the first event or onset of a run (s), or its begin without any."""
+    """Return the time of the first event or onset in a run (s), or else the begin of the run."""
     known = [run[name].values.ravel() for name in ("event_time", "onset_time") if name in run]
     times = np.concatenate([*known, [np.nan]])
     return float(np.nanmin(times) if np.isfinite(times).any() else run.time[0])
 
 
 def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
-    """Return names with as few decimals as tell the places along strike and down-dip (m) apart."""
+    """Return names with as few decimals as distinguish places along strike and down-dip (m)."""
     for decimals in range(MOST_DECIMALS + 1):
         width = 3 if decimals == 0 else 4 + decimals
         texts = [

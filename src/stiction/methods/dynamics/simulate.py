@@ -64,8 +64,8 @@ def simulate_rupture(
         On specimens, the number of the event in order, from 0. By default it is
         the sliding event.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable gets the
-        steps taken and 0.
+        True shows progress on standard error after a second. A callable receives the
+        number of steps taken and 0.
 
     Returns
     -------

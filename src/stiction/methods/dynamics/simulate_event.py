@@ -1,10 +1,9 @@
 """`simulate_rupture` on specimens: an event in space and time, and the velocity of the block.
 
 1. Follow the path of the sample to sliding, and choose the event.
-2. Run the event once as a trial, which shows how long it takes and how much
-   slips.
-3. Run it again and keep frames, with pictures of the block spread evenly over the
-   slip.
+2. Run the event once as a trial, which shows the duration and the amount of slip.
+3. Run the event again and keep frames. Pictures of the block are spread evenly over
+   the slip.
 """
 
 from __future__ import annotations
@@ -110,7 +109,8 @@ def simulate_event(
 class EventRecord:
     """Frames of an event up to now, with pictures of the block.
 
-    A trial of the event shows how much slips, so that the pictures are spread evenly over the slip.
+    A trial of the event shows the amount of slip, so that the pictures are spread
+    evenly over the slip.
     """
 
     def __init__(

@@ -1,11 +1,11 @@
-"""The start of a run on the quasi-static path, close to the first instability.
+"""Start a run on the quasi-static path, close to the first instability.
 
 Problem
 -------
 While the load tau_0 rises slowly at the rate R, slip follows the equilibria
-d(tau_0). Find the state of the run (slip, slip rate and memory variables) at a
-load tau_c - D, a distance D below the onset tau_c, without the steps that lead
-there. A run from this state must have the same onset.
+d(tau_0). Find the state of the run (slip, slip rate and memory variables) at a load
+tau_c - D, a distance D below the onset tau_c, without taking the steps to this
+state. A run from this state must have the same onset.
 
 Algorithm: our own
 ------------------
@@ -24,8 +24,9 @@ a = R/(2 D).
    is inertia (the kernel is even in a, except for the radiation of the mean).
 5. At the slipping nodes, the difference of stress and strength estimates the
    error of the state, and as a stress the amount by which the onset may be
-   misplaced. If it is more than `_MAX_ERROR` of the stress scale, go to 2 with a
-   larger D: V falls as D^(-1/2), its second derivative as D^(-5/2).
+   misplaced. If this error exceeds `_MAX_ERROR` of the stress scale, go to step 2
+   with a larger D: V falls as D^(-1/2), and its second derivative falls as
+   D^(-5/2).
 6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then
    begins at rest.
 """
@@ -48,7 +49,7 @@ _MAX_TRIALS = 5
 
 
 def static_program(problem: Problem) -> DenseProgram | None:
-    """Return the search for equilibria of a problem, or `None` on planes and for curved laws."""
+    """Return the search for equilibria of a problem, or `None` for planes and curved laws."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return DenseProgram(problem)
@@ -96,7 +97,7 @@ def _state_at(
     distance: float,
     rate: float,
 ) -> RuptureState | None:
-    """Steps 2 to 5: return the state at a distance (Pa) below the onset; `None` if it is unknown.
+    """Steps 2 to 5: return the state at a distance (Pa) below the onset. `None` if unknown.
 
     It is unknown if a node is beyond the first piece of its law, where the linear programme does
     not hold, or if a front has arrived, since the time of arrival is not known.

@@ -1,4 +1,4 @@
-"""Ruptures on specimens: a path of equilibria whose instabilities run with inertia.
+"""Ruptures on specimens: a path of equilibria, with inertia during instabilities.
 
 Problem
 -------
@@ -9,13 +9,13 @@ path continues from the final state of the waves.
 
 Algorithm of an event
 ---------------------
-1. Begin at the static state that becomes unstable. Raise the drive a little, as
-   it goes on to rise, and let slip grow a little along the unstable direction
-   (`begin`).
+1. Begin at the static state that becomes unstable. Raise the drive slightly,
+   because it continues to rise, and let slip grow slightly along the unstable
+   direction (`begin`).
 2. Follow the waves. The block is at rest when no node slips while shear waves
    cross the block and return (`DynamicEvent.run`).
 3. Let slip that is still under way come to rest in a static state
-   (`RuptureProgram.jump`). Nodes that were carried beyond this equilibrium count
+   (`RuptureProgram.jump`). Nodes that waves carried beyond this equilibrium count
    as stopped.
 """
 
@@ -91,16 +91,16 @@ def variables(method: Any, problem: Problem) -> dict[str, Variable]:
 
 @dataclass
 class DynamicEvent:
-    """Instability of a specimen while its waves run.
+    """An instability of a specimen, with waves.
 
     Attributes
     ----------
     before : EquilibriumState
         The equilibrium that became unstable.
     start : (n,) array
-        Stress of the static state at the start, less the initial stress, Pa.
+        Stress in the static state at the start, minus the initial stress, Pa.
     front : (n,) array
-        Slip with which the front arrives at a node, m. Infinite if it arrived
+        Slip, m, at which the front arrives at a node. Infinite if the front arrived
         before the event.
     slides : bool
         Whether every node has slipped.
@@ -168,10 +168,10 @@ def begin(
 
 
 class RuptureProgram(DenseProgram):
-    """Search for equilibria of a specimen, with waves between them.
+    """Search for equilibria of a specimen, with waves between equilibria.
 
     Between events loading is slow. Nodes that waves carried beyond the next
-    equilibrium rest below their strength afterwards.
+    equilibrium then rest below their strength.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ class RuptureProgram(DenseProgram):
 
 
 class RuptureSolver(OnsetSolver):
-    """Solver for samples of a specimen with inertia; thread-safe."""
+    """Solver for samples of a specimen with inertia. It is thread-safe."""
 
     program: RuptureProgram
     inertia = True
@@ -234,7 +234,7 @@ class RuptureSolver(OnsetSolver):
         super().__init__(problem, Equilibrium(events=events), program)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the variables of `Rupture`, each with the samples as first dimension."""
+        """Return the variables of `Rupture`. The first dimension of each is the sample."""
         refuse_overstress(rows)
         return super().__call__(rows)
 

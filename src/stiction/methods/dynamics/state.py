@@ -1,15 +1,15 @@
 """State of a rupture: constants of the run, variables, and diagnostics at every step.
 
-A run takes two kinds of steps. Implicit steps of adaptive size follow a creeping
-interface (`implicit`), and explicit steps of fixed size follow its waves
-(`explicit`). The diagnostic `phase` tells which kind comes next. Both solve, at
+A run takes two types of steps. Implicit steps with adaptive size follow a creeping
+interface (`implicit`), and explicit steps with fixed size follow its waves
+(`explicit`). The diagnostic `phase` states which type comes next. Both solve, at
 every node,
 
     tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
 
 tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f
-the stress that slip elsewhere transfers, mode by mode with the memory kernel C of
-`elasticity.memory_kernels`:
+the stress that slip at other nodes transfers. It is computed mode by mode with the
+memory kernel C from `elasticity.memory_kernels`:
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
 
@@ -62,7 +62,7 @@ Reason = IntEnum(
 
 
 class Phase(IntEnum):
-    """Kind of the next step, explicit or implicit. It decides the form of `RuptureState.memory`."""
+    """Type of the next step, explicit or implicit. `RuptureState.memory` depends on the type."""
 
     IMPLICIT = 0  # psi, the memory variables themselves
     EXPLICIT = 1  # psi/B, divided by their response B to a unit slip rate
@@ -149,7 +149,7 @@ STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")]
 
 
 def event_type(nodes: int) -> np.dtype[Any]:
-    """Return the type of the record of an event; pairs are before and after it."""
+    """Return the data type for the record of an event. Pairs are values before and after."""
     return np.dtype(
         [
             ("time", "f8"),  # when it began, s
@@ -162,7 +162,7 @@ def event_type(nodes: int) -> np.dtype[Any]:
 
 
 class StepRecord(NamedTuple):
-    """Rows to keep every step in. Without rows, no step is kept."""
+    """Rows that keep every step. Without rows, no step is kept."""
 
     steps: NDArray[Any]  # (steps,) array of DIAGNOSTICS
     stations: NDArray[Any]  # (steps, stations) array of STATION
@@ -189,7 +189,7 @@ class Thresholds(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Elastic half-spaces on a grid. Read-only, shared by threads."""
+    """Elastic half-spaces on a grid. They are read-only and shared by threads."""
 
     transform: Transform
     impedance: float  # Z = G/(2 c_s), Pa s/m
@@ -206,7 +206,7 @@ class Grid(NamedTuple):
 
 
 class Nodes(NamedTuple):
-    """Properties of the nodes that do not change in a run, each (nodes,)."""
+    """Properties of the nodes that do not change in a run. Each has shape (nodes,)."""
 
     peak: Array  # tau_p, Pa; infinite beyond the extent of the interface
     residual: Array  # tau_r, Pa
@@ -217,7 +217,7 @@ class Nodes(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Load and friction of an interface, and its stepping. Does not change in a run."""
+    """Load, friction and stepping for an interface. They do not change in a run."""
 
     law: Any  # ``friction.parameters``
     nodes: Nodes

@@ -1,4 +1,4 @@
-"""Scalars of a run: loads, moment, energies, rupture speeds."""
+"""Scalars of a run: loads, moment, energies and rupture speeds."""
 
 from typing import Any
 
@@ -51,8 +51,8 @@ def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run.
 
     Planes have median speeds along x and y, and no largest speed: the apparent speed of a front
-    that arrives at an angle can exceed all wave speeds. On a line it can where a long part breaks
-    almost at once.
+    that arrives at an angle can exceed all wave speeds. On a line this happens only if a
+    long part breaks almost at once.
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
@@ -65,7 +65,7 @@ def scalars(interface: Interface) -> dict[str, Variable]:
 def rate_spectrum(
     problem: Problem, time: Array, rate: Array
 ) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
-    """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N; on a plane N m.
+    """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N, or N m on a plane.
 
     The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with straight lines between the
     times (s), from one period in all to the waves that the nodes and times resolve. It is empty
@@ -90,16 +90,17 @@ def rate_spectrum(
 
 
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
-    """Return strain, fracture and radiated energy so far, J/m; on a plane J."""
+    """Return the strain, fracture and radiated energy so far, J/m, or J on a plane."""
     return _energies(run, state.slip, state.slip_hat, float(state.now["work"]))
 
 
 def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[str, float]:
-    """Return the energies of a slip and its transform on which the load has done this work.
+    """Return the energies for a slip, its transform, and the work that the load has done.
 
-    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry away the work
-    less friction and strain energy. The stress of a slipping node equals its strength, so the work
-    of friction follows from the slip alone.
+    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry
+    away the work minus the work of friction and the strain energy. The stress of a
+    slipping node equals its strength, so the work of friction follows from the slip
+    alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.peak), nodes.peak - nodes.residual, 0.0)
@@ -117,7 +118,7 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
 
 
 def arrested_events(run: Run) -> list[ArrestedEvent]:
-    """Return the events of a run so far, with what inertia knows of each."""
+    """Return the events in a run so far, with the variables that only inertia provides."""
     interface, events = run.medium.interface, []
     for record in run.events:
         states, radiated = [], []
@@ -137,7 +138,7 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
 
 
 def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
-    """Return a speed of the front along each axis, on the line through the onset, m/s."""
+    """Return the speed of the front, m/s, along each axis on the line through the onset."""
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
     arrival = state.arrival.reshape(interface.shape)
@@ -150,7 +151,7 @@ def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
 
 
 def _critical_load(run: Run, now: Any, stress: float) -> float:
-    """Return the load that carries the critical stress, Pa; NaN if it began overstressed."""
+    """Return the load, Pa, that carries the critical stress. NaN if the start was overstressed."""
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     began = now["start_load"] * nodes.profile + nodes.initial
@@ -195,7 +196,7 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
 def front_speed(
     name: str, interface: Interface, axis: int, arrival: Floats, nucleation: float
 ) -> float:
-    """Return a speed of a front along a line of nodes, named as in `SPEEDS`, m/s; NaN without."""
+    """Return the speed of a front, m/s, along a line of nodes, named as in `SPEEDS`, or NaN."""
     lengths, statistic = SPEED_SPANS[name]
     spacing = interface.spacings[axis]
     window = max(lengths * nucleation, 8.0 * spacing)
@@ -210,9 +211,10 @@ def front_speed(
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
     """Return the apparent speed of a front at each node on a line, m/s, or NaN.
 
-    `arrival` (s) is periodic, and NaN at nodes that the front did not reach. The speed is a mean
-    over `window` (m). It is NaN unless the arrival is strictly monotone over the window, so that
-    the birth of patches and the meeting of fronts do not count.
+    `arrival` (s) is periodic, and NaN at nodes that the front did not reach. The
+    speed is a mean over `window` (m). It is NaN unless the arrival is strictly
+    monotone over the window. This excludes the birth of patches and the meeting of
+    fronts.
     """
     # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))

@@ -1,4 +1,4 @@
-"""Waves in a block with friction on its interface: central differences in time, row by row.
+"""Waves in a block with friction on its interface, by central differences, row by row.
 
 Problem
 -------
@@ -11,16 +11,17 @@ change.
 Algorithm (`wave_steps`)
 ------------------------
 Leapfrog with steps of size h: velocities are known in the middle of a step, displacements at its
-end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step goes
-through the rows:
+end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step
+processes the rows:
 
-1. Compute the forces F on the row from its elements (`_force`). They depend on w alone, so that
-   only w is stored.
+1. Compute the forces F on the row from its elements (`_force`). They depend on w
+   alone, so only w is stored.
 2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
    (`_move`).
 3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate at which
-   its stress equals its strength, and rests if this rate would be negative. `Mesh.correction`, the
-   closed form of K less the K of the mesh, acts on the slip of the interface.
+   its stress equals its strength, and rests if this rate would be negative.
+   `Mesh.correction`, the K of the closed form minus the K of the mesh, acts on the slip of
+   the interface.
 4. Move the top with its platen (`_move_platen`), or let the pusher act on the ends
    (`_move_pusher`). The spring of the machine is semi-implicit. An infinitely
    stiff machine does not move.
@@ -40,10 +41,11 @@ from stiction.methods.equilibrium.sample import StaticSample, strength_at
 
 
 class Waves(NamedTuple):
-    """Displacements and velocities of a block.
+    """The displacements and velocities of a block.
 
-    Single precision is enough, as displacements are counted from the static state. u and v are the
-    sums w of displacement and viscous time times rate, which the elements need.
+    Single precision is enough, because displacements are counted from the static
+    state. u and v are the sums w (displacement plus viscous time times rate) that the
+    elements need.
     """
 
     u: Array
@@ -91,8 +93,8 @@ def _force(
 ) -> None:
     """Step 1: write the force on a row along an axis.
 
-    x0, x1 and x2 are the displacements along the axis in the row below, the row and the row above;
-    y0, y1 and y2 are the other components.
+    x0, x1 and x2 are the displacements along the axis in the row below, the row, and
+    the row above. y0, y1 and y2 are the other components.
     """
     n = force.shape[0]
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
@@ -133,7 +135,7 @@ def _slide(
     keep: float,
     gain: float,
 ) -> int:
-    """Step 3: move the nodes of the interface. Return how many never slipped."""
+    """Step 3: move the nodes of the interface. Return how many nodes never slipped."""
     dx, step = mesh.spacing, mesh.step
     slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
     never, fast = 0, False
@@ -175,7 +177,7 @@ def _slide(
 
 @jit_inside
 def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
-    """Step 4: move the top with its platen, behind its spring, or hold it."""
+    """Step 4: move the top with its platen and spring, or hold the top."""
     now, top, step = waves.now, waves.u.shape[0] - 1, mesh.step
     total = 0.0
     for i in range(force.shape[0]):
@@ -202,7 +204,7 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 
 @jit_inside
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
-    """Step 4: move the pusher behind its spring, or hold it, and apply its force to the block.
+    """Step 4: move the pusher with its spring, or hold the pusher. Apply its force to the block.
 
     The force F changes the speed of the pusher from v to v + g F, with the mobility g of the pushed
     nodes.
@@ -236,10 +238,10 @@ def wave_steps(
     sample: StaticSample, start: Array, front: Array, mesh: Mesh, waves: Waves, steps: int,
     ends: bool,
 ) -> int:  # fmt: skip
-    """Take a number of steps, with `ends` until all nodes have slipped. Return the number taken.
+    """Take steps, with `ends` only until all nodes have slipped. Return the number of steps.
 
-    `start` is the stress of the static state less the initial stress (Pa), and `front` the slip
-    with which the front arrives at a node (m).
+    `start` is the stress in the static state minus the initial stress (Pa). `front`
+    is the slip (m) at which the front arrives at a node.
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)
