@@ -1,8 +1,8 @@
 """The command line as ``python -m stiction``.
 
-Python looks for modules in the current folder first, and its files may come from a stranger. The
-current folder is therefore removed from the path, in which the command ``stiction`` does not have
-it either.
+Python looks for modules in the current folder first, and its files may come from a
+stranger. Therefore the current folder is removed from the path. The command
+``stiction`` does not search the current folder either.
 """
 
 import os

@@ -42,29 +42,30 @@ def simulator(
     Parameters
     ----------
     problem, random, method, seed
-        Arguments of `infer`.
+        As in `infer`.
     parameters : sequence of str
-        Keys as in the prior of `infer`, for example ``("correlation_length",
+        Keys, as in the prior of `infer`, for example ``("correlation_length",
         "marginal.low")``.
     samples : int
-        Number of tests that a call simulates.
+        Number of tests to simulate in each call.
     load_cell_error : float
         Standard deviation of the error of a peak, Pa.
 
     Returns
     -------
     callable
-        ``simulate(theta)`` returns the peaks, (samples,), Pa, for an array theta
-        with a number for each parameter. ``simulate(theta, first=k)`` returns the
-        peaks of samples k, k + 1, ..., which are independent of the first call if
-        k >= samples. All theta share the samples, so that peaks are smooth in
-        theta.
+        ``simulate(theta)`` returns an array (samples,) of peaks, Pa, for an array
+        theta with a number for each parameter. ``simulate(theta, first=k)`` returns
+        the peaks of samples k, k + 1, ... If k >= samples, these peaks are
+        independent of the first call. All theta share the samples, so peaks are
+        smooth functions of theta.
 
     Raises
     ------
     InputError
-        If an argument is invalid or a parameter does not exist. The function
-        raises it if the values of the parameters do not make a valid problem.
+        If an argument is invalid or a parameter does not exist. The returned function
+        raises an `InputError` if the values of the parameters give an invalid
+        problem.
 
     Examples
     --------
@@ -89,7 +90,7 @@ def simulator(
         raise InputError(unknown)
 
     def simulated(theta: Any, *, first: int = 0) -> Array:
-        """Return the peaks of samples first, first + 1, ... at theta, (samples,), Pa."""
+        """Return the peaks (samples,), Pa, of samples first, first + 1, ... at theta."""
         first = check("first", first, Number)
         values = check("theta", theta, Numbers)
         if values.shape != (len(parameters),) or not np.isfinite(values).all():

@@ -21,16 +21,16 @@ def __dir__() -> list[str]:  # what completion lists
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
     """Return the problem of Albertini, Karrer, Grigoriu and Kammer (2020).
 
-    It is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m and W
-    = 0.5 TPa/m. Only the strength above the residual strength affects the onset,
-    so the residual strength is zero.
+    The problem is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m
+    and W = 0.5 TPa/m. Only the strength above the residual strength affects the
+    onset, so the residual strength is zero.
 
     Parameters
     ----------
     nodes : int
         Number of nodes on the interface, even.
     plane : {"stress", "strain"}
-        The paper states plane stress, where G* = G (1 + nu), but prints G* = G/(1
+        The paper states plane stress, for which G* = G (1 + nu), but prints G* = G/(1
         - nu), which belongs to plane strain. ``plane="strain"`` gives the printed
         value.
     """
@@ -51,7 +51,7 @@ def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.Rando
     Parameters
     ----------
     problem : Problem
-        A problem, whose nucleation length h_n sets the scale.
+        A problem. Its nucleation length h_n sets the scale.
     correlation_ratio : float
         Ratio xi_0/h_n, positive, with xi_0 = 2 pi/lambda.
     """

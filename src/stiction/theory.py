@@ -1,4 +1,4 @@
-"""Theory of the local criterion and of cracks: results that need no ensemble."""
+"""Theory of the local criterion and of cracks: results that do not need an ensemble."""
 
 from stiction.methods.criterion.griffith import energy_release_rate, griffith_length
 from stiction.methods.criterion.local import nucleation_stress

@@ -87,7 +87,7 @@ def add(typing_context: Any, first: Any, second: Any) -> Any:
 
 @intrinsic
 def totals(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """The sums of the lanes of four of them, each (0 + 1) + (2 + 3), by half as many additions."""
+    """The lane sums of four vectors, each (0 + 1) + (2 + 3), with half as many additions."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         def chosen(first: Any, second: Any, lanes: list[int]) -> Any:

@@ -242,7 +242,7 @@ def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[A
 
 
 def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
-    """Return the pressure between blocks glued to rigid platens, divided by its mean, (n,).
+    """Return the pressure (n,) between blocks glued to rigid platens, divided by its mean.
 
     With rollers the pressure would be uniform, 1, and the top would widen by the
     share (3 - kappa)/(8 G) of its length. Glue prevents this through a shear traction

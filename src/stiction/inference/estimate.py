@@ -271,7 +271,7 @@ def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
 
 
 class Goodness(NamedTuple):
-    """Quality of the fit of a family of marginals: its best member, and two measures.
+    """How well a family of marginals fits: its best member, and two measures of the fit.
 
     `distance` is Kolmogorov's distance. `score` is the score (step 4) minus the score of
     the best family: 0 for the best family, negative for others. Differences below 2 do not

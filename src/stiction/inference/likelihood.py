@@ -1,4 +1,4 @@
-"""Likelihood of measured peaks, from densities of simulated onsets on a grid of parameters.
+"""Likelihood of measured peaks, from simulated onsets on a grid of parameters.
 
 Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error
 were measured on specimens with onset T. Compute the likelihood L(theta) = prod_j

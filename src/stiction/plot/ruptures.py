@@ -259,7 +259,7 @@ def film(
     frames: int = 160,
     progress: Show = True,
 ) -> Path:
-    """Write a film of a rupture: stress and slip rate.
+    """Write a film of the stress and the slip rate in a rupture.
 
     Parameters
     ----------

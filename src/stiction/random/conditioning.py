@@ -389,7 +389,7 @@ def _gaussians(
 def _log_ratio(
     measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
 ) -> LogRatio:
-    """Return the logarithm of the ratio of l_k to its Gaussian, as a function of place and z.
+    """Return a function of place and z: the log ratio of l_k to its Gaussian.
 
     The Gaussian is scaled to 1 at the `mean`, because a constant factor at a place
     does not matter.

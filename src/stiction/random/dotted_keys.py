@@ -20,7 +20,7 @@ MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 
 
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
-    """Return a copy of a model object, or of a list of them, with values set by dotted keys.
+    """Copy a model object, or a list of model objects, and set values by dotted keys.
 
     Messages begin with `path`, the dotted key that leads to the object. Raises an
     `InputError` if a value is invalid, or if a key does not exist. The message then

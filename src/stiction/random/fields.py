@@ -516,7 +516,7 @@ class RandomInterface:
 
     @checked
     def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
-        """Map draws (samples, dimension) to profiles by name, (samples, *shape) each.
+        """Map draws (samples, dimension) to profiles (samples, *shape) by name.
 
         For a property that is not random, the name is `FACTOR` followed by the
         property.

@@ -84,7 +84,7 @@ class Stream(NamedTuple):
 def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
-    """Fill `out`, (samples, rows, columns), with fields (1). A line has a single row."""
+    """Fill `out`, with shape (samples, rows, columns), with fields (1). A line has a single row."""
     samples, rows, columns = out.shape
     half = columns // 2
     scale = 0.5 * rows * columns

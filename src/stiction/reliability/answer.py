@@ -310,7 +310,7 @@ class Answer(Result):
         return "\n".join([result, *self._moved()])
 
     def _moved(self) -> list[str]:
-        """Return lines of text that tell how each assumption changes the design."""
+        """Return lines of text that show how each assumption changes the design."""
         effects = self.sensitivities
         if not effects.sizes.get("source"):
             return []

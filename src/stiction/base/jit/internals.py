@@ -37,7 +37,7 @@ if numba.version_info.short > NEWEST:
 
 
 class _Locator(_CacheLocator):
-    """The folder of a function's compiled forms, named by a digest of the text of its file.
+    """The folder for a function's compiled forms, named by a digest of the source text.
 
     Another environment with the same package therefore compiles nothing again.
     """

@@ -23,7 +23,8 @@ off them (the sum of K d over them is not negative). So the sum of (1) over them
 grows by no more than strength falls and the load on them rises. In a slow instability strength
 falls by ten times as much as <tau>. If locked nodes at their residual strength slip again because
 the load rises, waves may overshoot and lower <tau>, but strength does not fall. A stress above the
-strength at the start counts as strength, because its release is an instability, too.
+strength at the start counts as strength, because the release of this stress is also an
+instability.
 
 Algorithm, after each step of a run (`observe`)
 -----------------------------------------------

@@ -188,7 +188,7 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
 
 
 def _stencils(elements: Array, strips: Array) -> Array:
-    """Return the coefficients of the force on a node, (rows, axis, 5, 3).
+    """Return the coefficients (rows, axis, 5, 3) of the force on a node.
 
     The last index is the row below, the row of the node, and the row above. The
     five coefficients belong to

@@ -193,7 +193,7 @@ class EventRecord:
         }
 
     def dataset(self, method: Any, stopped: str, path: SamplePath) -> xr.Dataset:
-        """Return the frames of the event and pictures of the block, with all events of the path."""
+        """Return the event's frames, pictures of the block, and all events on the path."""
         problem, interface = self.problem, self.problem.interface
         arrival = self.event.waves.arrival
         reached = bool(np.isfinite(arrival).any())

@@ -73,7 +73,7 @@ def _read_netcdf(content: bytes) -> xr.Dataset:
 
 
 def _read_image(content: bytes) -> xr.DataArray:
-    """Return the grey values of an image, (nx, ny). Its first line is at y = 0."""
+    """Return the grey values (nx, ny) of an image. The first line is at y = 0."""
     import xarray as xr
     from PIL import Image
 

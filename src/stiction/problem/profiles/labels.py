@@ -441,7 +441,7 @@ def _only(data: Any, names: list[Any]) -> Any:
 
 
 def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
-    """Return the message that lists all columns where the right one is not clear."""
+    """Return a message that lists all columns, because the choice is ambiguous."""
     units = {name: unit_of(data.variables[name]) for name in names if not str(name).isdecimal()}
     shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
     listed = ", ".join(shown[:LISTED_COLUMNS]) or f"{len(names)} columns without names"

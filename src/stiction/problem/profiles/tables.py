@@ -446,7 +446,7 @@ def _not_a_number(line: int, cell: str) -> str:
 
 
 def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
-    """Return the index of the first row of numbers, and the columns of numbers (step 2)."""
+    """Return the index of the first row with numbers, and the columns with numbers (step 2)."""
 
     def is_value(cell: str, or_empty: bool = False) -> bool:
         value = _number(cell, words, None)
