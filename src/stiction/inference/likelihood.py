@@ -350,10 +350,10 @@ def make_likelihood(
 ) -> Likelihood:
     """Simulate the onsets that the likelihood needs (steps 1 to 5).
 
-    `lengths` holds the length of each kind of specimen, m, or None for the length of the
-    problem. `variable` is the name of the peaks among the results, and `error` is the
-    standard deviation of the load-cell error. `box` is the relevant part of the prior,
-    in u with shape (2, parameters), and by default the whole prior.
+    `lengths` holds the specimen length, m, for each kind, or None for the length in
+    the problem. `variable` is the name of the peaks among the results, and `error` is
+    the standard deviation of the load-cell error. `box` is the relevant part of the
+    prior, in u with shape (2, parameters), and by default the whole prior.
     """
     box = prior.whole if box is None else box
     method, meter = simulation.method, simulation.meter

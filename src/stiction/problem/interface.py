@@ -229,7 +229,7 @@ class Interface:
         return self
 
     def _wrong_extent(self) -> str | None:
-        """Return what is wrong with the extent, or nothing if it is valid."""
+        """Return what is wrong with the extent, or None if the extent is valid."""
         extent, ends = self.extent, self._ends
         if extent is None:
             return None

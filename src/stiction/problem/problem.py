@@ -343,7 +343,7 @@ class Problem:
         return self.interface.inverse_transform(symbol * self.interface.transform(slip))
 
     def relief(self, slip: Array) -> float:
-        """Return the load factor minus the mean stress, Pa, at a slip (m, flattened).
+        """Return by how much a slip (m, flattened) lowers the mean stress, Pa.
 
         A machine of finite stiffness loses force when the interface slips, and nodes
         beyond the extent take over stress. The mean covers the nodes that can break,
@@ -355,7 +355,7 @@ class Problem:
 
     @cached_property
     def relief_of_nodes(self) -> Array:
-        """Relief by a unit slip of each node of an interface that ends, (nodes,), Pa/m.
+        """Relief (nodes,), Pa/m, by unit slip at each node, for an interface that ends.
 
         K is symmetric, so the mean of K d over the nodes that can break is <K b, d> over their
         number, where b is 1 at these nodes and 0 beyond.
@@ -710,7 +710,7 @@ class Problem:
         return twice
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
-        """Return the profiles of a given `Sample` by name. Refuse a sample of another problem."""
+        """Return the profiles of a given `Sample` by name, or refuse a foreign sample."""
         if sample.shape != self.interface.shape:
             shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
             raise InputError(f"profiles: the sample has {shapes}")

@@ -27,10 +27,10 @@ nodes that weaken."""
 
 
 def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
-    """Return the largest weakening rate, Pa/m, in (samples, *shape) among nodes that may break.
+    """Return the largest weakening rate, Pa/m, among nodes that may break.
 
-    Barriers do not count: with a uniform critical slip they weaken steeply but never
-    slip.
+    Arrays have shape (samples, *shape). Barriers do not count: with a uniform
+    critical slip they weaken steeply but never slip.
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():

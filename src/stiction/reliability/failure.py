@@ -441,8 +441,8 @@ def design_stress(
 ) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
-    The design stress is a quantile of the onset stress. It is computed from one set
-    of repetitions of subset simulation.
+    The design stress is a quantile of the onset stress. One set of repetitions gives
+    the quantile.
 
     Parameters
     ----------

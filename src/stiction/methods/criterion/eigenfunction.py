@@ -116,7 +116,7 @@ def grid_weights(half_width: float) -> Array:
 
 
 def around(w: Array, nodes: int) -> Array:
-    """Return the weights w_0, w_1, ... on both sides of node 0 of a periodic line, (nodes,)."""
+    """Return weights w_0, w_1, ... on both sides of node 0 on a periodic line, as (nodes,)."""
     both = np.zeros(nodes)
     offsets = np.arange(w.size)
     np.add.at(both, offsets % nodes, w)

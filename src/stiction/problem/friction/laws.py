@@ -47,9 +47,9 @@ _VALID = {
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), in which f falls from 1 to 0.
 
-    A law consists of the function f in its `parameters`, the integral of f and the
-    inverse of f. A law takes the arguments of `LinearWeakening`, with W = -f'(0)
-    (tau_p - tau_r)/d_c and Gamma = (tau_p - tau_r) d_c times the integral of f.
+    A law consists of the function f in its `parameters`, and the integral and inverse
+    of f. A law takes the arguments of `LinearWeakening`, with W = -f'(0) (tau_p -
+    tau_r)/d_c and Gamma = (tau_p - tau_r) d_c times the integral of f.
     """
 
     family: ClassVar[str] = "laws"

@@ -201,8 +201,8 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
     """Step 2: unmark the nodes whose solution is below zero. Return how many.
 
-    A solution counts as below zero in two cases: if K_ii times the solution is below
-    -`atol` (Pa), or if the solution is below -`rtol` times the largest solution.
+    A solution counts as below zero if K_ii times the solution is below -`atol` (Pa),
+    and the solution is also below -`rtol` times the largest solution.
     """
     solution = workspace.solution
     largest = 1.0
