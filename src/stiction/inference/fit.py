@@ -130,9 +130,9 @@ class FieldFit(Result):
     interval : dict of str to (float, float)
         Bootstrap interval for each parameter. The interval for the noise may begin at
         zero. Intervals for bounds of the marginal end outside the values. Intervals
-        for exponent and anisotropy end at the searched ranges, 0.65 to 16 and 0.05 to
-        20. With `between`, the intervals for ``mean`` and ``between`` come from the
-        posterior given the levels of the records.
+        for exponent (0.65 to 16) and anisotropy (0.05 to 20) end at the searched
+        ranges. With `between`, the intervals for ``mean`` and ``between`` come from
+        the posterior given the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField

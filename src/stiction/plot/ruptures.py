@@ -164,7 +164,8 @@ def events(
     result : Dataset, or list or mapping of Dataset
         From `monte_carlo`, `onset` or a study whose method has ``events=``, or from
         `simulate_rupture` or `equilibrium_path`. Give several as a list, or by name.
-        problem : Problem, optional Needed only if the result does not hold it.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
 
     Returns
     -------

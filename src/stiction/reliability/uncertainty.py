@@ -1,8 +1,8 @@
 """Errors of estimated probabilities: intervals and the variance of correlated chains.
 
-Sources. Intervals for a count follow Clopper and Pearson (1934), Biometrika 26,
-404. The variance of chains from their genealogy follows Chan and Lai (2013), Annals
-of Statistics 41, 2877, and Lee and Whiteley (2018), Biometrika 105, 609.
+Sources. Clopper and Pearson (1934), Biometrika 26, 404, derive intervals for a
+count. Chan and Lai (2013), Annals of Statistics 41, 2877, and Lee and Whiteley
+(2018), Biometrika 105, 609, derive the variance of chains from their genealogy.
 """
 
 import math
