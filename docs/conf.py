@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import os
 import re
 import sys
 import tomllib
+import warnings
 from pathlib import Path
 
 import click
@@ -20,6 +23,7 @@ os.environ.pop("MPLBACKEND", None)
 sys.path.insert(0, str(HERE / "_extensions"))
 
 import stiction  # noqa: E402  # after the environment is set
+from stiction.base import progress  # noqa: E402
 from stiction.cli.commands import app as commands  # noqa: E402
 
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
@@ -95,6 +99,15 @@ HOW_TOS = re.findall(
     r"\[([^\]`]+)\]\((\w+)\.py\)", (ROOT / "examples" / "README.md").read_text("utf-8")
 )
 SCRIPTS = ROOT / "build" / "how-to"
+
+
+def keep_pages_clean(conf, name):
+    """Leave paths, progress and the compilation of kernels out of the printed output of scripts."""
+    warnings.formatwarning = lambda text, kind, *_, **__: f"{kind.__name__}: {text}\n"
+    logging.getLogger("stiction").setLevel(logging.ERROR)
+    progress.LONG = math.inf
+
+
 sphinx_gallery_conf = {
     "examples_dirs": [str(SCRIPTS), "gallery"],
     "gallery_dirs": ["how-to", "pictures"],
@@ -107,6 +120,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_memory": False,
     "capture_repr": (),
+    "reset_modules": ("matplotlib", keep_pages_clean),
     "abort_on_example_error": True,
 }
 

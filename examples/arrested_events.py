@@ -21,7 +21,7 @@ for sample in np.flatnonzero(onsets.arrested_events)[:5]:
     stress, length = float(first.event_stress) / 1e6, float(first.event_length) * 1e3
     print(f"sample {sample}: at {stress:.3f} MPa, {length:.1f} mm long")
 
-busiest = int(onsets.arrested_events.argmax())
+busiest = int(onsets.arrested_events.values.argmax())
 onset = onsets.isel(sample=busiest)
 loads = np.linspace(0.9 * float(onset.first_instability), float(onset.critical_load), 20)[:-1]
 path = st.equilibrium_path(problem, tau_p[busiest], loads)
