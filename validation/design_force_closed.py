@@ -14,7 +14,8 @@ Steps, as in `stiction.inference.specimens`, but for arrays of its own:
 3. The likelihood at (m, s) is the product over levels and peaks.
 4. The predictive distribution function of a further peak is the mean over the posterior.
 
-Truths of b have s = 0.08: log-normal, Weibull, gamma, normal, and two batches of 25 and 75 %.
+Truths of b have s = 0.08: log-normal, Weibull, gamma, normal, two batches of 25 and 75 %, and an
+exponential lower tail. A rare batch, 5 % of the specimens, is weaker by a quarter.
 The right design is a quantile of two million draws.
 
 Run: ``python validation/design_force_closed.py [CAMPAIGNS [SEED]]``
@@ -74,6 +75,11 @@ def factors(truth, count, rng):
         apart = SCATTER / np.sqrt(0.25 * 0.75)
         means = np.where(rng.random(count) < 0.25, 1.0 - 0.75 * apart, 1.0 + 0.25 * apart)
         return means * (1.0 + 0.02 * rng.standard_normal(count))
+    if truth == "lower tail":
+        return 1.0 + SCATTER * (1.0 - rng.standard_exponential(count))
+    if truth == "rare batch":  # beside a normal scatter of 5.8 %
+        means = np.where(rng.random(count) < 0.05, 0.75, 1.0) / 0.9875
+        return means * (1.0 + 0.058 * rng.standard_normal(count))
     return law(truth, SCATTER).rvs(count, random_state=rng)
 
 
@@ -151,7 +157,8 @@ def student(values):
 def main(campaigns=150, seed=1):
     """Print true over promised probabilities, designs over the right ones, intervals that hold."""
     rng = np.random.default_rng(seed)
-    for truth in ("lognormal", "weibull", "gamma", "normal", "two batches"):
+    names = "lognormal", "weibull", "gamma", "normal", "two batches", "lower tail", "rare batch"
+    for truth in names:
         spread = np.exp(OF_PEAK * rng.standard_normal(2_000_000))
         known = np.sort(factors(truth, 2_000_000, rng) * spread)
         right = np.quantile(known, PROMISED)

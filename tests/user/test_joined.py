@@ -11,6 +11,7 @@ from setups import make_problem
 import stiction as st
 from stiction.inference import joined as joining
 from stiction.inference.specimens import PRIOR_SCALE
+from stiction.random.equally_likely import as_random, origin
 
 PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 RNG = np.random.default_rng(8)
@@ -122,6 +123,19 @@ def test_profiles_and_peaks_are_joined():
     with pytest.warns(st.AccuracyWarning, match="contradict the profiles, p = 0.0"):
         apart = st.infer(PROBLEM, fit, 1.5 * peaks, **LOCAL)
     assert any("contradict" in note for note in apart.notes)
+    # A design repeats the doubts, and says what so few specimens cannot exclude.
+    uncertain = st.uncertain(apart, {"problem.friction.weakening_rate": (0.2e12, 0.3e12)})
+    assert origin(as_random(uncertain)) is apart
+    design = st.design_stress(
+        PROBLEM, apart, probability=0.1, method=st.LocalCriterion(), target_cv=0.5,
+        sensitivities=False, progress=False,
+    )  # fmt: skip
+    assert {*apart.notes} <= {*design.warnings}
+    assert f"! {apart.notes[0]}" in str(design)
+    specimens = len(RECORDS) + len(peaks)
+    share = 1.0 - 0.05 ** (1.0 / specimens)
+    assert design.assumption.startswith(f"{specimens} specimens cannot exclude")
+    assert f"up to {share:.0%} of all" in design.assumption
     # The prior of the scatter decides where it is narrow, and that of the mean.
     prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
     told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)
@@ -143,7 +157,7 @@ def test_what_joining_refuses():
         "did you mean 'weibull'",
         lambda: st.infer(PROBLEM, EVEN, PEAKS, between="weibul", **LOCAL),
     )
-    refuses("need parameters with a prior", lambda: found.prior_transform([0.5] * 4))
+    refuses("need a posterior from st.infer", lambda: found.prior_transform([0.5] * 4))
     stored = found.interfaces(4)
     refuses(
         "holds draws of mean and scatter", lambda: st.infer(PROBLEM, stored, PEAKS, **LOCAL)

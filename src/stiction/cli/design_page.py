@@ -95,11 +95,11 @@ def write_design_page(
             page.figure(figure, "What moves the design. The band is its interval.")
         page.table("What moves the design", *_moves(design))
     page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources or {}))
-    doubts = [*design.warnings]
+    doubts = [*design.warnings, *([design.assumption] if design.specimens else [])]
     for item in evidence:
         page.listing(f"Evidence: {type(item).__name__}", str(item))
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
-    page.table("Doubts", ["doubt"], [[text] for text in doubts or ["none"]])
+    page.table("Doubts", ["doubt"], [[text] for text in dict.fromkeys(doubts or ["none"])])
     try:
         write_whole(place, page.html().encode())
     except OSError as error:

@@ -172,6 +172,11 @@ class FieldFit(Result):
     _prior: FactorPrior
 
     @property
+    def specimens(self) -> int:
+        """Number of specimens whose scatter was fitted. 0 without `between`."""
+        return self._levels.size if self._families else 0
+
+    @property
     def _estimate(self) -> Estimate:
         return self._repeated[0].truth
 

@@ -80,6 +80,11 @@ class SpecimenPosterior(Posterior):
     agreement: Agreement | None = field(default=None, repr=False)
 
     @property
+    def specimens(self) -> int:
+        """Number of specimens that were scanned or tested."""
+        return self.grid.profiles.levels.size + sum(map(len, self.peaks.values))
+
+    @property
     def families(self) -> dict[str, float]:
         """Posterior probability of each family for the factor between specimens."""
         return self.grid.families

@@ -293,6 +293,12 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     return EquallyLikely(members, source=source, constants=tuple(constants))
 
 
+def origin(random: Any) -> Any:
+    """Return the fit or posterior from which random interfaces were drawn, or `None`."""
+    source = getattr(random, "source", None)
+    return origin(source.given) or source.given if isinstance(source, Uncertain) else source
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Uncertain(Result):
     """Source with distributions of parameters and of constants in the problem."""

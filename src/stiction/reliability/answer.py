@@ -28,6 +28,7 @@ from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.random.equally_likely import MAX_MEMBERS
 from stiction.reliability.tail import Tail, two_levels_refused
+from stiction.reliability.uncertainty import CONFIDENCE
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
@@ -126,7 +127,8 @@ class Answer(Result):
         Share of plain samples in which the event does not happen at any stress.
         With a stiff machine, an interface may stay stable and carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer. Empty if there are no such reasons.
+        Reasons not to trust the answer, including the doubts of a fit or posterior.
+        Empty if there are no such reasons.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
@@ -158,6 +160,8 @@ class Answer(Result):
         First quantity of the printed answer: 'stress', 'force' or
         'friction_coefficient', as requested. For `design_stress` it is the force
         if the area is known.
+    specimens : int
+        Number of measured specimens behind the scatter between specimens, or 0.
     """
 
     stress: float
@@ -181,6 +185,7 @@ class Answer(Result):
     confidence: float = 0.75
     of_stress: bool = False
     quantity: str = "stress"
+    specimens: int = 0
 
     @classmethod
     def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
@@ -305,9 +310,10 @@ class Answer(Result):
             sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
             result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         if self.algorithm == "exact":
-            return f"{result}; {self.reason}"
-        result += f"; {self.algorithm}, {self.evaluations} evaluations"
-        return "\n".join([result, *self._moved()])
+            result += f"; {self.reason}"
+        else:
+            result += f"; {self.algorithm}, {self.evaluations} evaluations"
+        return "\n".join([result, *self._moved(), *(f"  ! {text}" for text in self.warnings)])
 
     def _moved(self) -> list[str]:
         """Return lines of text that show how each assumption changes the design."""
@@ -332,7 +338,18 @@ class Answer(Result):
             lines.append(
                 f"    by family of the factor between specimens: {', '.join(families)}"
             )
+        if self.specimens:
+            lines.append(f"    {self.assumption}")
         return lines
+
+    @property
+    def assumption(self) -> str:
+        """What the measured specimens cannot exclude, with a confidence of 95 %."""
+        unseen = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / self.specimens)
+        return (
+            f"{self.specimens} specimens cannot exclude a weaker batch with a share of up to"
+            f" {unseen:.0%} of all specimens"
+        )
 
 
 def band_of(members: Array) -> tuple[float, float]:

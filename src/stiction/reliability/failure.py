@@ -39,7 +39,7 @@ from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
-from stiction.random.equally_likely import AnyRandom, as_random
+from stiction.random.equally_likely import AnyRandom, as_random, origin
 from stiction.random.spectra import Share
 from stiction.reliability.answer import (
     Answer,
@@ -241,7 +241,10 @@ def _answered(
         experiment, answer = _of_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
-    return replace(answer, warnings=tuple(texts_of(warned)))
+    source = origin(experiment.random)
+    doubts = [*getattr(source, "doubts", ()), *getattr(source, "notes", ())]
+    specimens = getattr(source, "specimens", 0)
+    return replace(answer, warnings=(*texts_of(warned), *doubts), specimens=specimens)
 
 
 def _of_enough_members(
