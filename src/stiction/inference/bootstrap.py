@@ -40,7 +40,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
-from stiction.ensemble.batches import in_threads, usable_cores
+from stiction.ensemble.batches import in_threads
 from stiction.inference.estimate import NAMES, Estimate, estimate
 from stiction.inference.marginal_fit import Family, beta_of
 from stiction.inference.whittle import RANGES, origin
@@ -81,7 +81,6 @@ def bootstrapped(
     confidence: float,
     seed: int,
     progress: Show,
-    workers: int | None = None,
     further: Sequence[tuple[Estimate, int]] = (),
 ) -> tuple[list[Repetitions], list[Repetitions]]:
     """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
@@ -100,7 +99,8 @@ def bootstrapped(
             meter.advance()
             return again
 
-        results = in_threads(refit, range(count), workers or usable_cores())
+        # More threads would wait for each other, as most of the time is in Python's own code.
+        results = in_threads(refit, range(count), workers=1)
         fits = [result for result in results if result is not None]
         if len(fits) < MIN_REPETITIONS:
             raise NotRepeated(truth.setting.marginal, len(fits), count)

@@ -330,7 +330,6 @@ def fit_field(
     bootstrap: Annotated[Count, Field(ge=MIN_REPETITIONS)] = 200,
     confidence: Share = 0.9,
     seed: Number = 0,
-    workers: Count | None = None,
     progress: Progress = True,
 ) -> FieldFit:
     """Fit a random field to measured profiles, with an interval for every parameter.
@@ -393,8 +392,6 @@ def fit_field(
         Confidence level of the intervals.
     seed : int
         Seed for the repetitions.
-    workers : int, optional
-        Number of threads, by default all cores. Results do not depend on it.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -475,7 +472,7 @@ def fit_field(
         # 3.
         try:
             repeated, further = bootstrapped(
-                estimates[0], bootstrap, confidence, seed, progress, workers,
+                estimates[0], bootstrap, confidence, seed, progress,
                 list(zip(estimates[1:], counts, strict=False)),
             )  # fmt: skip
             break
