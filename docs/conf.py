@@ -90,7 +90,7 @@ def scrape_figure(block, block_vars, gallery_conf):
     if not isinstance(figure, Figure) or figure.canvas.manager is not None:
         return ""
     path = next(block_vars["image_path_iterator"])
-    figure.savefig(path, dpi=150)
+    figure.savefig(path, dpi=270)
     return figure_rst([path], gallery_conf["src_dir"])
 
 
@@ -114,6 +114,7 @@ sphinx_gallery_conf = {
     "backreferences_dir": "api/backreferences",
     "doc_module": ("stiction",),
     "image_scrapers": ("matplotlib", scrape_figure),
+    "image_srcset": ["3x"],
     "thumbnail_size": (800, 540),
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",

@@ -327,7 +327,7 @@ NETCDF_ATTACKS = {
     "large chunks": ("more than the limit", lambda file: file.create_dataset(
         "strength", (8,), "f8", maxshape=(None,), chunks=(2**26,), compression="gzip")),
     "large values of a small chunk": ("another size than its chunks", inflating),
-    "another filter": ("unusual way", lambda file: file.create_dataset(
+    "another filter": ("unsupported filter", lambda file: file.create_dataset(
         "strength", (8,), "f8", compression="lzf")),
 }  # fmt: skip
 

@@ -89,7 +89,7 @@ def nearest(given: str, valid: Sequence[str]) -> str:
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
-    """Return the same message, preceded by the purpose of the name."""
+    """Return the message of `unknown`, preceded by what the name stands for."""
     return f"{what}: {unknown(given, valid)}"
 
 

@@ -150,7 +150,9 @@ def _check_storage(dataset: Any) -> None:
     filters = _filters(dataset)
     packing = [number for number in filters if number != CHECKSUM]
     if packing not in PACKED or len(filters) - len(packing) > 1:
-        raise InputError(f"{dataset.name!r} is packed in an unusual way. Write it with zlib")
+        raise InputError(
+            f"{dataset.name!r} is compressed with an unsupported filter. Write it with zlib"
+        )
 
 
 def _filters(dataset: Any) -> list[int]:

@@ -146,7 +146,7 @@ def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
 
 
 def _continuous_width(nodes: int, rate: float) -> int:
-    """Return the nodes in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
+    """Return the number of nodes in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
     return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate), 1.0) * nodes)
 
 

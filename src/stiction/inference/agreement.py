@@ -267,7 +267,7 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
         )
     if prediction[name].ndim != 1 or len(measured.values) > 1:
         raise InputError(
-            f"prediction: must be for one kind of specimen, got {name} over"
+            f"prediction: must be for a single kind of specimen, got {name} over"
             f" {', '.join(map(str, prediction[name].dims))} for {len(measured.values)} kinds."
             " Choose a step of a sweep with isel, and compare kinds in separate calls"
         )

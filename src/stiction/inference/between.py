@@ -37,7 +37,7 @@ def levels_of(rows: Sequence[Array]) -> Array:
     """Return the means of records from different specimens."""
     levels = np.array([row.mean() for row in rows])
     if levels.min() <= 0.0:
-        raise InputError(f"between: needs records of positive mean. Got {levels.min():g}")
+        raise InputError(f"between: needs records with a positive mean. Got {levels.min():g}")
     return levels
 
 

@@ -1,4 +1,4 @@
-"""Combine profiles and peaks: onsets of the fields within, posterior and agreement.
+"""Combine profiles and peaks: onsets of fields within specimens, posterior and agreement.
 
 See `stiction.inference.specimens` for the model, its sources and the steps. This
 file contains step 1, the simulation, and the result with its notes.

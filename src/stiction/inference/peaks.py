@@ -121,7 +121,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
 
 
 def si_of(unit: str) -> str:
-    """Return the SI unit that belongs to a unit: "1", "N", or else "Pa"."""
+    """Return the SI unit for a unit: "1", "N", or otherwise "Pa"."""
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
@@ -144,7 +144,8 @@ def _values(given: Any, unit: str) -> Array:
     values: Array = check("peaks", numbers, Numbers)
     if values.ndim != 1:
         raise InputError(
-            f"peaks: must be one list of numbers for one kind of specimen, got {describe(given)}."
+            "peaks: must be a list of numbers for a single kind of specimen, got"
+            f" {describe(given)}."
             " For several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))

@@ -2,9 +2,10 @@
 
 Problem. Specimen k has strength m b_k f(x). Here m is the mean, b_k a factor with
 mean 1 and coefficient of variation s, and f a field with mean 1 within the
-specimen. Measured are the levels (means) of some specimen of mean strength c. Each
-measured specimen has its own factor. Find the posterior of m, s and the family of
-b, averaged over equally likely fields within a specimen.
+specimen. The data are the levels (mean strengths) of some specimens and the peaks of
+others. A specimen of mean strength c has its onset at T(c). Each measured specimen
+has its own factor. Find the posterior of m, s and the family of b, averaged over
+equally likely fields within a specimen.
 
 Sources. Gelman and others, Bayesian Data Analysis (2013), chapter 5, describe the
 integration of hierarchical models. Gelman (2006), Bayesian Analysis 1, 515,

@@ -91,7 +91,7 @@ def hermite_shares(marginal: Any) -> Array:
 
 
 class Observed(NamedTuple):
-    """Average periodogram of all records with the same geometry, their number, and the floor."""
+    """Average periodogram of records with the same geometry, their number, and the noise floor."""
 
     window: RecordWindow
     records: int

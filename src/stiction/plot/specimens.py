@@ -149,7 +149,7 @@ def force_travel(
     """
     results = [result] if isinstance(result, xr.Dataset) else list(result)
     if not results:
-        raise InputError("result: is empty. Give one or more paths")
+        raise InputError("result: is empty. Give one or more equilibrium paths")
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):

@@ -142,7 +142,7 @@ class EquallyLikely:
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
-        """Number for each member. Members with equal fields have the same number."""
+        """Number of the kind of each member. Members with equal fields are of the same kind."""
         known: dict[Any, int] = {}
         numbers = [
             known.setdefault(tuple(member.properties.items()), len(known))

@@ -166,7 +166,9 @@ class RandomField:
         True
         """
         if self.conditions is not None:
-            raise InputError("profile: the field already has a profile. Join both into one")
+            raise InputError(
+                "profile: the field already has a profile. Combine both into a single profile"
+            )
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.of is not None):
             raise InputError(

@@ -28,7 +28,7 @@ def log_width(cv: float) -> float:
 
 
 def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
-    """Return an interval within [0, 1] for an estimate whose logarithm is about normal."""
+    """Return an interval within [0, 1] for an estimate whose logarithm is roughly normal."""
     if not math.isfinite(cv):
         return 0.0, 1.0
     width = log_width(cv)

@@ -498,7 +498,7 @@ class Study(_Parts):
         return rows.dataset(study.attributes, self.axes)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain dictionaries, lists and numbers, as in TOML.
+        """Return the study as plain dictionaries, lists and numbers, as in TOML.
 
         Raises
         ------

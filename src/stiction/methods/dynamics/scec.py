@@ -143,7 +143,7 @@ def write_scec(
 
 
 def _first_onset(run: Any) -> float:
-    """Return the time of the first event or onset in a run (s), or else the beginning."""
+    """Return the time (s) of the first event or onset in a run, or else its start time."""
     known = [run[name].values.ravel() for name in ("event_time", "onset_time") if name in run]
     times = np.concatenate([*known, [np.nan]])
     return float(np.nanmin(times) if np.isfinite(times).any() else run.time[0])

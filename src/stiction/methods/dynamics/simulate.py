@@ -121,7 +121,7 @@ def simulate_rupture(
         raise InputError(refused)
     rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
-        raise InputError(f"profiles: must be one sample, got {rows.samples}")
+        raise InputError(f"profiles: must be a single sample, got {rows.samples}")
     problem.doubt(rows)
     if problem.specimen is not None:
         result = simulate_event(problem, rows, method, save, event, progress)

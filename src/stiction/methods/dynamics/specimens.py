@@ -250,7 +250,7 @@ class RuptureSolver(OnsetSolver):
 def refuse_overstress(rows: Sample) -> None:
     """Raise an `InputError` for stress above the strength, which only half-spaces accept."""
     if np.any(rows.strength < rows.initial_stress):
-        raise InputError("initial_stress: must not be above the strength on specimens")
+        raise InputError("initial_stress: on specimens, it must not be above the strength")
 
 
 def front_speeds(problem: Problem, steepest_rate: float, arrival: Array) -> dict[str, float]:

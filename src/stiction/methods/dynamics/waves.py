@@ -238,10 +238,11 @@ def wave_steps(
     sample: StaticSample, start: Array, front: Array, mesh: Mesh, waves: Waves, steps: int,
     ends: bool,
 ) -> int:  # fmt: skip
-    """Take steps, with `ends` only until all nodes have slipped. Return the number of steps.
+    """Advance the waves by up to `steps` time steps, and return the number of steps taken.
 
-    `start` is the stress in the static state minus the initial stress (Pa). `front`
-    is the slip (m) at which the front arrives at a node.
+    If `ends` is true, stop once all nodes have slipped. `start` is the stress in the static
+    state minus the initial stress (Pa). `front` is the slip (m) at which the front counts as
+    arrived at a node.
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)

@@ -145,7 +145,7 @@ def equilibrium_path(
         raise InputError("method: only specimens take a method, st.Rupture(). Leave it out")
     rows = problem.sample(profiles)
     if rows.samples != 1:
-        raise InputError(f"profiles: must be one sample, got {rows.samples}")
+        raise InputError(f"profiles: must be a single sample, got {rows.samples}")
     problem.doubt(rows)
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)

@@ -141,7 +141,8 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
         period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
-            f"{dim} extends from {x.min():g} to {x.max():g} m, the interface is {length:g} m long."
+            f"{dim} extends from {x.min():g} to {x.max():g} m, but the interface is {length:g} m"
+            " long."
             f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
@@ -161,8 +162,9 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
         warn_accuracy(
-            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}: node i"
-            f" stands for {dim}_i {offset * spacing:+.4g} m, to be added to positions in the result"
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}. The"
+            f" values are used at the nodes. Add {offset * spacing:+.4g} m to positions in the"
+            " result"
         )
     return offset
 
