@@ -12,6 +12,7 @@ import stiction as st
 from stiction.inference import joined as joining
 from stiction.inference.specimens import PRIOR_SCALE
 from stiction.random.equally_likely import as_random, origin
+from stiction.reliability.answer import unseen_batch
 
 PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 RNG = np.random.default_rng(8)
@@ -130,12 +131,14 @@ def test_profiles_and_peaks_are_joined():
         PROBLEM, apart, probability=0.1, method=st.LocalCriterion(), target_cv=0.5,
         sensitivities=False, progress=False,
     )  # fmt: skip
-    assert {*apart.notes} <= {*design.warnings}
+    assert design.doubts == apart.notes
     assert f"! {apart.notes[0]}" in str(design)
     specimens = len(RECORDS) + len(peaks)
     share = 1.0 - 0.05 ** (1.0 / specimens)
-    assert design.assumption.startswith(f"{specimens} specimens cannot exclude")
-    assert f"up to {share:.0%} of all" in design.assumption
+    assert design.specimens == specimens
+    (text,) = unseen_batch(specimens)
+    assert f"{specimens} specimens cannot exclude" in text
+    assert f"up to {share:.0%} of all" in text
     # The prior of the scatter decides where it is narrow, and that of the mean.
     prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
     told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)

@@ -20,7 +20,7 @@ from stiction.cli.report import Page
 from stiction.ensemble.batches import versions
 from stiction.plot.style import PAGE, paper_style
 from stiction.problem.problem import Problem
-from stiction.reliability.answer import Answer
+from stiction.reliability.answer import Answer, unseen_batch
 
 
 @checked
@@ -95,7 +95,7 @@ def write_design_page(
             page.figure(figure, "What moves the design. The band is its interval.")
         page.table("What moves the design", *_moves(design))
     page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources or {}))
-    doubts = [*design.warnings, *([design.assumption] if design.specimens else [])]
+    doubts = [*design.warnings, *design.doubts, *unseen_batch(design.specimens)]
     for item in evidence:
         page.listing(f"Evidence: {type(item).__name__}", str(item))
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]

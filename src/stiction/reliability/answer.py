@@ -127,8 +127,9 @@ class Answer(Result):
         Share of plain samples in which the event does not happen at any stress.
         With a stiff machine, an interface may stay stable and carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer, including the doubts of a fit or posterior.
-        Empty if there are no such reasons.
+        Reasons not to trust the answer. Empty if there are no such reasons.
+    doubts : tuple of str
+        Doubts of the fit or posterior behind the answer.
     normal_pressure, friction_coefficient : float
         Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
     area, force : float
@@ -186,6 +187,7 @@ class Answer(Result):
     of_stress: bool = False
     quantity: str = "stress"
     specimens: int = 0
+    doubts: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
@@ -269,7 +271,7 @@ class Answer(Result):
         known = [row for row in rows if math.isfinite(row.value)]
         title = "Design value" if self.of_stress else "Probability of sliding"
         basis = f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"
-        return Summary(title, known, "95 % interval", [basis, *self.warnings])
+        return Summary(title, known, "95 % interval", [basis, *self.warnings, *self.doubts])
 
     def __str__(self) -> str:
         if self.of_stress and math.isinf(self.stress):
@@ -313,7 +315,7 @@ class Answer(Result):
             result += f"; {self.reason}"
         else:
             result += f"; {self.algorithm}, {self.evaluations} evaluations"
-        return "\n".join([result, *self._moved(), *(f"  ! {text}" for text in self.warnings)])
+        return "\n".join([result, *self._moved(), *(f"  ! {text}" for text in self.doubts)])
 
     def _moved(self) -> list[str]:
         """Return lines of text that show how each assumption changes the design."""
@@ -338,18 +340,18 @@ class Answer(Result):
             lines.append(
                 f"    by family of the factor between specimens: {', '.join(families)}"
             )
-        if self.specimens:
-            lines.append(f"    {self.assumption}")
-        return lines
+        return lines + [f"    {text}" for text in unseen_batch(self.specimens)]
 
-    @property
-    def assumption(self) -> str:
-        """What the measured specimens cannot exclude, with a confidence of 95 %."""
-        unseen = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / self.specimens)
-        return (
-            f"{self.specimens} specimens cannot exclude a weaker batch with a share of up to"
-            f" {unseen:.0%} of all specimens"
-        )
+
+def unseen_batch(specimens: int) -> list[str]:
+    """Return a sentence on the batch that so many specimens cannot exclude with 95 % confidence."""
+    if not specimens:
+        return []
+    unseen = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / specimens)
+    return [
+        f"{specimens} specimens cannot exclude a weaker batch with a share of up to"
+        f" {unseen:.0%} of all specimens"
+    ]
 
 
 def band_of(members: Array) -> tuple[float, float]:

@@ -242,9 +242,12 @@ def _answered(
         for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
     source = origin(experiment.random)
-    doubts = [*getattr(source, "doubts", ()), *getattr(source, "notes", ())]
-    specimens = getattr(source, "specimens", 0)
-    return replace(answer, warnings=(*texts_of(warned), *doubts), specimens=specimens)
+    return replace(
+        answer,
+        warnings=tuple(texts_of(warned)),
+        doubts=(*getattr(source, "doubts", ()), *getattr(source, "notes", ())),
+        specimens=getattr(source, "specimens", 0),
+    )
 
 
 def _of_enough_members(
