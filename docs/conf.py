@@ -23,7 +23,7 @@ os.environ.pop("MPLBACKEND", None)
 sys.path.insert(0, str(HERE / "_extensions"))
 
 import stiction  # noqa: E402  # after the environment is set
-from stiction.base import progress  # noqa: E402
+from stiction.base import progress  # noqa: E402  # after the environment is set
 from stiction.cli.commands import app as commands  # noqa: E402
 
 META = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

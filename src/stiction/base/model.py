@@ -45,7 +45,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 # -- kinds of values -----------------------------------------------------------------------------
 
-NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or astropy"
+SI_NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or astropy"
 """What replaces a text such as '4 km'."""
 
 
@@ -54,7 +54,7 @@ def as_number(value: Any) -> float:
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, str):
-        raise ValueError(NUMBER)
+        raise ValueError(SI_NUMBER)
     if not isinstance(value, numbers.Real) or isinstance(value, bool):
         raise ValueError("must be a number")
     try:
@@ -137,7 +137,7 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     """
     read = (info.context or {}).get("read")
     if isinstance(value, str) and states_unit(value):
-        raise ValueError(NUMBER)
+        raise ValueError(SI_NUMBER)
     if isinstance(value, str | Path | dict) and read is not None:
         value = read(value, str(info.field_name))
     if isinstance(value, str | Path | dict):

@@ -111,11 +111,17 @@ def is_in(text: str | None, si: str) -> bool:
     return given is not None and wanted is not None and given.powers == wanted.powers
 
 
+def number_and_unit(text: str) -> tuple[float, str]:
+    """Return the number and the unit, which may be empty, in a text such as '4 cm'."""
+    number, _, unit = text.strip().partition(" ")
+    return float(number), unit
+
+
 def states_unit(text: str) -> bool:
     """Return whether a text is a number, with a known unit or without, such as '4 cm'."""
-    number, _, unit = text.strip().partition(" ")
     with suppress(ValueError):
-        return math.isfinite(float(number)) and (not unit or parse(unit) is not None)
+        number, unit = number_and_unit(text)
+        return math.isfinite(number) and (not unit or parse(unit) is not None)
     return False
 
 

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_val
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Converted, Positive, as_count, as_number, in_si, model, to_plain
-from stiction.base.units import factor_to
+from stiction.base.units import factor_to, number_and_unit
 
 Mask = NDArray[np.bool_]
 
@@ -57,9 +57,9 @@ _counts = BeforeValidator(partial(_one_or_two, read=_node_count))
 def _place(value: Any) -> float:
     """Return a length in m from a number, a quantity, or text such as "0.5 km"."""
     if isinstance(value, str):
-        number, _, unit = value.strip().partition(" ")
         try:
-            value = float(number) * factor_to("m", unit or "m")
+            number, unit = number_and_unit(value)
+            value = number * factor_to("m", unit or "m")
         except ValueError:
             raise ValueError("must be a number, or text such as '0.5 km'") from None
     place = as_number(in_si(value, "length"))
