@@ -17,7 +17,7 @@ import numpy as np
 
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.sample import Outcome, PathStatus, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
 
 MACHINE = 2e7
@@ -74,16 +74,17 @@ def compared(
         found["drop"].append(path.peak / follow_to_sliding(overdamped, sample).peak - 1.0)
         states = [(event.before, event.after) for event in path.events]
         for before, after in [*states, (path.last, None)]:
-            if not before.unstable:
+            if before.status != PathStatus.UNSTABLE:
                 continue
             least = overdamped.jump(sample, before)
+            arrested = least.outcome == Outcome.ARRESTED
             event = program.event(sample, before)
             event.run(program.max_steps)
-            found["through"].append(float(least.arrested and after is None))
+            found["through"].append(float(arrested and after is None))
             if after is not None:  # as the waves leave it, before the rest comes to rest
                 short = least.state.slip - event.waves.slip
                 added = (event.waves.slip - before.slip).max()
-                found["shorter"].append(float(short.max() > 1e-3 * added or not least.arrested))
+                found["shorter"].append(float(short.max() > 1e-3 * added or not arrested))
             speed = front_speeds(problem, rows.steepest_rate, event.waves.arrival)[
                 "median_rupture_speed"
             ]

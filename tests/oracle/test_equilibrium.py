@@ -10,7 +10,7 @@ from setups import SOLID, exact_onset, make_problem, turns
 import stiction as st
 import stiction.methods.equilibrium.dense.program
 from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.sample import at_rest, sample_of
+from stiction.methods.equilibrium.sample import PathStatus, Search, at_rest, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding
 
 
@@ -31,8 +31,8 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
     rows, program = problem.sample(tau_p), DenseProgram(problem)
     for row, load in enumerate(loads):
         sample = sample_of(rows, program.pieces, row)
-        found = program.next(sample, replace(at_rest(sample), by_events=True))
-        assert found.unstable
+        found = program.next(sample, replace(at_rest(sample), search=Search.EVENTS))
+        assert found.status == PathStatus.UNSTABLE
         assert found.load == pytest.approx(load, rel=1e-11)
 
 

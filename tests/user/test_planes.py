@@ -9,7 +9,7 @@ from setups import exact_onset
 
 import stiction as st
 from stiction.methods.equilibrium import solver
-from stiction.methods.equilibrium.sample import Jump, Outcome
+from stiction.methods.equilibrium.sample import Jump, Outcome, PathStatus
 from stiction.methods.equilibrium.transforms import plane as program
 from stiction.methods.equilibrium.transforms.relaxation import Relaxed
 
@@ -31,11 +31,11 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch):
     whole = exact_onset(PLANE, PLANE_STRENGTH).critical_load.item()
 
     def path_lost(*given):
-        return dataclasses.replace(follow_on(*given), unstable=False, known=False)
+        return dataclasses.replace(follow_on(*given), status=PathStatus.GIVEN_UP)
 
     def at_rest(own, sample, state, to_rest):
         monkeypatch.setattr(program.PlaneProgram, "next", path_lost)
-        return Jump(True, True, state)
+        return Jump(Outcome.ARRESTED, state)
 
     for owner, name, lost in (
         (

@@ -27,7 +27,12 @@ from stiction.methods.dynamics.summary import SPEEDS, rate_spectrum
 from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
 from stiction.methods.dynamics.waves import TIME as NOW
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
-from stiction.methods.equilibrium.sample import present_pieces, residual_nodes, sample_of
+from stiction.methods.equilibrium.sample import (
+    PathStatus,
+    present_pieces,
+    residual_nodes,
+    sample_of,
+)
 from stiction.methods.equilibrium.solver import SamplePath, follow_to_sliding
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
@@ -85,7 +90,7 @@ def simulate_event(
     with Meter("rupture", show=progress, unit="events") as meter:
         path = follow_to_sliding(program, sample)  # 1.
         states = [event.before for event in path.events]
-        states += [path.last] if path.last.unstable else []
+        states += [path.last] if path.last.status == PathStatus.UNSTABLE else []
         meter.advance(len(states))
         if not states:
             raise InputError("problem: the machine is so stiff that no patch becomes unstable")

@@ -51,6 +51,8 @@ from stiction.methods.equilibrium.sample import (
     EquilibriumState,
     Jump,
     Outcome,
+    PathStatus,
+    Search,
     StaticSample,
     refused,
 )
@@ -204,24 +206,18 @@ class RuptureProgram(DenseProgram):
         event.run(self.max_steps)
         slip = event.waves.slip
         stiff: Array = self.problem.blocks.stiffness @ slip
-        outcome: int = Outcome.SLIDING
+        outcome = Outcome.SLIDING
         if not event.slides:  # 3.
             elastic, true = self._workspaces
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop, self.ends)
             outcome = jump(slip_state, unstable.load, np.inf, true)
         state = EquilibriumState(
-            unstable.load,
-            slip,
-            unstable.direction,
-            stiff,
-            by_events=True,
-            jumped=True,
+            unstable.load, slip, unstable.direction, stiff, PathStatus.STABLE, Search.EVENTS,
             stopped=True,
-        )
-        arrested, is_known = outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED
+        )  # fmt: skip
         now = event.waves.now
         timed = {"event_duration": now[FAST_UNTIL] - now[FAST_SINCE]}
-        return Jump(arrested, is_known, state, arrival=event.waves.arrival, timed=timed)
+        return Jump(outcome, state, event.waves.arrival, timed)
 
 
 class RuptureSolver(OnsetSolver):

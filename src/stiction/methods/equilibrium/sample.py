@@ -80,6 +80,23 @@ class Outcome(IntEnum):
     SLIDING = 0
     ARRESTED = 1
     UNDECIDED = 2
+    NOT_UNSTABLE = 3  # at rest after a long step along a path that was not seen to turn
+
+
+class PathStatus(IntEnum):
+    """Why the path of stable equilibria ends at a state."""
+
+    STABLE = 0  # the load is the target, or every node has slipped
+    UNSTABLE = 1  # slip jumps along the direction of the state
+    GIVEN_UP = 2  # too many slipping nodes, or too many events
+
+
+class Search(IntEnum):
+    """How the equilibria after a state of a line or specimen are found."""
+
+    PROGRAMME_FROM_REST = 0
+    PROGRAMME = 1  # from the state, because a patch jumped before
+    EVENTS = 2  # event by event, because the programme does not hold
 
 
 class StaticSample(NamedTuple):
@@ -144,18 +161,16 @@ class Present(NamedTuple):
 
 @dataclass
 class EquilibriumState:
-    """An equilibrium on the path of a sample. By default it is unstable."""
+    """An equilibrium on the path of a sample."""
 
     load: float  # tau_0, Pa
     slip: Array  # (n,): d, m
     direction: Array  # (n,): direction of the instability
     Kd: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
-    gap: float = np.nan  # distance to a load without equilibrium, Pa; NaN if it is unknown
-    certified: bool = True  # the gap is proved
-    unstable: bool = True  # the path is unstable here
-    known: bool = True  # the path could be followed so far
-    by_events: bool = False  # a linear programme failed before to find the next instability
-    jumped: bool = False  # an instability came to rest on the way
+    status: PathStatus = PathStatus.UNSTABLE
+    search: Search = Search.PROGRAMME_FROM_REST
+    gap: float | None = None  # distance to a load without equilibrium, Pa, if it is known
+    certified: bool = True  # a multiplier proves the gap
     stopped: bool = False  # a slipping node stopped on the way
     # Largest mean stress on the way here, divided by the mean of the load
     # profile, Pa. Without a machine it is the load itself (None).
@@ -174,7 +189,8 @@ class EquilibriumState:
 def at_rest(sample: StaticSample) -> EquilibriumState:
     """Return the state in which the first node is about to slip."""
     load = float((sample.excess / sample.profile).min())
-    return EquilibriumState(load, *np.zeros((3, sample.excess.size)))
+    slip, direction, Kd = np.zeros((3, sample.excess.size))
+    return EquilibriumState(load, slip, direction, Kd, PathStatus.STABLE)
 
 
 def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
@@ -187,10 +203,8 @@ def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
 class Jump(NamedTuple):
     """End of an instability."""
 
-    arrested: bool
-    known: bool
+    outcome: Outcome
     state: EquilibriumState
-    counts: bool = True  # false for a long step of a path that was not seen to turn
     arrival: Array | None = None  # with inertia: arrival time of the front at each node, s
     timed: Mapping[str, float] = MappingProxyType({})  # with inertia: variables of the event
 

@@ -22,6 +22,8 @@ from stiction.methods.equilibrium.events import ArrestedEvent, event_table, even
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
+    Outcome,
+    PathStatus,
     Program,
     StaticSample,
     make_sample,
@@ -91,27 +93,31 @@ def follow_to_sliding(
     """
     can_break = np.isfinite(sample.excess)
     ends, sliding = not can_break.all(), None
-    # 1.
-    state = program.next(sample)
     first: EquilibriumState | None = None
     events: list[ArrestedEvent] = []
-    known, peak, arrival = state.known, state.highest, None
-    while state.unstable:  # 2.
-        jump = program.jump(sample, state, to_rest and ends)  # 3.
-        if jump.counts:
+    outcome, arrival = Outcome.NOT_UNSTABLE, None
+    # 1.
+    state = program.next(sample)
+    peak = state.highest
+    while state.status == PathStatus.UNSTABLE:  # 2.
+        # 3.
+        jump = program.jump(sample, state, to_rest and ends)
+        outcome = jump.outcome
+        if outcome != Outcome.NOT_UNSTABLE:
             first = first or state
-            if not jump.arrested:
-                known, arrival = jump.known, jump.arrival
-                break
-            # 4. A jump that does not count is a long step of a path that did not turn.
+        slides = outcome in (Outcome.SLIDING, Outcome.UNDECIDED)
+        if outcome == Outcome.ARRESTED:  # 4.
             events.append(ArrestedEvent(state, jump.state, jump.timed))
-            if ends and (jump.state.slip[can_break] > 0.0).all():
-                arrival = jump.arrival
-                break
+            slides = ends and bool((jump.state.slip[can_break] > 0.0).all())
+        if slides:
+            arrival = jump.arrival
+            break
         state = program.next(sample, jump.state)
-        known, peak = state.known, max(peak, state.highest)
-    if ends and events and known and (state is events[-1].before or not state.unstable):
-        sliding = events.pop()  # the last instability, after which the others creep at most
+        peak = max(peak, state.highest)
+    known = outcome != Outcome.UNDECIDED and state.status != PathStatus.GIVEN_UP
+    if ends and known and events and outcome != Outcome.SLIDING:
+        # The last instability, after which the other nodes creep at most.
+        sliding = events.pop()
         state = sliding.before
     return SamplePath(first or state, state, peak, events, known, arrival, sliding)
 
@@ -184,7 +190,7 @@ class OnsetSolver:
             "critical_load": last.load,
             "critical_stress": self._peak(path),
             "first_instability": first.load - self.problem.relief(first.slip),
-            "certificate_gap": first.gap,
+            "certificate_gap": np.nan if first.gap is None else first.gap,
             "critical_position": patch.centre if interface.is_plane else patch.centre[0],
             "sliding_position": (
                 sliding_patch.centre if interface.is_plane else sliding_patch.centre[0]
@@ -201,7 +207,7 @@ class OnsetSolver:
             values["critical_patch_length"] = patch.area
         # Behind a stiff machine, or within a short extent, an interface can slide without any
         # instability.
-        stable = path.known and not first.unstable
+        stable = first.status == PathStatus.STABLE
         if stable:
             names = OF_INSTABILITY & values.keys()
             values |= {name: np.full_like(values[name], np.nan) for name in names}

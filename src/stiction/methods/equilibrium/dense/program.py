@@ -36,12 +36,14 @@ from stiction.methods.equilibrium.dense.linear_program import (
     solve_program,
 )
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
-from stiction.methods.equilibrium.dense.stable_path import PathStatus, follow_stable_path
+from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
 from stiction.methods.equilibrium.patches import count_patches
 from stiction.methods.equilibrium.sample import (
     EquilibriumState,
     Jump,
     Outcome,
+    PathStatus,
+    Search,
     StaticSample,
     at_rest,
     exceeds,
@@ -181,29 +183,29 @@ class DenseProgram:
         See steps 1 to 3 in the docstring of the module.
         """
         state = state or at_rest(sample)
-        from_rest, by_events = not state.slip.any(), state.by_events or self.driven
+        from_rest = not state.slip.any()
+        search = Search.EVENTS if self.driven else state.search
         if from_rest:
             for workspace in self._workspaces:
                 workspace.n_factored[0] = 0  # the rows belong to another sample
-        if target == np.inf and not by_events:
+        if target == np.inf and search != Search.EVENTS:
             instability = self._next_by_programme(sample, state, from_rest)
             if instability is not None:
                 return instability
-            by_events = not from_rest
+            if not from_rest:
+                search = Search.EVENTS
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         held = self.ends and target < np.inf
         slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, held)
         end = follow_stable_path(slip_state, state.load, target, direction)
         reached = EquilibriumState(
-            end.load, slip, direction, Kd,
-            unstable=end.status == PathStatus.UNSTABLE,
-            known=end.status != PathStatus.GIVEN_UP,
-            peak=end.peak, by_events=by_events, jumped=state.jumped,
-            stopped=end.stopped or state.stopped,
+            end.load, slip, direction, Kd, PathStatus(end.status), search,
+            stopped=end.stopped or state.stopped, peak=end.peak,
         )  # fmt: skip
         # No multiplier bounds the load from above if a law steepens or a node
         # stopped.
-        reached.certified = reached.unstable and not (self.pieces.steepens or reached.stopped)
+        is_unstable = reached.status == PathStatus.UNSTABLE
+        reached.certified = is_unstable and not (self.pieces.steepens or reached.stopped)
         if reached.certified and from_rest:
             present = present_sample(sample, slip)
             self._certify(present, reached, multiplier_of(sample, reached))
@@ -238,12 +240,13 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         if load <= state.load:
             return state
-        if not (state.jumped or state.by_events or self.driven):
+        if state.search == Search.PROGRAMME_FROM_REST and not self.driven:
             solution = self.solve(sample, load)
             if solution is not None and not exceeds(sample, solution.slip):
-                return replace(solution, load=load, direction=state.direction, unstable=False)
-        reached = self.next(sample, replace(state, by_events=True), load)
-        return None if reached.unstable or not reached.known else reached
+                status = PathStatus.STABLE
+                return replace(solution, load=load, direction=state.direction, status=status)
+        reached = self.next(sample, replace(state, search=Search.EVENTS), load)
+        return reached if reached.status == PathStatus.STABLE else None
 
     def jump(
         self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
@@ -261,10 +264,10 @@ class DenseProgram:
                 # Round-off: only nodes that pass a corner can stop an instability.
                 outcome = Outcome.UNDECIDED
         state = EquilibriumState(
-            instability.load, slip, instability.direction, Kd,
-            by_events=instability.by_events, jumped=True, stopped=instability.stopped,
+            instability.load, slip, instability.direction, Kd, PathStatus.STABLE,
+            max(instability.search, Search.PROGRAMME), stopped=instability.stopped,
         )  # fmt: skip
-        return Jump(outcome == Outcome.ARRESTED, outcome != Outcome.UNDECIDED, state)
+        return Jump(Outcome(outcome), state)
 
     def _run(
         self, sample: StaticSample, instability: EquilibriumState, slip: Array, to_rest: bool

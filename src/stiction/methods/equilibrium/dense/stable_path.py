@@ -58,7 +58,6 @@ Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or
 `position`.
 """
 
-from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -83,7 +82,7 @@ from stiction.methods.equilibrium.dense.cholesky import (
     substitute_slipping,
 )
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
-from stiction.methods.equilibrium.sample import piece_at, start_of, strength_at
+from stiction.methods.equilibrium.sample import PathStatus, piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16
 """Slip is computed anew from L after so many events, so that round-off does not accumulate."""
@@ -96,14 +95,6 @@ NEGATIVE_RATE_RTOL = 1e-10
 
 ONE: Any = np.int64(1)  # as `ZERO`: numba would compile a kernel again for a literal
 NOBODY = -1  # no position in S, no node
-
-
-class PathStatus(IntEnum):
-    """Why a path ended."""
-
-    ENDED_STABLE = 0  # the load is the target, or every node has slipped
-    UNSTABLE = 1  # slip jumps along the direction that was written
-    GIVEN_UP = 2  # too many slipping nodes, or too many events
 
 
 class PathEnd(NamedTuple):
@@ -469,7 +460,7 @@ def follow_stable_path(
             Kd[i] += event.step * Kv[i]
         peak = max(peak, load - mean_relief(workspace.stiffness, sample.profile, slip))
         if at_target:  # 6.
-            return PathEnd(load, peak, stopped, PathStatus.ENDED_STABLE)
+            return PathEnd(load, peak, stopped, PathStatus.STABLE)
 
         # 4. and 5. The factor after the event.
         if event.corner_position != NOBODY:
@@ -491,5 +482,5 @@ def follow_stable_path(
                 return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
             n_slipping, first_changed = start.n_slipping, start.first_changed
             if all_slip(state):  # 6. Behind a stiff machine the interface slides stably.
-                return PathEnd(load, peak, stopped, PathStatus.ENDED_STABLE)
+                return PathEnd(load, peak, stopped, PathStatus.STABLE)
     return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)

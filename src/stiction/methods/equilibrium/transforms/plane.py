@@ -35,6 +35,7 @@ from stiction.methods.equilibrium.sample import (
     EquilibriumState,
     Jump,
     Outcome,
+    PathStatus,
     StaticSample,
     at_rest,
     exceeds,
@@ -315,7 +316,7 @@ class PlaneProgram:
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
         still = np.zeros_like(slip)
-        return EquilibriumState(load, slip, still, unstable=False, certified=False)
+        return EquilibriumState(load, slip, still, status=PathStatus.STABLE, certified=False)
 
     def _turn(
         self,
@@ -339,6 +340,7 @@ class PlaneProgram:
         """Return the direction (n,) in which the path turns, or NaN if the turn is not found."""
         if state.multiplier is not None or state.gap == 0.0:
             return multiplier_of(sample, state)
+        assert state.gap is not None  # instabilities of planes have a gap
         operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
         slip = state.slip
         for retreat in START_RETREATS if state.certified else ():
@@ -352,17 +354,22 @@ class PlaneProgram:
     def jump(
         self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
     ) -> Jump:
+        assert instability.gap is not None  # instabilities of planes have a gap
         load_beyond = instability.load + instability.gap
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(
             self._operator(sample), sample, load_beyond, instability.slip,
             accuracy=0.1 * self.requested, is_unstable=True, to_rest=to_rest,
         )  # fmt: skip
-        arrested = end.status == Outcome.ARRESTED
-        # Without a turn, an arrest only shows that a stable path was hard to follow.
-        counts = not arrested or instability.certified or instability.multiplier is not None
-        after = EquilibriumState(load_beyond, end.slip, instability.direction, jumped=True)
-        return Jump(arrested, end.status != Outcome.UNDECIDED, after, counts)
+        outcome = end.status
+        turns = instability.certified or instability.multiplier is not None
+        if outcome == Outcome.ARRESTED and not turns:
+            # It only shows that a stable path was hard to follow.
+            outcome = Outcome.NOT_UNSTABLE
+        after = EquilibriumState(
+            load_beyond, end.slip, instability.direction, status=PathStatus.STABLE
+        )
+        return Jump(outcome, after)
 
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float
@@ -372,7 +379,7 @@ class PlaneProgram:
         end = least_equilibrium(self._operator(sample), sample, load, state.slip, SLIP_RTOL)
         if end.status != Outcome.ARRESTED:
             return None
-        return replace(state, load=load, slip=end.slip, unstable=False)
+        return replace(state, load=load, slip=end.slip, status=PathStatus.STABLE)
 
     def stress_released(self, state: EquilibriumState) -> Array:
         symbol = self.elastic.symbol(self.shape)
