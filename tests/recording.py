@@ -210,30 +210,35 @@ def refusal(call: Callable[[], Any]) -> Any:
     except (ValueError, RuntimeError) as error:
         named = [text.partition(": ")[0] for text in getattr(error, "problems", ())]
         arguments = [name for name in named if len(name.split()) <= MAX_WORDS_OF_A_NAME]
-        return " ".join([type(error).__name__, *dict.fromkeys(arguments)])
+        return f"{type(error).__name__} {','.join(dict.fromkeys(arguments))}".strip()
 
 
-def said(call: Callable[[], Any]) -> str | dict[str, int]:
+def said(call: Callable[[], Any]) -> str:
     """How a call is refused, or the number of its warnings by class."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         result = refusal(call)
-    return result if isinstance(result, str) else warned(caught)
+    if isinstance(result, str):
+        return result
+    return " ".join(f"{name}:{count}" for name, count in warned(caught).items()) or "taken"
 
 
-def each(door: Callable[..., Any], *given: Any) -> list[Callable[[], Any]]:
-    """Calls of one function, of an argument or of options by name each."""
-    return [
-        partial(door, **one) if isinstance(one, dict) else partial(door, one) for one in given
-    ]
+def mistakes(file: str, scope: dict[str, Any]) -> Calls:
+    """The calls that the records of a file hold as text, each beside what is said of it.
 
-
-def table_of(calls: Calls, rows: dict[str, list[Callable[[], Any]]]) -> None:
-    """Add what each call of a table says to those that are recorded, a record for each list."""
-    for name, some in rows.items():
+    A new one is written there with an empty answer, which ``--record`` fills in.
+    """
+    calls = Calls()
+    for name, texts in read(record_of(file)).items():
         calls(READ, name=name)(
-            lambda some=some: {str(number): said(call) for number, call in enumerate(some)}
+            lambda texts=texts: {text: said(partial(eval, text, scope)) for text in texts}
         )
+    return calls
+
+
+def record_of(file: str) -> Path:
+    """The records beside a file of tests."""
+    return Path(file).with_name(Path(file).stem.removeprefix("test_") + ".json")
 
 
 @contextlib.contextmanager
@@ -264,7 +269,7 @@ def compared(calls: Calls, file: str) -> Callable[..., None]:
 
     @pytest.mark.parametrize("name", calls)
     def test(name: str, request: pytest.FixtureRequest) -> None:
-        path = Path(file).with_name(Path(file).stem.removeprefix("test_") + ".json")
+        path = record_of(file)
         found = outputs_of(calls[name])
         recorded = read(path)
         changed = differences(found, recorded.get(name, {}), calls[name].close)

@@ -421,22 +421,6 @@ def test_marginals_end_at_the_bounds_that_were_given(marginal, support):
         assert high == pytest.approx(support[1], rel=1e-9)
 
 
-def test_bounds_themselves():
-    """Low equal to high, or to the mean, leaves no distribution; a cv of 10 is the largest."""
-    for wrong in (
-        lambda: st.Beta(alpha=1.5, beta=3.0, low=1e6, high=1e6),
-        lambda: st.Lognormal(mean=1e6, cv=0.2, low=1e6),
-        lambda: st.TruncatedNormal(mean=1e6, cv=0.2, low=1e6),
-        lambda: st.TruncatedNormal(mean=1e6, cv=0.2, high=1e6),
-        lambda: st.Lognormal(mean=1e6, cv=np.nextafter(10.0, 11.0)),
-        lambda: st.Weibull(mean=1e6, cv=10.0),
-    ):
-        with pytest.raises(st.InputError):
-            wrong()
-    with pytest.warns(st.UnitWarning):
-        assert st.Lognormal(mean=1e6, cv=10.0).cv == 10.0
-
-
 @pytest.mark.parametrize(
     "marginal",
     [

@@ -180,40 +180,6 @@ def test_the_tables_hold_every_field():
 
 
 FIELD = beta_strength(4e-3)
-GIVEN_TWICE = {
-    "load.pressing_force": ("normal_pressure", {"load": st.Load(pressing_force=1e3)}),
-    "load.normal_pressure": ("normal_pressure", {"load": st.Load(normal_pressure=2e6)}),
-    "load.initial_stress": ("initial_stress", {"load": st.Load(initial_stress=1e4)}),
-    "friction.residual_strength": (
-        "residual_strength",
-        {"friction": st.LinearWeakening(weakening_rate=5e11, residual_strength=1e4)},
-    ),
-    "friction.residual_ratio": (
-        "residual_strength",
-        {"friction": st.LinearWeakening(weakening_rate=5e11, residual_ratio=0.3)},
-    ),
-    "friction.weakening_rate": ("critical_slip", {}),
-}
-
-
-@pytest.mark.parametrize("key", GIVEN_TWICE)
-def test_what_a_random_property_or_a_profile_would_replace_is_refused(key):
-    name, parts = GIVEN_TWICE[key]
-    interface = st.Interface(0.05, 128, width=0.01)
-    problem = dataclasses.replace(make_problem(128, 0.05), interface=interface, **parts)
-    random = st.RandomInterface(**{"strength": FIELD, name: FIELD})
-    profiles = {"strength": STRENGTH[0], name: 0.1 * STRENGTH[0]}
-    calls = {
-        "random": partial(ensemble, problem, random, 2),
-        "profiles": partial(st.onset, problem, profiles, method=LOCAL),
-    }
-    for owner, call in calls.items():
-        with pytest.raises(st.InputError) as caught:
-            call()
-        text = f"problem.{key}: has no effect beside {owner}.{name}"
-        assert any(refusal.startswith(text) for refusal in caught.value.problems)
-    sample = problem.sample(STRENGTH)
-    assert st.onset(problem, sample, method=LOCAL).sizes == {"sample": 1}
 
 
 def test_a_law_without_a_scale_takes_it_from_profiles_only():
@@ -225,12 +191,6 @@ def test_a_law_without_a_scale_takes_it_from_profiles_only():
             st.onset(*pair, method=method) for pair in ((problem, given), (whole, STRENGTH))
         )
         assert lent.critical_stress.item() == own.critical_stress.item()
-    for call in (
-        lambda: st.onset(problem, STRENGTH, method=LOCAL),
-        lambda: ensemble(problem, FIELD, 2),
-    ):
-        with pytest.raises(st.InputError, match="friction: give one of weakening_rate"):
-            call()
 
 
 def test_no_dimension_of_a_sweep_is_a_keyword_of_sel():

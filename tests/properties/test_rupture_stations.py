@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from refusals import refusals
 from ruptures import BREAKING_PLANE, dip
 from setups import QUARTER, make_problem
 
@@ -29,21 +28,6 @@ def simulate(problem, method=METHOD, **save):
     strength = 1e6 - 3e5 * dip(interface, [0.012] * len(interface.shape), 0.007)
     save = st.Save(**save)
     return st.simulate_rupture(problem, strength, method=method, save=save, progress=False)
-
-
-def at(problem, place):
-    return simulate(problem, stations={"a": place})
-
-
-test_what_no_station_is = refusals({
-    "stations['a']: (7.5,) is not on the interface of 0.04 m": lambda: at(LINE, 7.5),
-    "Give x in m": lambda: at(LINE, (0.01, 0.01)),
-    "Give x and y in m": lambda: at(BREAKING_PLANE, 0.01),
-    "must be a finite number, got nan": lambda: at(BREAKING_PLANE, (0.01, np.nan)),
-    "from the first node": lambda: at(BREAKING_PLANE, (-0.01, 0.0)),
-    "stations ... must be ... got 3": lambda: st.Save(stations={3: 0.01}),
-    "stations: must be a valid dictionary": lambda: st.Save(stations=[0.01]),
-})  # fmt: skip
 
 
 def test_files_of_a_line_read_back(tmp_path):

@@ -1,71 +1,19 @@
 """What a mistake or a doubt is about beside its words, which tests/records hold."""
 
 import dataclasses
-import os
 import pickle
 import warnings
 
 import numpy as np
 import pytest
-import xarray as xr
-from refusals import refusals
 from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
-from stiction.elasticity.memory_kernels import fit_exponentials
-from stiction.ensemble.dataset import Gathered
-from stiction.ensemble.experiment import Experiment
 from stiction.methods.equilibrium.solver import follow_to_sliding
-from stiction.reliability import subset
 
 LINE, PLANE = st.Interface(0.1, 256), st.Interface((0.5, 0.5), (4096, 4096))
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)
 ONE = np.full(256, 1e6)
-KEPT = Experiment(PROBLEM, FIELD, LOCAL, keep=("strength",))
-THERE = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-
-test_more_memory_than_there_is = refusals({
-    "samples: this takes ... GiB of memory": lambda: st.monte_carlo(
-        PROBLEM, FIELD, method=LOCAL, keep="strength", samples=10**9
-    ),
-    # 0.6 of the memory for the profiles of each point
-    "samples: this takes ... GiB of memory, more than": lambda: Gathered(
-        [KEPT, KEPT], st.Ensemble(samples=0.6 * THERE // (8 * 256))
-    ),
-    "this takes ... GiB of memory": lambda: FIELD.sample(PLANE, samples=10**6),
-    "strength.given.profile: this takes ... GiB of memory ... fewer places":
-        lambda: beta_strength(5e-6).given(
-            xr.DataArray(ONE.repeat(400), {"x": np.linspace(0.0, 0.1, 256 * 400)}, "x"), noise=1e3
-        ).sample(LINE),
-    "subset ... GiB of memory ... fewer nodes":
-        lambda: subset.descend(lambda draws: draws[:, 0], 10**9, rng=None, samples=1000),
-    "kernel tolerance": lambda: fit_exponentials("II", 1.7, 1e-14),
-})  # fmt: skip
-
-
-FAULT = make_problem(residual_strength=2e5)
-FAULT = dataclasses.replace(FAULT, interface=dataclasses.replace(LINE, extent=(0.02, 0.08)))
-test_what_to_do_about_a_unit_or_a_kind = refusals({
-    "length: must be a number in SI units ... got '4 km'": lambda: st.Interface("4 km", 512),
-    "critical_slip: must be a number in SI units ... got '4 cm'":
-        lambda: st.LinearWeakening(critical_slip="4 cm"),
-    "extent: must be a number, or text such as": lambda: st.Interface(
-        4e3, 512, extent=("1km", "3 km")
-    ),
-    "extent: must hold ... check its unit": lambda: st.Interface(4e3, 512, extent=(1.0, 3.0)),
-    "extent: must be two ends ... True and False": lambda: st.Interface(
-        0.1, 256, extent=np.ones(256, dtype=int)
-    ),
-    "the ellipse must lie on ... semi_axes": lambda: st.Interface(
-        (0.5, 0.5), (64, 64), extent=st.Ellipse(centre=(0.2, 0.2), semi_axes=(0.3, 0.1))
-    ),
-    "load at ... Pa/s or slower": lambda: st.onset(
-        PROBLEM, ONE, method=st.Rupture(loading_rate=1e13)
-    ),
-    "strength: must be positive ... check its sign":
-        lambda: FAULT.own_sample({"strength": -ONE[None]}),
-    "strength is 22 to 22 Pa": lambda: FAULT.own_sample({"strength": 22e-6 * ONE[None]}),
-})  # fmt: skip
 
 
 def test_a_refusal_is_short_pickles_and_is_a_value_error():
@@ -115,14 +63,10 @@ def test_objects_are_frozen_compare_and_hash_by_value():
 
 DOUBTFUL = {
     "density in g/cm3": lambda: st.Solid(1e9, 0.33, 1.17),
-    "rock in MPa": lambda: st.Solid(3e4, 0.25, 2700.0),
     "initial stress in MPa": lambda: make_problem(load=st.Load(initial_stress=0.1)).doubt(
         make_problem(load=st.Load(initial_stress=0.1)).sample(ONE)
     ),
     "a station in km": lambda: st.Save(stations={"a": 1.5e-4}).nodes(LINE),
-    "a station beyond the end": lambda: st.Save(stations={"a": 0.01}).nodes(
-        dataclasses.replace(LINE, extent=(0.02, 0.08))
-    ),
 }
 
 

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 from joint import FIELD, GIVEN, PROBLEM
-from refusals import refuses
 from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
@@ -84,21 +83,3 @@ def test_members_may_have_different_factors():
     alone = ensemble(PROBLEM, FIELD, 40, seed=3)
     ratios = (found.critical_stress / alone.critical_stress).values
     assert 5 < np.sum(ratios == 1.0) < 35
-
-
-def test_what_factors_refuse():
-    def on(problem, **between):
-        given = {"strength": FIELD, "between": between}
-        return lambda: ensemble(problem, st.RandomInterface(**given), 12)
-
-    refuses(
-        "between.initial_stress: is a factor on the initial_stress",
-        on(PROBLEM, initial_stress=FACTOR),
-    )
-    refuses("between.pressing_force: is a factor", on(PROBLEM, pressing_force=FACTOR))
-    refuses("between.critical_slip: is a factor", on(PROBLEM, critical_slip=FACTOR))
-    refuses("did you mean 'pressing_force'", on(PROBLEM, presing_force=FACTOR))
-    refuses(
-        "give one of normal_pressure and pressing_force",
-        on(PRESSED, pressing_force=FACTOR, normal_pressure=FACTOR),
-    )

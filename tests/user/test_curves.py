@@ -63,6 +63,7 @@ def test_files_of_testing_machines(tmp_path):
     head = "Weg (mm);Standardkraft (kN)"
     folder = tmp_path / "tests"
     folder.mkdir()
+    refuses("no file", lambda: st.read_curve(folder))
     for name in ("a.csv", "b.txt"):
         (folder / name).write_text(
             "\n".join(["Prüfer;M. Muster", head, *rows]).replace(".", ",")
@@ -94,24 +95,6 @@ def test_files_of_testing_machines(tmp_path):
     ]
     peaks = st.read_peaks(Curves(tuple(several)))
     assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
-
-
-def test_curves_that_are_refused(tmp_path):
-    frame = pd.DataFrame({"travel (mm)": TRAVEL * 1e3, "force (N)": machine()})
-    cycle = pd.concat([frame, frame])
-    for words, given, options in (
-        ("line ... goes back", cycle, {}),
-        ("unit of the force is not stated", frame.rename(columns={"force (N)": "force"}), {}),
-        ("travel is in kg", frame.rename(columns={"travel (mm)": "travel (kg)"}), {}),
-        ("'force' and 'load' may both", frame.assign(load=1.0), {}),
-        ("no column is clearly the travel", frame[["force (N)"]], {}),
-        ("unit: is 'kN'", frame, {"unit": "kN"}),
-        ("fewer than 8", frame[:5], {}),
-        ("must be a path", 3.0, {}),
-    ):
-        refuses(words, lambda g=given, o=options: st.read_curve(g, **o))
-    (tmp_path / "empty").mkdir()
-    refuses("no file", lambda: st.read_curve(tmp_path / "empty"))
 
 
 BLOCKS = st.Problem(

@@ -148,27 +148,6 @@ def test_profiles_and_peaks_are_joined():
     refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL))
 
 
-def test_what_joining_refuses():
-    given = LOCAL | {"between": "lognormal"}
-    found = st.infer(PROBLEM, EVEN, PEAKS, **given)
-    refuses("random: is a posterior", lambda: st.infer(PROBLEM, found, PEAKS, **LOCAL))
-    refuses(
-        "between.strength: is a coefficient of variation between 0 and 0.9",
-        lambda: st.infer(PROBLEM, EVEN, PEAKS, prior={"between.strength": (1.0, 2.0)}, **LOCAL),
-    )
-    refuses(
-        "did you mean 'weibull'",
-        lambda: st.infer(PROBLEM, EVEN, PEAKS, between="weibul", **LOCAL),
-    )
-    refuses("need a posterior from st.infer", lambda: found.prior_transform([0.5] * 4))
-    stored = found.interfaces(4)
-    refuses(
-        "holds draws of mean and scatter", lambda: st.infer(PROBLEM, stored, PEAKS, **LOCAL)
-    )
-    longer = {0.0512: PEAKS}
-    refuses("the problem is of 0.05 m", lambda: st.infer(PROBLEM, EVEN, longer, **LOCAL))
-
-
 def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     with pytest.warns(st.AccuracyWarning, match="1 specimen.* mostly by its prior"):
         fit = st.fit_field(RECORDS[:1], PROBLEM.interface, between=True, **QUICK)

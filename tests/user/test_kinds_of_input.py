@@ -118,23 +118,6 @@ def test_peaks(kind):
         assert peaks.lengths == (0.1, 0.2)
 
 
-def test_peaks_that_are_refused():
-    for words, given in {
-        "N ... unit = 'Pa'": PEAKS * u.N,
-        "cannot be converted": PEAKS * u.m,
-        "must be positive": np.ma.masked_less(PEAKS, 700.0),
-        "name like 'peak": pd.DataFrame({"a": PEAKS, "b": PEAKS}),
-    }.items():
-        refuses(words, lambda given=given: make_peaks(given))
-    # Were the unit dropped, 700 MPa would be 0.7 MPa and fit.
-    problem = make_problem(NODES)
-    strength = st.paper.strength(problem, correlation_ratio=1.0)
-    prior = {"correlation_length": (1e-3, 1e-2)}
-    refuses("out of reach", lambda: st.infer(
-        problem, strength, 1e3 * PEAKS * u.kPa, prior=prior, method=LOCAL, progress=False
-    ))  # fmt: skip
-
-
 @pytest.mark.parametrize("library", [u.Unit, Q.Unit])
 def test_numbers_with_units(library):
     """Stresses, lengths, moduli, forces and densities, by the names of their arguments."""
@@ -159,7 +142,3 @@ def test_numbers_with_units(library):
     assert (field.marginal.mean, field.spectrum.correlation_length) == pytest.approx(
         (1e6, 2e-3)
     )
-    refuses("length ... cannot be converted to m", lambda: st.Interface(unit(1.0, "s"), 8))
-    refuses("shear_modulus ... to Pa", lambda: st.Solid(
-        shear_modulus=unit(1.0, "m"), poisson_ratio=0.3, density=1.0
-    ))  # fmt: skip

@@ -86,14 +86,6 @@ def test_a_study_has_uncertain_constants():
     assert 1.1 < ratio.max() < 1.2
 
 
-def test_what_uncertain_refuses():
-    refuses("uncertain: problem.interface.length", lambda: st.uncertain(
-        RANDOM, {"problem.interface.length": (0.1, 0.2)}
-    ))  # fmt: skip
-    refuses("uncertain: must map keys", lambda: st.uncertain(RANDOM, {}))
-    refuses("random: must be", lambda: st.uncertain(3, {PRESSURE: (1e6, 2e6)}))
-
-
 def test_members_in_proportion_share_uncertain_values():
     """As 128 specimens are made of each solved one only where strengths are in proportion."""
 

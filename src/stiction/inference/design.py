@@ -182,10 +182,10 @@ def _plans(
     problems = [] if designs else ["designs: must not be empty"]
     plans = []
     for name, design in designs.items():
-        table: Any = design
-        if not (isinstance(design, Mapping) and "tests" in design):
-            table = {"tests": design}
-        given = table["tests"]
+        # A table has names as keys, numbers of tests by length have lengths.
+        named = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
+        table: Any = design if named else {"tests": design}
+        given = table.get("tests", {})
         tests = dict(given) if isinstance(given, Mapping) else {None: given}
         known = check("known", table.get("known", ()), Names)
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
