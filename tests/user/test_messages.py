@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
+import shlex
 
 import pytest
 import tomli_w
@@ -12,6 +13,7 @@ from checks import python
 from refusals import refuses
 from setups import EXACT, beta_strength, make_problem
 from small_study import altered, small_study
+from typer.main import get_command
 
 import stiction as st
 from stiction.base import files
@@ -108,8 +110,12 @@ def test_every_help_has_examples_and_no_text_is_cut(runs):
     assert "..." not in overview.replace("[ARGS]...", "")
     for name in (command.callback.__name__ for command in app.registered_commands):
         assert re.search(rf"^  {name} ", overview, re.MULTILINE)
-        calls = runs(f"{name} --help").partition("\n  Examples:\n")[2]
-        assert calls.startswith(f"    stiction {name}"), name
+        calls = runs(f"{name} --help").partition("\n  Examples:\n")[2].partition("\n\n")[0]
+        assert calls, name
+        for line in calls.splitlines():
+            program, command, *options = shlex.split(line.partition(" > ")[0])
+            assert (program, command) == ("stiction", name), line
+            get_command(app).commands[name].make_context(name, options)
 
 
 @pytest.mark.filterwarnings("always")

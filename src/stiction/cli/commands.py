@@ -625,10 +625,10 @@ def reliability(
 
     \b
     Examples:
-      stiction reliability study.toml --force 40e3 stiction reliability study.toml
-      --probability 1e-3 stiction reliability study.toml --uncertain
-      "problem.friction.residual_ratio = [0.6, 0.8]" stiction reliability
-      study.toml --out curve --smallest 1e-6
+      stiction reliability study.toml --force 40e3
+      stiction reliability study.toml --probability 1e-3
+      stiction reliability study.toml --uncertain "problem.friction.residual_ratio = [0.6, 0.8]"
+      stiction reliability study.toml --out curve --smallest 1e-6
     """
     from stiction.study.run import table_of
     from stiction.study.study import Study, open_run
