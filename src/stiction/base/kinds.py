@@ -11,7 +11,7 @@ import pydantic
 from pydantic_core import CoreSchema, core_schema
 
 from stiction.base.errors import InputError, unknown
-from stiction.base.model import Mistakes, mistakes, to_plain, valid_keys
+from stiction.base.model import to_plain
 
 T = TypeVar("T", bound=type)
 _registered: dict[str, dict[str, Any]] = {}
@@ -138,14 +138,12 @@ def from_table(kinds: Kinds, given: Mapping[str, Any], context: Any = None) -> A
     rest = dict(given)
     name = rest.pop("type", None)
     if name is None:
-        raise Mistakes([("type", f"missing (valid: {', '.join(kinds)})")])
+        raise InputError(f"needs a type (valid: {', '.join(kinds)})")
     if not isinstance(name, str) or name not in kinds:
-        raise Mistakes([("type", unknown(str(name), kinds))])
-    kind = kinds[name]
-    try:
-        return _adapter(kind).validate_python(rest, context=context)
-    except pydantic.ValidationError as error:
-        raise Mistakes(mistakes(error, valid_keys(kind), False)) from None
+        cause = {"error": InputError(unknown(str(name), kinds))}
+        mistake: Any = {"type": "value_error", "loc": ("type",), "input": name, "ctx": cause}
+        raise pydantic.ValidationError.from_exception_data("type", [mistake])
+    return _adapter(kinds[name]).validate_python(rest, context=context)
 
 
 @lru_cache(maxsize=64)

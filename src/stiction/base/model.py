@@ -13,7 +13,7 @@ import operator
 import os
 import types
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import (
     TYPE_CHECKING,
@@ -252,18 +252,6 @@ Mode: TypeAlias = Literal["II", "III"]
 # -- mistakes ------------------------------------------------------------------------------------
 
 
-MISSING = "missing"
-"""Text about a key that is absent, unless it is misspelt."""
-
-
-class Mistakes(InputError):
-    """Mistakes inside a model, as pairs of a path and a message."""
-
-    def __init__(self, places: list[tuple[str, str]]) -> None:
-        super().__init__(_joined(path, text, by=": ") for path, text in places)
-        self.places = places
-
-
 def describe(value: Any) -> str:
     """Return a short form of a given value, for messages."""
     if isinstance(value, np.ndarray):
@@ -285,87 +273,100 @@ def valid_keys(cls: Any) -> list[str]:
 
 
 MAX_MISTAKES = 100
-"""Mistakes of a model that are explained."""
+"""Mistakes of a call or a file that are explained."""
 
 
-def mistakes(
-    error: pydantic.ValidationError, valid: Sequence[str], call: bool
-) -> list[tuple[str, str]]:
-    """Return the mistakes that pydantic found in a model or call, with their paths.
+def explain(
+    error: pydantic.ValidationError, given: Any, root: str = "", otherwise: str = ""
+) -> list[str]:
+    """Return a message for each mistake that pydantic found in a given value.
 
-    `valid` are the names of the keys or arguments. Each item of pydantic is put into words:
-
-    1. The path gets names in place of positions. In a call, and where another model explained
-       the mistake, pydantic adds members of unions to the path. They are left out.
-    2. An `InputError` from another model already contains messages with paths.
-    3. Otherwise the type of the item determines the message.
-    4. A union has an item for each member. The messages of the items are joined by
-       'or'.
-    5. A missing key is not reported if a given key is a misspelling of it.
+    The path in a message begins with `root`. `otherwise` stands in place of an empty path.
+    A union has an item for each of its members. The texts of the members are joined by 'or'.
     """
-    # Members of a union by path, text and given value.
-    texts: dict[tuple[str, str, str], list[str]] = {}
-    shown = [name for name in valid if name != "self"]
-    misspelt: set[str] = set()
-    items = error.errors()
+    members: dict[tuple[str, str], dict[str, None]] = {}
+    items = error.errors(include_url=False)
     for item in items[:MAX_MISTAKES]:
-        kind, given = item["type"], f", got {describe(item.get('input'))}"
-        context, steps = item.get("ctx") or {}, list(item["loc"])
-        cause = context.get("error")
-        # 1.
-        if steps and isinstance(steps[0], int) and steps[0] < len(valid):
-            steps[0] = valid[steps[0]]
-        if call or isinstance(cause, Mistakes):
-            named = steps[: bool(valid)]
-            steps = named + [step for step in steps[len(named) :] if isinstance(step, int)]
-        path = ".".join(map(str, steps))
-        # 2.
+        context, missing = item.get("ctx", {}), item["type"].startswith("missing")
+        steps = filter(None, (root, *_steps_into(given, item["loc"], missing)))
+        begin = f"{'.'.join(steps) or otherwise}: ".removeprefix(": ")
+        cause, got = context.get("error"), f", got {describe(item['input'])}"
         if isinstance(cause, InputError):
-            without_path = [("", text) for text in cause.problems]
-            for inner, text in getattr(cause, "places", without_path):
-                texts[_joined(path, inner), text, ""] = [""]
-            continue
-        # 3.
-        text, member = str(cause), ""
-        if kind == "unexpected_positional_argument":
-            return [("", f"give the arguments by name (valid: {', '.join(shown)})")]
-        if kind.startswith("missing"):
-            text, given = MISSING, ""
-        elif kind in ("unexpected_keyword_argument", "extra_forbidden"):
-            misspelt.add(nearest(path, shown))
-            path, text, given = "", unknown(path, shown), ""
-        elif cause is None:
+            members |= {(begin + text, ""): {} for text in cause.problems}
+        elif missing:
+            members[begin + "missing", ""] = {}
+        elif cause is not None:
+            members[begin + str(cause), got] = {}
+        else:
             name = str(context.get("class_name") or context.get("class") or "")
-            text, member = "must be ", item["msg"].removeprefix("Input should be ")
-            member = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else member
-        texts.setdefault((path, text, given), []).append(member)
-    # 4. and 5.
-    return [
-        (path, text + " or ".join(dict.fromkeys(members)) + given)
-        for (path, text, given), members in texts.items()
-        if text != MISSING or path not in misspelt
-    ] + [("", f"and {len(items) - MAX_MISTAKES} more")] * (len(items) > MAX_MISTAKES)
+            text = item["msg"].removeprefix("Input should be ")
+            text = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else text
+            members.setdefault((begin + "must be ", got), {})[text] = None
+    texts = [text + " or ".join(names) + got for (text, got), names in members.items()]
+    return [*texts, *[f"and {len(items) - MAX_MISTAKES} more"] * (len(items) > MAX_MISTAKES)]
 
 
-def _joined(*steps: str, by: str = ".") -> str:
-    return by.join(filter(None, steps))
+def _steps_into(given: Any, steps: Sequence[int | str], missing: bool) -> Iterator[str]:
+    """Yield the steps that lead into a value. Other steps of pydantic are members of unions."""
+    for step in steps:
+        keys = range(len(given)) if isinstance(given, list | tuple) else given
+        if isinstance(keys, Mapping | range) and step in keys:
+            given = given[step]
+        elif not missing or step != steps[-1]:
+            continue
+        yield str(step)
 
 
-def explain(error: pydantic.ValidationError, root: str = "") -> list[str]:
-    """Return a message for each mistake that pydantic found, with its path below `root`."""
-    places = mistakes(error, (), True)
-    return [_joined(_joined(root, path), text, by=": ") for path, text in places]
+def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.ValidationError:
+    """Return pydantic's error about a model or a call with the valid names.
+
+    A missing name is not reported if a given name is a misspelling of it.
+    """
+    mistakes: list[Any] = error.errors(include_url=False)
+    misspelt = set()
+    for mistake in mistakes:
+        if mistake["type"] == "unexpected_keyword_argument":
+            (name,) = mistake["loc"]
+            misspelt.add((nearest(name, valid),))
+            cause = {"error": InputError(unknown(name, valid))}
+            mistake |= {"type": "value_error", "loc": (), "ctx": cause}
+    kept = [
+        mistake
+        for mistake in mistakes
+        if not mistake["type"].startswith("missing") or mistake["loc"] not in misspelt
+    ]
+    return pydantic.ValidationError.from_exception_data(error.title, kept)
+
+
+def call_by_names(
+    call: Callable[..., Any], signature: inspect.Signature, owner: str, args: Any, kwargs: Any,
+    root: str = "",
+) -> Any:  # fmt: skip
+    """Call a function that pydantic validates, or raise an `InputError` that lists all mistakes."""
+    by_place = [
+        name
+        for name, parameter in signature.parameters.items()
+        if parameter.kind is not parameter.KEYWORD_ONLY
+    ]
+    given = dict(zip(by_place, args, strict=False)) | kwargs
+    names = [name for name in signature.parameters if name != "self"]
+    if len(given) < len(args) + len(kwargs):  # too many by place, or a name given twice
+        raise InputError(f"{owner}: give the arguments by name (valid: {', '.join(names)})")
+    try:
+        return call(**given)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(named(error, names), given, root, owner)) from None
 
 
 # -- objects and functions -----------------------------------------------------------------------
 
 
-def _explained(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
-    """Validate a model, which explains its own mistakes because it knows the names of its keys."""
+def _named_keys(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
+    """Validate a model. Only its class knows the names of its keys."""
     try:
         return handler(given)
     except pydantic.ValidationError as error:
-        raise Mistakes(mistakes(error, valid_keys(cls), False)) from None
+        raise named(error, valid_keys(cls)) from None
 
 
 @typing.overload
@@ -382,9 +383,9 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
-    explained: Any = classmethod(_explained)
-    # A name of its own, so that it lies outside the validators of a base class.
-    setattr(cls, f"_explained_{cls.__name__}", pydantic.model_validator(mode="wrap")(explained))
+    named_keys: Any = classmethod(_named_keys)
+    # A subclass replaces the validator of its base class.
+    cls._named_keys = pydantic.model_validator(mode="wrap")(named_keys)
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, validate_by_name=True)
     decorate = pydantic_dataclass(
         frozen=True, eq=False, repr=False, kw_only=kw_only, config=config
@@ -394,10 +395,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
     @functools.wraps(validated_init)
     def init(self: Any, *args: Any, **kwargs: Any) -> None:
-        try:
-            validated_init(self, *args, **kwargs)
-        except pydantic.ValidationError as error:
-            raise InputError(explain(error, cls.__name__)) from None
+        validate, owner = functools.partial(validated_init, self), cls.__name__
+        call_by_names(validate, signature, owner, args, kwargs, root=owner)
 
     # Validation inside another model must keep calling pydantic's own path, not
     # this wrapper.
@@ -406,7 +405,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of
     hints = typing.get_type_hints(cls, include_extras=True)
     keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
-    wrapped.__signature__ = plain_signature(wrapped, keys)
+    signature = wrapped.__signature__ = plain_signature(wrapped, keys)
     return wrapped
 
 
@@ -443,18 +442,11 @@ def checked(function: Function) -> Function:
         function
     )
     function.__annotations__ = written
-    names = list(inspect.signature(function).parameters)
     signature = plain_signature(function, hints)
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        try:
-            return validated(*args, **kwargs)
-        except pydantic.ValidationError as error:
-            places = mistakes(error, names, True)
-            raise InputError(
-                f"{path or function.__name__}: {text}" for path, text in places
-            ) from None
+        return call_by_names(validated, signature, function.__name__, args, kwargs)
 
     typing.cast(Any, call).__signature__ = signature
     return typing.cast(Function, call)
@@ -494,14 +486,10 @@ def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
     parameters = [
         parameter.replace(annotation=_Plain(plain_name(hints[name])))
         if name in hints
-        else parameter
+        else parameter  # self
         for name, parameter in signature.parameters.items()
     ]
-    returned = signature.return_annotation
-    if isinstance(owner, type):
-        returned = inspect.Signature.empty
-    elif returned is not inspect.Signature.empty:
-        returned = _Plain(plain_name(returned))
+    returned = _Plain(plain_name(signature.return_annotation))
     return signature.replace(parameters=parameters, return_annotation=returned)
 
 
@@ -521,7 +509,7 @@ def check(name: str, value: Any, annotation: Any) -> Any:
     try:
         return _adapter(annotation).validate_python(value)
     except pydantic.ValidationError as error:
-        raise InputError(explain(error, name)) from None
+        raise InputError(explain(error, value, name)) from None
 
 
 @functools.lru_cache(maxsize=64)

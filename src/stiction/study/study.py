@@ -651,7 +651,7 @@ def _read(
     try:
         return pydantic.TypeAdapter(cls).validate_python(given, context=context)
     except pydantic.ValidationError as error:
-        raise InputError(dict.fromkeys(explain(error))) from None
+        raise InputError(explain(error, given)) from None
 
 
 def _stored_interfaces(path: Path) -> list[Any]:
