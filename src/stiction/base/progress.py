@@ -1,8 +1,7 @@
 """Report the progress of long work, with the same mechanism everywhere.
 
-After a second, a terminal shows a bar (rich), a notebook shows an output that is
-updated, and a pipe receives a line now and then. The working code reports its
-progress with `advance`.
+After a second, a terminal shows a bar (rich). A pipe receives a line now and then, and a
+notebook a line that is overwritten. The working code reports its progress with `advance`.
 """
 
 from __future__ import annotations
@@ -12,16 +11,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from functools import cache
 from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
 """True shows progress once work takes long, False is silent, a callable gets (done, total)."""
 
-AFTER, TICK = 1.0, 0.25
-"""Seconds of silence, for work that needs no bar, and seconds between updates."""
-LONG = 10.0
-"""Seconds between lines in a pipe, at least."""
+SILENCE = 1.0
+"""Seconds without a bar, because short work needs none."""
+PIPE_INTERVAL = 10.0
+"""Seconds between lines in a pipe or a notebook, at least."""
 
 interrupted = threading.Event()
 """Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
@@ -60,6 +58,8 @@ class Meter:
             self._first = time.monotonic(), self.done
         if callable(self._show):
             self._show(self.done, self.total or 0)
+        elif self in _running and not _in_terminal():
+            _running[0]._write_line()
 
     @property
     def elapsed(self) -> float:
@@ -71,7 +71,7 @@ class Meter:
         """Return the progress, the elapsed and the remaining time, in words."""
         of = f" of {self.total:,}" if self.total else ""
         parts = [f"{self.done:,}{of} {self.unit}" if self.done or of else "", self.note]
-        parts += ["compiling" * bool(_compiling), duration(math.floor(self.elapsed))]
+        parts.append(duration(math.floor(self.elapsed)))
         begin, before = self._first or (0.0, self.done)
         if self.total and self.done > before:
             pace = (time.monotonic() - begin) / (self.done - before)
@@ -81,21 +81,33 @@ class Meter:
         return ", ".join(part for part in parts if part)
 
     def __enter__(self) -> Meter:
-        self._begun = time.monotonic()
+        self._begun, self._line_due = time.monotonic(), PIPE_INTERVAL
         if self._show is True:
             _running.append(self)
-            if _running[0] is self:
-                self._ended = threading.Event()
-                self._watcher = threading.Thread(target=_watch, args=[self._ended], daemon=True)
-                self._watcher.start()
+        if _running == [self] and _in_terminal():
+            self._bar = _bar()
+            self._starter = threading.Timer(SILENCE, self._bar.start)
+            self._starter.daemon = True
+            self._starter.start()
         return self
 
     def __exit__(self, *error: object) -> None:
+        if hasattr(self, "_bar"):
+            self._starter.cancel()
+            self._starter.join()
+            self._bar.stop()
+        elif _running[:1] == [self] and self._line_due > PIPE_INTERVAL:
+            self._write_line(last=True)
         if self in _running:
             _running.remove(self)
-        if hasattr(self, "_watcher"):
-            self._ended.set()
-            self._watcher.join()
+
+    def _write_line(self, last: bool = False) -> None:
+        """Write a line for a pipe or a notebook if it is due: few, however long the work takes."""
+        if last or self.elapsed >= self._line_due:
+            self._line_due = max(self.elapsed + PIPE_INTERVAL, 1.1 * self.elapsed)
+            line, notebook = f"{_shown().what}: {_shown().text}", "ipykernel" in sys.modules
+            end = "\r" if notebook else "\n"  # a notebook shows the last line only
+            print(line.ljust(80 * notebook), end=end, file=sys.stderr, flush=True)
 
 
 SILENT = Meter("", show=False)
@@ -103,87 +115,32 @@ SILENT = Meter("", show=False)
 
 _running: list[Meter] = []
 """Meters that are shown, the outermost first."""
-_compiling: list[Any] = []
-"""Kernels that numba compiles at the moment."""
 
 
-def _watch(ended: threading.Event) -> None:
-    """Show one of the running meters until the outermost meter has ended."""
-    display = shown = None
-    while not ended.wait(TICK):
-        if "numba" in sys.modules:
-            _listen()
-        old = [meter for meter in tuple(_running) if meter.elapsed >= AFTER]
-        if old:  # the outermost whose total is known, else the innermost
-            shown = next((meter for meter in old if meter.total), old[-1])
-            display = display or _display()
-            display(shown, False)
-    if display is not None and shown is not None:
-        display(shown, True)
+def _shown() -> Meter:
+    """Return the outermost running meter whose total is known, or else the innermost meter."""
+    return next((meter for meter in _running if meter.total), _running[-1])
 
 
-@cache
-def _listen() -> None:
-    """Let numba say when it compiles."""
-    from numba.core import event
-
-    class Listener(event.Listener):
-        def on_start(self, begun: Any) -> None:
-            _compiling.append(begun)
-
-        def on_end(self, ended: Any) -> None:
-            del _compiling[-1:]
-
-    event.register("numba:compile", Listener())
+def _in_terminal() -> bool:
+    return sys.stderr is not None and sys.stderr.isatty()
 
 
-def _display() -> Callable[[Meter, bool], None]:
-    """Return a function that shows a meter. Its second argument is true at the last call."""
-    stream, soon = sys.stderr, LONG
-    if stream is not None and stream.isatty():
-        return _in_terminal()
-    if "ipykernel" in sys.modules:
-        return _in_notebook()
+def _bar() -> Any:
+    """Return a bar that shows a running meter and disappears at the end.
 
-    def write_line(meter: Meter, last: bool) -> None:  # few lines, however long it takes
-        nonlocal soon
-        if meter.elapsed >= soon or (last and soon > LONG):
-            soon = max(meter.elapsed + LONG, 1.1 * meter.elapsed)
-            print(f"{meter.what}: {meter.text}", file=stream, flush=True)
-
-    return write_line
-
-
-def _in_terminal() -> Callable[[Meter, bool], None]:
-    """Show a bar that disappears at the end. Printed lines appear above the bar."""
+    Printed lines appear above the bar.
+    """
     from rich.console import Console
-    from rich.progress import BarColumn, Progress
+    from rich.live import Live
+    from rich.progress_bar import ProgressBar
+    from rich.table import Table
 
-    columns = "{task.description}", BarColumn(30), "{task.fields[text]}"
-    options: Any = {"transient": True, "auto_refresh": False, "redirect_stdout": False}
-    bar = Progress(*columns, console=Console(stderr=True), **options)
-    task = bar.add_task("", text="")
+    def row() -> Table:
+        meter, grid = _shown(), Table.grid(padding=(0, 1))
+        size: Any = {"total": meter.total, "completed": meter.done, "width": 30}
+        grid.add_row(meter.what, ProgressBar(pulse=not meter.total, **size), meter.text)
+        return grid
 
-    def show(meter: Meter, last: bool) -> None:
-        if last:
-            bar.stop()
-        else:
-            bar.start()
-            options: Any = {"total": meter.total, "completed": meter.done, "text": meter.text}
-            bar.update(task, description=meter.what, refresh=True, **options)
-
-    return show
-
-
-def _in_notebook() -> Callable[[Meter, bool], None]:
-    """Show an output that is updated, and empty at the end. Rich would need ipywidgets."""
-    from IPython.display import display
-
-    handle = display({}, raw=True, display_id=True)
-
-    def show(meter: Meter, last: bool) -> None:
-        share = f"{meter.done / meter.total:.0%}, " if meter.total else ""
-        text = {"text/plain": f"{meter.what}: {share}{meter.text}"}
-        handle.update({} if last else text, raw=True)
-
-    return show
+    options: Any = {"transient": True, "redirect_stdout": False}
+    return Live(get_renderable=row, console=Console(stderr=True), **options)
