@@ -311,13 +311,13 @@ def rupture_onset():
     for ratio in (0.25, 0.5, 2.0):
         strength = st.paper.strength(problem, correlation_ratio=ratio)
         tau_p = strength.sample(problem.interface, samples=6, seed=1)
-        for rate in (1e5, 2e7, 1e9):
-            method = st.Rupture(loading_rate=rate, start="rest")
+        for loading_rate in (1e5, 2e7, 1e9):
+            method = st.Rupture(loading_rate=loading_rate, start="rest")
             rest, first = solver_time(problem, method, tau_p, 1)
-            method = st.Rupture(loading_rate=rate)
+            method = st.Rupture(loading_rate=loading_rate)
             ours, found = solver_time(problem, method, tau_p, 1)
             apart = np.abs(found["critical_stress"] / first["critical_stress"] - 1.0).max()
-            label = f"xi_0/h_n = {ratio}, {rate:.0e} Pa/s"
+            label = f"xi_0/h_n = {ratio}, {loading_rate:.0e} Pa/s"
             row(label, ours, [("from rest", rest)], f"{apart:.0e} apart")
 
 

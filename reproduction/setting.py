@@ -111,7 +111,7 @@ H = PROBLEM.nucleation_length
 """Nucleation length h_n, m."""
 L = PROBLEM.interface.measure
 G_STAR = PROBLEM.effective_modulus
-W = PROBLEM.uniform_rate
+W = PROBLEM.uniform_weakening_rate
 """Weakening rate, Pa/m."""
 STRAIN = PROBLEM if PARAMETERS else _study("strain").problem
 """The same with the printed modulus, G/(1 - nu), which belongs to plane strain."""
@@ -139,10 +139,12 @@ def residual(strength):
 
 def _loading_rate() -> float:
     if "loading_rate" in PARAMETERS:
-        rate = PARAMETERS["loading_rate"]
-        if not (isinstance(rate, int | float) and 0.0 < rate < np.inf):
-            raise st.InputError(f"loading_rate: give a positive number, Pa/s, got {rate!r}")
-        return float(rate)
+        loading_rate = PARAMETERS["loading_rate"]
+        if not (isinstance(loading_rate, int | float) and 0.0 < loading_rate < np.inf):
+            raise st.InputError(
+                f"loading_rate: give a positive number, Pa/s, got {loading_rate!r}"
+            )
+        return float(loading_rate)
     if not PARAMETERS:
         return PRINTED_RATE
     return float(f"{PRINTED_RATE * (MEAN / 1e6) / (CROSSING / 1.08e-4):.2g}")

@@ -216,8 +216,8 @@ def window(run: Runner, samples: int) -> xr.Dataset:
     field = strength(setting.LAST)
 
     def batch(ratio, first, count):
-        rate = setting.W * ratio / setting.LAST
-        friction = dataclasses.replace(fine.friction, weakening_rate=rate)
+        weakening_rate = setting.W * ratio / setting.LAST
+        friction = dataclasses.replace(fine.friction, weakening_rate=weakening_rate)
         problem = dataclasses.replace(fine, friction=friction)
         tau_p = field.sample(fine.interface, samples=count, seed=run.seed, first=first)
         least = st.theory.nucleation_stress(problem, tau_p).min(axis=1)

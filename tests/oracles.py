@@ -36,15 +36,15 @@ def dense(symbol: Any, shape: Any) -> Any:
 
 
 def by_linear_programme(
-    stiffness: Any, rate: Any, excess: Any, profile: Any
+    stiffness: Any, weakening_rate: Any, excess: Any, profile: Any
 ) -> tuple[float, Any, Any]:
     """max tau_0: (K - W) d + s - tau_0 p >= 0, d >= 0, by the simplex method of HiGHS.
 
     The load, its slip and its multiplier; in units that make the matrix of order one. Feasibility
     is kept to 1e-7 at worst, 1e-10 on request; the vertex is exact.
     """
-    n, unit = len(stiffness), float(np.max(rate))
-    matrix = (stiffness - np.diag(np.broadcast_to(rate, n))) / unit
+    n, unit = len(stiffness), float(np.max(weakening_rate))
+    matrix = (stiffness - np.diag(np.broadcast_to(weakening_rate, n))) / unit
     found = linprog(
         np.r_[np.zeros(n), -1.0],
         A_ub=np.c_[-matrix, np.broadcast_to(profile, n)],
@@ -58,13 +58,13 @@ def by_linear_programme(
 
 
 def largest_load(
-    problem: st.Problem, strength: Any, rate: Any = None
+    problem: st.Problem, strength: Any, weakening_rate: Any = None
 ) -> tuple[float, Any, Any]:
     """Load, slip and multiplier of the first instability by the linear programme."""
     symbol, load = symbol_of(problem), problem.load
-    rate = problem.friction.weakening_rate if rate is None else rate
+    W = problem.friction.weakening_rate if weakening_rate is None else weakening_rate
     excess, profile = strength - load.initial_stress, load.profile
-    flat = (np.broadcast_to(field, strength.shape).ravel() for field in (rate, excess, profile))
+    flat = (np.broadcast_to(field, strength.shape).ravel() for field in (W, excess, profile))
     return by_linear_programme(dense(symbol, strength.shape), *flat)
 
 

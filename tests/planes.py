@@ -35,9 +35,9 @@ def moduli(modulus, ratio):
     return modulus / (1.0 - ratio), modulus
 
 
-def plane_sample(strength, residual, rate):
+def plane_sample(strength, residual, weakening_rate):
     """A sample on a plane under a uniform load, of (nx, ny) fields or numbers."""
     shape = np.shape(strength)
-    fields = (strength, residual, 1.0, rate)
+    fields = (strength, residual, 1.0, weakening_rate)
     flat = (np.broadcast_to(field, shape).flatten() for field in fields)
     return make_sample(*flat, LINEAR._replace(at_corner=AT_CORNER))

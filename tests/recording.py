@@ -143,7 +143,7 @@ def numbers(value: Any, path: str) -> Any:
         return [_short(one) for one in array.reshape(-1)]
     flat = np.nan_to_num(array.reshape(-1), posinf=0.0, neginf=0.0)
     place = np.arange(flat.size)
-    weighted = [np.mean(flat * np.cos(rate * place + 1.0)) for rate in (1.234, 0.057)]
+    weighted = [np.mean(flat * np.cos(frequency * place + 1.0)) for frequency in (1.234, 0.057)]
     least_and_most = [np.nanmin(array), np.nanmax(array)] if np.isfinite(flat).any() else []
     lost = int(np.isnan(array).sum())
     digest = [_short(float(one)) for one in (*least_and_most, flat.mean(), *weighted)]

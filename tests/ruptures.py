@@ -16,11 +16,15 @@ from stiction.methods.dynamics.summary import energy_balance
 STRESS = dataclasses.replace(SOLID, plane="stress")
 
 
-def wavy_line(nodes: int = 128, rate: float = 0.2e12, **options: Any) -> tuple[Any, Any]:
+def wavy_line(
+    nodes: int = 128, weakening_rate: float = 0.2e12, **options: Any
+) -> tuple[Any, Any]:
     """A problem in plane stress, and a strength: first slip at 0.759 MPa, onset at 0.7885 MPa."""
     x = np.arange(nodes) / nodes
     strength = 1e6 - 2e5 * np.cos(2 * np.pi * x) + 5e4 * np.sin(10 * np.pi * x)
-    return make_problem(nodes, 0.05, solid=STRESS, weakening_rate=rate, **options), strength
+    return make_problem(
+        nodes, 0.05, solid=STRESS, weakening_rate=weakening_rate, **options
+    ), strength
 
 
 def simulate(problem: Any, strength: Any, save: Any = None, **method: Any) -> Any:

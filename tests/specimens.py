@@ -16,7 +16,7 @@ def crooked(
     mode: str = "II",
     nu: float = 0.33,
     plane: str = "stress",
-    rate: float = 0.19e12,
+    weakening_rate: float = 0.19e12,
     residual: float = 0.52e6,
     **more: Any,
 ) -> st.Problem:
@@ -26,7 +26,7 @@ def crooked(
     return st.Problem(
         solid=st.Solid(youngs_modulus=2.7e9, poisson_ratio=nu, density=1180.0, plane=plane),
         interface=st.Interface(length=0.083, nodes=nodes),
-        friction=st.LinearWeakening(weakening_rate=rate, residual_strength=residual),
+        friction=st.LinearWeakening(weakening_rate=weakening_rate, residual_strength=residual),
         specimen=st.Blocks(height=height, thickness=0.0071, drive=drive or st.Platen()),
         load=more.pop("load", load),
         mode=mode,

@@ -57,7 +57,7 @@ class BruteForce:
         self.load, self.slip = float((self.s / self.q).min()), np.zeros(self.s.size)
         self.peak, self.first, self.drops = self.carried, None, []
         self.slides, self.kinks = False, [self.load]
-        self.rate = np.zeros(self.s.size)
+        self.v = np.zeros(self.s.size)
         self.stops = self.stops_at_corners = self.stops_in_jumps = 0
 
     @property
@@ -88,8 +88,8 @@ class BruteForce:
         A is K less the present weakening, on the nodes at their strength; `elastic`, it is K, on
         all. Or a direction z >= 0 in which nothing bounds it, and False.
         """
-        rate = self.slopes[self.piece] * (self.s - self.r) / self.critical
-        a = self.K if elastic else self.K - np.diag(rate)
+        W = self.slopes[self.piece] * (self.s - self.r) / self.critical
+        a = self.K if elastic else self.K - np.diag(W)
         at = (self.over > -AT * self.scale) | elastic
         z = np.where(at, start, 0.0)
         least = 1e-12 * np.abs(drive).max()
@@ -135,13 +135,13 @@ class BruteForce:
             self.slip = np.where(there, end, self.slip + size * z)
         return size
 
-    def step(self, rate: np.ndarray) -> None:
+    def step(self, v: np.ndarray) -> None:
         """Raise the drive until a node reaches its strength or a corner."""
-        closing = self.q - self.K @ rate
-        left = np.full(rate.size, np.inf)
-        rests = (rate == 0.0) & (closing > 0.0) & (self.over <= -AT * self.scale)
+        closing = self.q - self.K @ v
+        left = np.full(v.size, np.inf)
+        rests = (v == 0.0) & (closing > 0.0) & (self.over <= -AT * self.scale)
         np.divide(-self.over, closing, out=left, where=rests)
-        self.load += self.move(rate, float(left.min()))
+        self.load += self.move(v, float(left.min()))
         self.peak = max(self.peak, self.carried)
         self.kinks.append(self.load)
 
@@ -184,19 +184,19 @@ class BruteForce:
         for _ in range(EVENTS * piece.size):
             if self.slides:
                 return self
-            rate, stable = self.complementary(self.q, self.rate)
+            v, stable = self.complementary(self.q, self.v)
             if stable:
-                stop = int(((rate == 0.0) & (self.rate > 0.0)).sum())
+                stop = int(((v == 0.0) & (self.v > 0.0)).sum())
                 self.stops += stop
-                if ((self.piece > piece) & (self.rate > 0.0)).any():
+                if ((self.piece > piece) & (self.v > 0.0)).any():
                     self.stops_at_corners += stop
                 piece = self.piece
-                self.rate = rate
-                self.step(rate)
+                self.v = v
+                self.step(v)
                 self.slides = bool((self.slip > 0.0).all())
             else:
-                self.rate = np.zeros(rate.size)
-                self.jump(rate)
+                self.v = np.zeros(v.size)
+                self.jump(v)
         raise AssertionError(f"no sliding after {EVENTS} events a node")
 
 

@@ -33,13 +33,13 @@ PACKAGE = Path(st.__file__).parent
 SIZES = 0.5, 2.0
 
 
-def problem(length=0.1, nodes=128, rate=0.3e12, specimen=None, **law):
+def problem(length=0.1, nodes=128, weakening_rate=0.3e12, specimen=None, **law):
     """One interface of a polymer; the solid's plane state is that of a plane or a line."""
     plane = {} if isinstance(nodes, tuple) else {"plane": "stress"}
     return st.Problem(
         st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, **plane),
         st.Interface(length, nodes),
-        st.LinearWeakening(weakening_rate=rate, **law),
+        st.LinearWeakening(weakening_rate=weakening_rate, **law),
         specimen=specimen,
     )
 
@@ -78,13 +78,13 @@ def specimens():
     """Plates behind a machine, pushed from one side."""
     drive = st.Pusher(height=0.01, width=0.005, stiffness=3e7)
     blocks = st.Blocks(height=0.05, thickness=0.006, drive=drive)
-    system = problem(nodes=64, rate=0.06e12, specimen=blocks, residual_ratio=0.4)
+    system = problem(nodes=64, weakening_rate=0.06e12, specimen=blocks, residual_ratio=0.4)
     return {method.type: onsets(system, method) for method in (EXACT, LOCAL)}
 
 
 def ruptures():
     """One rupture to sliding, and one held below it."""
-    system = problem(nodes=64, rate=0.15e12, residual_ratio=0.5)
+    system = problem(nodes=64, weakening_rate=0.15e12, residual_ratio=0.5)
     held = st.Rupture(load=[[0.0, 1e-3, 3e-3], [0.0, 0.7e6, 0.7e6]], end_time=3e-3)
     return {
         "rising": onsets(system, st.Rupture(loading_rate=1e8), 1), "held": onsets(system, held, 1)

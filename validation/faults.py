@@ -81,14 +81,14 @@ def corner_constants(time, slip, places, speed):
     omega = 2.0 * np.pi * BAND * SHEAR_SPEED / RADIUS
     middle, length = 0.5 * (time[1:] + time[:-1]), np.diff(time)
     waves = np.exp(-1j * np.outer(omega, middle)) * np.sinc(np.outer(omega, length) / 2 / np.pi)
-    rate = waves @ np.diff(slip[:, inside], axis=0)  # transforms of slip rates
+    slip_rate = waves @ np.diff(slip[:, inside], axis=0)  # transforms of slip rates
     # Equal areas of the focal sphere, along a spiral.
     share = np.sqrt(1.0 - (1.0 - (2.0 * np.arange(DIRECTIONS) + 1.0) / DIRECTIONS) ** 2)
     angle = np.pi * (1.0 + 5.0**0.5) * np.arange(DIRECTIONS)
     corners = []
     for along in np.stack([share * np.cos(angle), share * np.sin(angle)], axis=1):
         delay = np.tensordot(along, places, 1)[inside] / speed
-        pulse = np.abs((rate * np.exp(1j * np.outer(omega, delay))).sum(axis=1))
+        pulse = np.abs((slip_rate * np.exp(1j * np.outer(omega, delay))).sum(axis=1))
         velocity, low = BAND * pulse, BAND < HIGHEST_CORNER
         by_integrals = np.sqrt((velocity**2).sum() / (pulse**2).sum())
         corners.append((BAND[np.argmax(velocity[low])], by_integrals))
@@ -151,8 +151,8 @@ def loading(faults=60):
         "rate (Pa/s)   r          arrested   moment of all events   critical load (of slow ones)"
     )
     slow = None
-    for rate in RATES:
-        method = st.Rupture(loading_rate=rate, events=40)
+    for loading_rate in RATES:
+        method = st.Rupture(loading_rate=loading_rate, events=40)
         found = st.monte_carlo(
             problem, strength, method=method, samples=faults, seed=1, progress=False
         )
@@ -160,7 +160,8 @@ def loading(faults=60):
         load = found.critical_load.values
         slow = slow or (moment, load)
         print(
-            f"{rate:8.0e}   {rate * crossing / scale:8.1e}   {int(found.arrested_events.sum()):6d}"
+            f"{loading_rate:8.0e}   {loading_rate * crossing / scale:8.1e}"
+            f"   {int(found.arrested_events.sum()):6d}"
             f"   {moment / slow[0]:12.3f}   {np.mean(load / slow[1]):20.4f}",
             flush=True,
         )

@@ -57,10 +57,10 @@ def cases(nodes=256):
         of="friction_coefficient",
     )  # fmt: skip
     wave = 1.0 + 0.5 * np.cos(2.0 * np.pi * np.arange(nodes) / nodes)
-    rate = problem.friction.weakening_rate
+    weakening_rate = problem.friction.weakening_rate
     residual = st.Problem(
         problem.solid, st.Interface(0.05, nodes // 2),
-        st.LinearWeakening(weakening_rate=rate, residual_ratio=0.5),
+        st.LinearWeakening(weakening_rate=weakening_rate, residual_ratio=0.5),
     )  # fmt: skip
     weibull = st.RandomField(st.Weibull(mean=1e6, cv=0.25), strength.spectrum, mean_mode=True)
     low = {"marginal.low": bounds["marginal.low"]}

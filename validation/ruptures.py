@@ -70,11 +70,11 @@ def onset(nodes=512, samples=5):
     for ratio in RATIOS:
         tau_p = strengths(problem, ratio, samples, seed=3)
         exact = first(tau_p, st.Equilibrium())
-        for rate in LOADING_RATES:
-            away = first(tau_p, st.Rupture(loading_rate=rate)) / exact - 1.0
+        for loading_rate in LOADING_RATES:
+            away = first(tau_p, st.Rupture(loading_rate=loading_rate)) / exact - 1.0
             print(
-                f"xi_0/h_n = {ratio:4.2f}, {rate:7.0e} Pa/s: mean {away.mean():+.2e}, largest"
-                f" {np.abs(away).max():.2e}",
+                f"xi_0/h_n = {ratio:4.2f}, {loading_rate:7.0e} Pa/s: mean {away.mean():+.2e},"
+                f" largest {np.abs(away).max():.2e}",
                 flush=True,
             )
 

@@ -85,7 +85,7 @@ def compared(
                 short = least.state.slip - event.waves.slip
                 added = (event.waves.slip - before.slip).max()
                 found["shorter"].append(float(short.max() > 1e-3 * added or not arrested))
-            speed = front_speeds(problem, rows.steepest_rate, event.waves.arrival)[
+            speed = front_speeds(problem, rows.steepest_weakening_rate, event.waves.arrival)[
                 "median_rupture_speed"
             ]
             if np.isfinite(speed):

@@ -78,14 +78,21 @@ def without_trend(events, name):
 
 
 def rig(
-    machine, rate=5e9, *, length=LENGTH, drive=None, side="both", start=RESIDUAL, nodes=NODES
+    machine,
+    weakening_rate=5e9,
+    *,
+    length=LENGTH,
+    drive=None,
+    side="both",
+    start=RESIDUAL,
+    nodes=NODES,
 ):
     """Return the rig as a problem: a reloaded interface rests at its residual strength."""
     pusher = st.Pusher(height=0.5 * HEIGHT, width=HEIGHT, side=side, stiffness=machine)
     return st.Problem(
         solid=st.Solid(**GABBRO, plane="stress"),
         interface=st.Interface(length=length, nodes=int(nodes * length / LENGTH)),
-        friction=st.LinearWeakening(weakening_rate=rate, residual_strength=RESIDUAL),
+        friction=st.LinearWeakening(weakening_rate=weakening_rate, residual_strength=RESIDUAL),
         specimen=st.Blocks(height=HEIGHT, thickness=THICKNESS, drive=drive or pusher),
         load=st.Load(normal_pressure=PRESSURE, initial_stress=start),
     )
@@ -127,11 +134,11 @@ def share_of_weaker_end(found, length=LENGTH):
     return np.minimum(left, 1.0 - left)
 
 
-def rate_of(machine, strength, excess, peak):
+def weakening_rate_of(machine, strength, excess, peak):
     """Return the weakening rate (Pa/m) with which the mean peak is the measured one."""
 
     def above(log_slip):
-        problem = rig(machine, rate=excess / 10.0**log_slip)
+        problem = rig(machine, weakening_rate=excess / 10.0**log_slip)
         return float(onsets(problem, strength, 40)[0].critical_stress.mean()) - peak
 
     return excess / 10.0 ** brentq(above, -6.3, -4.0, xtol=0.01)
@@ -223,8 +230,8 @@ def constrain(machine, events):
     rows = []
     for excess, cv in itertools.product(EXCESS, CVS):
         strength = strength_of(excess, cv, 0.2)
-        rate = rate_of(machine, strength, excess, events.before.mean())
-        problem = rig(machine, rate=rate)
+        weakening_rate = weakening_rate_of(machine, strength, excess, events.before.mean())
+        problem = rig(machine, weakening_rate=weakening_rate)
         found, slid = onsets(problem, strength)
         weaker = share_of_weaker_end(found)
         drop, slip, spread = of_model(problem, found, slid)
@@ -233,8 +240,8 @@ def constrain(machine, events):
         row = {
             "excess": excess,
             "cv": cv,
-            "critical_slip": excess / rate,
-            "rate": rate,
+            "critical_slip": excess / weakening_rate,
+            "weakening_rate": weakening_rate,
             "scatter": float(found.critical_stress.std(ddof=1)),
             "arrests": 1.0 - slid.mean(),
             **{f"both{i}": np.mean(weaker > share) for i, share in enumerate(SHARES)},
@@ -246,7 +253,7 @@ def constrain(machine, events):
         rows.append(row)
         print(
             f"excess {excess / 1e3:.0f} kPa +- {100 * cv:.0f} %:"
-            f" d_c {1e6 * row['critical_slip']:.1f} um, W {rate / 1e9:.1f} GPa/m,"
+            f" d_c {1e6 * row['critical_slip']:.1f} um, W {weakening_rate / 1e9:.1f} GPa/m,"
             f" scatter {row['scatter'] / 1e3:.2f} kPa, arrests {row['arrests']:.2f}, both ends"
             f" {row['both0']:.2f}/{row['both1']:.2f}/{row['both2']:.2f}, slip scatter"
             f" {1e6 * row['spread']:.2f} um (from one end {1e6 * one.mean():.2f}, from both"
@@ -258,19 +265,21 @@ def constrain(machine, events):
         some = rows[rows.cv == cv][::-1]  # by critical slip, with which the share rises
         rising = np.maximum.accumulate(some[f"both{i}"]) + 1e-9 * np.arange(len(some))
         slips = np.interp((low, high), rising, some.critical_slip)
-        rates = np.interp((low, high), rising, some.rate)
+        weakening_rates = np.interp((low, high), rising, some.weakening_rate)
         print(
             f"measured share with {100 * cv:.0f} % and a weaker end of {share:.2f}: d_c"
-            f" {1e6 * slips[0]:.1f} to {1e6 * slips[1]:.1f} um, W {rates[1] / 1e9:.1f} to"
-            f" {rates[0] / 1e9:.1f} GPa/m"
+            f" {1e6 * slips[0]:.1f} to {1e6 * slips[1]:.1f} um, W {weakening_rates[1] / 1e9:.1f} to"
+            f" {weakening_rates[0] / 1e9:.1f} GPa/m"
         )
     return rows
 
 
-def product(machine, rate, excess):
+def product(machine, weakening_rate, excess):
     """Print that scatter and length of the local strength count by one product only."""
     for cv, length in ((0.5, 0.2), (0.25, 0.8), (0.7, 0.1)):
-        found, _ = onsets(rig(machine, rate=rate), strength_of(excess, cv, length))
+        found, _ = onsets(
+            rig(machine, weakening_rate=weakening_rate), strength_of(excess, cv, length)
+        )
         whole = cv * excess * np.sqrt(length / LENGTH)
         print(
             f"local scatter {cv * excess / 1e3:.1f} kPa over {length:g} m, product"
@@ -285,27 +294,27 @@ def infer(machine, table, peaks, rows):
     """
     rng = np.random.default_rng(2)
     count, samples = (20, 100) if QUICK else (400, 300)
-    few, much = (rows[rows.cv == cv].set_index("excess").rate for cv in CVS)
+    few, much = (rows[rows.cv == cv].set_index("excess").weakening_rate for cv in CVS)
     members = []
     for _ in range(count):
         excess, length = rng.uniform(EXCESS[0], EXCESS[-1]), 10.0 ** rng.uniform(-1.0, 0.0)
         whole = 10.0 ** rng.uniform(3.2, 3.8)  # Pa: local scatter times sqrt(length/LENGTH)
         cv = whole / excess * np.sqrt(LENGTH / length)
         weight = (cv * np.sqrt(length / 0.2) - CVS[0]) / (CVS[1] - CVS[0])
-        rates = [np.interp(excess, some.index, some) for some in (few, much)]
-        rate = max(rates[0] + weight * (rates[1] - rates[0]), 1e9) * np.exp(
-            rng.uniform(-0.25, 0.25)
-        )
+        weakening_rates = [np.interp(excess, some.index, some) for some in (few, much)]
+        weakening_rate = max(
+            weakening_rates[0] + weight * (weakening_rates[1] - weakening_rates[0]), 1e9
+        ) * np.exp(rng.uniform(-0.25, 0.25))
         members.append(
             st.RandomInterface(
                 strength=strength_of(excess, cv, length),
                 weakening_rate=st.RandomField(
-                    st.Lognormal(mean=rate, cv=1e-6), st.ExponentialSpectrum(1.0)
+                    st.Lognormal(mean=weakening_rate, cv=1e-6), st.ExponentialSpectrum(1.0)
                 ),
             )
         )
     found = st.infer(
-        rig(machine, rate=None, nodes=64),
+        rig(machine, weakening_rate=None, nodes=64),
         members,
         peaks,
         method=st.Equilibrium(),
@@ -319,9 +328,11 @@ def infer(machine, table, peaks, rows):
         print(f"agreement, {name}: p = {agree.p_values['cramer_von_mises']:.3f}")
 
 
-def predict(machine, rate, excess, cv=0.5, count=None):
+def predict(machine, weakening_rate, excess, cv=0.5, count=None):
     """Print peaks of other set-ups, in which nothing is fitted any more."""
-    print(f"W {rate / 1e9:.1f} GPa/m, excess {excess / 1e3:.0f} kPa +- {100 * cv:.0f} %:")
+    print(
+        f"W {weakening_rate / 1e9:.1f} GPa/m, excess {excess / 1e3:.0f} kPa +- {100 * cv:.0f} %:"
+    )
     strength = strength_of(excess, cv, 0.2)
     set_ups = (
         ("half as long", {"length": 0.5 * LENGTH}),
@@ -332,7 +343,7 @@ def predict(machine, rate, excess, cv=0.5, count=None):
         ("from rest without stress", {"start": 0.0}),
     )
     for what, changed in set_ups[:count]:
-        problem = rig(machine, rate=rate, **changed)
+        problem = rig(machine, weakening_rate=weakening_rate, **changed)
         found, _ = onsets(problem, strength)
         peak, x = (
             found.critical_stress.to_numpy(),
@@ -401,7 +412,7 @@ def inertia(machine, events, rows):
     print(f"measured: slip {mean_of(1e6 * events.slip, 1)} um, drop", end=" ")
     print(f"{mean_of(events['drop'] / 1e3, 1)} kPa")
     for row in rows[(rows.cv == CVS[1]) & rows.excess.isin(INERTIA)].itertuples():
-        problem = rig(machine, rate=row.rate, nodes=FINE)
+        problem = rig(machine, weakening_rate=row.weakening_rate, nodes=FINE)
         strength = strength_of(row.excess, row.cv, 0.2)
         print(f"excess {row.excess / 1e3:.0f} kPa, {CYCLES} cycles on {FINE} nodes:")
         print("  without inertia: " + described(last_events(problem, strength)))
@@ -519,7 +530,7 @@ def main():
     ratio = (events["drop"] / events.slip).mean()
     machine, blocks = machine_of(ratio)
     for _ in range(2):  # slip before the rupture makes its drop over slip less than that of all
-        problem = rig(machine, rate=CENTRAL[0])
+        problem = rig(machine, weakening_rate=CENTRAL[0])
         drop, slip, _ = of_model(problem, *onsets(problem, strength_of(CENTRAL[1], 0.5, 0.2)))
         machine, _ = machine_of(problem.blocks.relief * ratio / (drop.mean() / slip.mean()))
     print(f"drop over slip: {ratio / 1e9:.3f} MPa/mm")
@@ -529,7 +540,7 @@ def main():
     product(machine, *CENTRAL)
     predict(machine, *CENTRAL)
     for row in rows[rows.excess.isin((30e3, 45e3))].itertuples():
-        predict(machine, row.rate, row.excess, row.cv, count=2)
+        predict(machine, row.weakening_rate, row.excess, row.cv, count=2)
     inertia(machine, events, rows)
     for folder in folders:
         with paper_style():

@@ -130,12 +130,12 @@ def figure_3(d: Data):
     mean_stress = study["mean_stress"].values
     onset = float(study.time[mean_stress.argmax()])
     time = study["time"].values / onset
-    rate = _shifted(study, "slip_rate")[:-1, :-1] * setting.G_STAR
-    rate = np.maximum(rate / (MEAN * solid.shear_wave_speed), 1e-12)
-    top = float(rate.max()) / 2.0  # colours over five decades below the fastest
+    slip_rate = _shifted(study, "slip_rate")[:-1, :-1] * setting.G_STAR
+    slip_rate = np.maximum(slip_rate / (MEAN * solid.shear_wave_speed), 1e-12)
+    top = float(slip_rate.max()) / 2.0  # colours over five decades below the fastest
     late = (time[-1] - 1.0) * 1e4
     style = {"cmap": "inferno_r", "rasterized": True}
-    picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, rate, norm=LogNorm(1e-5 * top, 3.0 * top),
+    picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, slip_rate, norm=LogNorm(1e-5 * top, 3.0 * top),
                               **style)  # fmt: skip
     zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
     for speed, text in (
@@ -151,7 +151,7 @@ def figure_3(d: Data):
     figure.colorbar(picture, ax=zoom, label=label)
     stress = mean_stress / mean_stress.max()
     load.plot(stress, time, color="C0")
-    wide.pcolormesh(X, time, rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
+    wide.pcolormesh(X, time, slip_rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
     load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03), ylabel="$t/T$",
              xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
     wide.set(xlim=(0, 1), xlabel="$x/L$")

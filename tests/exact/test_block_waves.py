@@ -73,7 +73,7 @@ def test_blocks_of_twice_the_thickness_move_alike_if_their_drive_is_doubled(driv
 def test_the_statics_of_the_mesh_are_those_of_the_block(mode, drive):
     errors = []
     for nodes in (48, 96):
-        problem = crooked(nodes=nodes, mode=mode, drive=drive, rate=SLOW)
+        problem = crooked(nodes=nodes, mode=mode, drive=drive, weakening_rate=SLOW)
         blocks = problem.blocks
         static, profile, own = condensed(make_mesh(problem), nodes)
         slip = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes) ** 3
@@ -89,7 +89,7 @@ def test_the_statics_of_the_mesh_are_those_of_the_block(mode, drive):
 
 def test_shear_waves_of_mode_iii_swing_at_the_frequency_of_their_mode():
     """Beside a stuck interface and a free top: cos kx sin ly, l = pi/(2H)."""
-    problem = crooked(nodes=96, mode="III", rate=SLOW, drive=FREE)
+    problem = crooked(nodes=96, mode="III", weakening_rate=SLOW, drive=FREE)
     mesh = lossless(problem)
     x, height = problem.interface.x, 0.031
     k, across = 2.0 * np.pi / 0.083, 0.5 * np.pi / height
@@ -121,8 +121,8 @@ def test_pulses_cross_the_block_at_the_speeds_of_the_solid(along):
         return 1e-7 * np.exp(-(((y - 0.035) / width) ** 2))
 
     (waves.v if along else waves.u)[:] = pulse(y)[:, None]
-    rate = waves.v_rate if along else waves.u_rate
-    rate[:] = ((pulse(y) - pulse(y - speed * mesh.step)) / -mesh.step)[:, None]
+    velocity = waves.v_rate if along else waves.u_rate
+    velocity[:] = ((pulse(y) - pulse(y - speed * mesh.step)) / -mesh.step)[:, None]
     row = int(np.argmin(np.abs(y - 0.035 - path)))
     step, values = stepping(problem, mesh, waves), []
     for _ in range(int(1.15 * path / speed / mesh.step)):
@@ -169,7 +169,8 @@ def test_waves_along_the_interface_run_at_rayleighs_speed():
 )
 def test_energy_is_kept(drive, mode, attenuation):
     """What the stress before the event gives is stored, moves, or is lost to friction and so on."""
-    problem = crooked(nodes=48, drive=drive, mode=mode, rate=0.19e12 if mode == "II" else SLOW)
+    W = 0.19e12 if mode == "II" else SLOW
+    problem = crooked(nodes=48, drive=drive, mode=mode, weakening_rate=W)
     sample = of(problem, rough(problem, 2)[0])
     path = path_of(make_program(problem), sample)
     state = path.events[0].before if path.events else path.last
@@ -182,14 +183,14 @@ def test_energy_is_kept(drive, mode, attenuation):
         mesh.stiffness if np.isfinite(mesh.stiffness) else 0.0,
     )
 
-    def rates():
+    def velocities():
         return np.hstack([waves.u_rate, waves.v_rate]).astype(float)
 
-    lost, worst, largest, before = 0.0, 0.0, 0.0, rates()
+    lost, worst, largest, before = 0.0, 0.0, 0.0, velocities()
     for step in range(600):
         more = event.take_steps(1)
-        lost += attenuation * (mass * (0.5 * (before + rates())) ** 2).sum() * mesh.step
-        before = rates()
+        lost += attenuation * (mass * (0.5 * (before + velocities())) ** 2).sum() * mesh.step
+        before = velocities()
         if more and step % 20:
             continue
         # Where the rates are known.
@@ -267,7 +268,7 @@ def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
 
 def test_an_event_that_has_come_to_rest_moves_no_further():
     """Nor does it rest after waves have crossed the block once, if slip goes on."""
-    problem = crooked(nodes=64, drive=LOW, load=st.Load(), rate=0.09e12)
+    problem = crooked(nodes=64, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
     x = problem.interface.x
     strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
     program, sample = RuptureProgram(problem, st.Rupture()), of(problem, strength)
@@ -286,7 +287,7 @@ def test_half_the_spacing_changes_an_event_by_two_per_cent():
     """Slip and length of the largest event of a smooth strength; without inertia it is 2.2 %."""
     found = []
     for nodes in (128, 256):
-        problem = crooked(nodes=nodes, drive=LOW, load=st.Load(), rate=0.09e12)
+        problem = crooked(nodes=nodes, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
         x = problem.interface.x
         strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
         program = RuptureProgram(problem, st.Rupture())

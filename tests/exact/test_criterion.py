@@ -106,7 +106,7 @@ def test_load_that_varies_along_the_interface():
     )
     problem = make_problem(128, load=load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
-    one, two = windows_of(problem, problem.uniform_rate)[0].spectrum[[3, 2]]
+    one, two = windows_of(problem, problem.uniform_weakening_rate)[0].spectrum[[3, 2]]
 
     def tau_n(at):
         strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))
@@ -141,10 +141,10 @@ def test_weakening_rate_of_each_sample(make_strength):
     """Samples of different W in one call are the same as one by one; columns are broadcast."""
     problem = make_problem(weakening_rate=None)
     tau_p = make_strength(0.5).sample(problem.interface, samples=5, seed=1)
-    rates = np.array([[0.5], [0.4], [0.5], [0.3], [0.45]]) * 1e12
-    together = local_onset(problem, {"strength": tau_p, "weakening_rate": rates})
+    weakening_rates = np.array([[0.5], [0.4], [0.5], [0.3], [0.45]]) * 1e12
+    together = local_onset(problem, {"strength": tau_p, "weakening_rate": weakening_rates})
     for i in range(5):
-        alone = first_onset(make_problem(weakening_rate=float(rates[i, 0])), tau_p[i])
+        alone = first_onset(make_problem(weakening_rate=float(weakening_rates[i, 0])), tau_p[i])
         for name in ("critical_load", "critical_position"):
             assert together[name][i].item() == alone[name]
     assert len(np.unique(together.critical_load)) == 5

@@ -50,9 +50,9 @@ def test_stress_inside_a_growing_crack_is_minus_the_drop(mode, speed, short):
     past, past_weight = 0.5 * (x + 1.0), 0.5 * w
     scaled = np.multiply.outer(k, past)
     kernel = kernel_sum(mode, ETA)(scaled) if short else memory_kernel(scaled, mode, ETA)
-    rate = speed**2 * (1.0 - past) * j0(np.multiply.outer(k, speed * (1.0 - past)))
+    slip_rate = speed**2 * (1.0 - past) * j0(np.multiply.outer(k, speed * (1.0 - past)))
     slip = np.pi * amplitude * speed * j1(k * speed) / k
-    memory = np.pi * amplitude * (kernel * rate) @ past_weight
+    memory = np.pi * amplitude * (kernel * slip_rate) @ past_weight
     stress = 0.5 * k * (memory - static_stiffness(mode, ETA) * slip)
     stress -= 0.5 * np.pi * amplitude * speed**2 * j0(k * speed)
     inside = np.sum(k_weight * stress * np.exp(-0.5 * (k * width) ** 2)) / np.pi

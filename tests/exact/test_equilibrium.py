@@ -33,17 +33,17 @@ def test_uniform_strength_holds_until_every_node_is_at_it(problem):
 def test_conditions_of_optimality(problem, make_strength):
     tau_p = make_strength(0.25).sample(problem.interface, samples=20, seed=3)
     onset = exact_onset(problem, tau_p, sensitivity=True, slip=True)
-    rate, symbol = problem.friction.weakening_rate, symbol_of(problem)
+    weakening_rate, symbol = problem.friction.weakening_rate, symbol_of(problem)
     for sample in range(20):
         one = onset.isel(sample=sample)
         load, slip, y = one.first_instability.item(), one.slip.values, one.sensitivity.values
-        balance = tau_p[sample] - load + times(symbol, slip) - rate * slip
+        balance = tau_p[sample] - load + times(symbol, slip) - weakening_rate * slip
         assert slip.min() >= 0.0
         assert y.min() >= 0.0
         # 1e-11 of the strength: round-off of K d, K d being ten times the strength.
         assert balance.min() > -1e-11 * load
         assert np.abs(balance[slip > 0.0]).max() < 1e-11 * load
-        assert (times(symbol, y) - rate * y).max() < 1e-11 * rate * y.max()
+        assert (times(symbol, y) - weakening_rate * y).max() < 1e-11 * weakening_rate * y.max()
         assert y.sum() == pytest.approx(1.0, rel=1e-13)
         assert y @ tau_p[sample] == pytest.approx(load, rel=1e-11)
         assert one.certificate_gap.item() < 1e-9 * load
@@ -62,11 +62,11 @@ def test_first_bound_is_a_bound(problem, make_strength):
     program, symbol = DenseProgram(problem), symbol_of(problem)
     tau_p = make_strength(0.5).sample(problem.interface, samples=18, seed=6)
     for number, excess in enumerate(tau_p):
-        rate = 0.4e12 * (1.0 + 0.6 * np.sin((number % 9 + 1) * turns(256)))
-        sample = make_sample(excess, np.zeros(256), np.ones(256), rate, LINEAR)
+        W = 0.4e12 * (1.0 + 0.6 * np.sin((number % 9 + 1) * turns(256)))
+        sample = make_sample(excess, np.zeros(256), np.ones(256), W, LINEAR)
         _, y = program.bound(sample)
         # The eigenvalue of the window may equal the rate: round-off of its eigenvector.
-        assert (times(symbol, y) - rate * y).max() < 1e-12 * rate.max() * y.max()
+        assert (times(symbol, y) - W * y).max() < 1e-12 * W.max() * y.max()
         assert np.count_nonzero(y) < 128
 
 
@@ -114,16 +114,16 @@ def test_a_length_that_nothing_stops_has_the_least_drop_and_the_largest_energy()
     """Of a law with more than the half under it: 0.9 at 0.6 of d_c, an area of 0.75."""
     law = st.PiecewiseWeakening(slip=[0.6, 1.0], strength=[0.9, 0.0], weakening_rate=1e10)
     rng = np.random.default_rng(0)
-    peak, residual, profile, rate = rng.uniform(1.0, 2.0, (4, 9)) * [
+    peak, residual, profile, weakening_rate = rng.uniform(1.0, 2.0, (4, 9)) * [
         [2e6],
         [1e5],
         [1.0],
         [1e10],
     ]
-    sample = make_sample(peak, residual, profile, rate, pieces_of(law))
+    sample = make_sample(peak, residual, profile, weakening_rate, pieces_of(law))
     runs = Runs(COLUMN, COLUMN, 9, 2e-3, 1.5e9)
     # Half-length a: pi a D^2/(2 G*) is the energy; d_c is 0.1/0.6 of (tau_p - tau_r)/W.
-    energy = (0.75 * (peak - residual) ** 2 / (6.0 * rate)).max()
+    energy = (0.75 * (peak - residual) ** 2 / (6.0 * weakening_rate)).max()
     half = 2.0 * 1.5e9 * energy / (np.pi * (3e6 * profile - residual).min() ** 2)
     assert unstoppable_length(sample, 3e6, runs) == pytest.approx(half / 1e-3, rel=1e-12)
 

@@ -64,14 +64,14 @@ def test_a_circular_crack_is_eshelbys():
     assert found["event_magnitude"] == pytest.approx(magnitude)
 
 
-def fault(rate=2e9, **options):
+def fault(loading_rate=2e9, **options):
     problem = dataclasses.replace(
         make_problem(128, 0.05, mode="III", residual_strength=2e5),
         interface=st.Interface(0.05, 128, extent=(0.01, 0.03)),
     )
     x = problem.interface.x
     strength = 1e6 - 2e5 * np.exp(-(((x - 0.017) / 0.003) ** 2)) - 5e4 * np.cos(600.0 * x)
-    return problem, strength, st.Rupture(loading_rate=rate, **options)
+    return problem, strength, st.Rupture(loading_rate=loading_rate, **options)
 
 
 @pytest.fixture(scope="module")
@@ -154,10 +154,12 @@ def test_pictures_name_their_parts_and_leave_room(run):
     assert texts[:2] == ["a", "b"]
     assert texts[2].startswith("cracks, area stress drop ")
     later = np.append(run.time, run.time[-1] + 1.0)  # slip that follows the load
-    rate = np.append(run.moment_rate, 0.02 * run.moment_rate.max())
+    moment_rate = np.append(run.moment_rate, 0.02 * run.moment_rate.max())
     longer = run.drop_dims("time").assign_coords(time=later)
-    left = st.plot.moment_rate(longer.assign(moment_rate=("time", rate, {"units": "N/s"})))[0]
-    assert left.lines[0].get_xdata().size < rate.size
+    left = st.plot.moment_rate(
+        longer.assign(moment_rate=("time", moment_rate, {"units": "N/s"}))
+    )[0]
+    assert left.lines[0].get_xdata().size < moment_rate.size
     for span in ((1.86e6, 1.88e6), (2.0, 60.0), (3.0, 9.0)):
         with paper_style():
             axes = new_figure(2.6, 2.0).subplots()

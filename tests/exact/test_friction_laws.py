@@ -67,7 +67,9 @@ def test_each_scale_means_the_same_law():
     energy = DROP * critical * LAWS["dual"].integral
     for scale in ({"fracture_energy": energy}, {"critical_slip": critical}):
         law = st.PiecewiseWeakening(**TWO_PIECES, **scale)
-        assert law.rate(np.array([DROP]), *law.scale)[0] == pytest.approx(RATE, rel=1e-14)
+        assert law.weakening_rate_of(np.array([DROP]), *law.scale)[0] == pytest.approx(
+            RATE, rel=1e-14
+        )
 
 
 def test_polygon_along_a_law():
@@ -98,7 +100,9 @@ def test_a_polygon_has_the_scale_of_its_law(scale):
     polygon = st.PiecewiseWeakening.from_law(st.ExponentialWeakening(**{scale: value}), 8)
     # Of the chord to the first corner, at seven eighths of the drop.
     chord = DROP / 8.0 / (critical * law.slip_at(0.875))
-    assert polygon.rate(np.array([DROP]), *polygon.scale)[0] == pytest.approx(chord, rel=1e-12)
+    assert polygon.weakening_rate_of(np.array([DROP]), *polygon.scale)[0] == pytest.approx(
+        chord, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("scale", [{"weakening_rate": 0.5e12}, {"fracture_energy": 12.0}])

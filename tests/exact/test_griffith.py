@@ -33,8 +33,10 @@ def test_lengths_of_start_and_arrest():
     )
     assert start[0] == np.inf
     assert start[1] < stop[1] < LENGTH
-    rate = energy_release_rate(problem, 0.35e6, [start[1], stop[1]], **options).min(axis=1)
-    np.testing.assert_allclose(rate, 0.3, rtol=1e-8)
+    release_rate = energy_release_rate(problem, 0.35e6, [start[1], stop[1]], **options).min(
+        axis=1
+    )
+    np.testing.assert_allclose(release_rate, 0.3, rtol=1e-8)
     assert griffith_length(PROBLEM, 0.9e6, 0.3, arrest=True, **options) == np.inf
 
 

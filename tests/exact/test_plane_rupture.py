@@ -20,8 +20,8 @@ from stiction.methods.dynamics.simulate import simulate_rupture
 LENGTH, NODES = 0.024, 64
 
 
-@pytest.mark.parametrize(("mode", "rate"), [("II", 1e7), ("III", 1e9)])
-def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
+@pytest.mark.parametrize(("mode", "loading_rate"), [("II", 1e7), ("III", 1e9)])
+def test_fields_along_one_axis_are_those_of_the_line(mode, loading_rate):
     along, turn = (0, 1) if mode == "II" else (1, -1)
     still = 1 - along
     shape, lengths = (NODES, 8)[::turn], (LENGTH, LENGTH / 8)[::turn]
@@ -30,7 +30,7 @@ def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
     x = line.interface.x
     tau_p = 1e6 - 2e5 * np.exp(-(((x - 0.008) / 0.0025) ** 2)) + 3e4 * np.cos(2900.0 * x)
     on_plane = np.array(np.broadcast_to(np.expand_dims(tau_p, still), shape))
-    method = st.Rupture(loading_rate=rate)
+    method = st.Rupture(loading_rate=loading_rate)
     step = min(method.medium(problem).step for problem in (line, plane))
     one, two = (
         simulate_rupture(
@@ -39,13 +39,13 @@ def test_fields_along_one_axis_are_those_of_the_line(mode, rate):
         for problem, profile in ((line, tau_p), (plane, on_plane))
     )
     assert int(one.explicit_steps) > 100
-    assert (int(one.implicit_steps) > 50) == (rate < 1e8)
+    assert (int(one.implicit_steps) > 50) == (loading_rate < 1e8)
     assert one.sizes["time"] == two.sizes["time"]
     for name in ("slip", "slip_rate", "shear_stress"):
         exact, found = one[name].values, two[name].values
         across = found.take(3, 1 + still)
         # Round-off; rounded otherwise, implicit steps stop at slightly different residuals.
-        close = 1e-11 if rate > 1e8 else 1e-8
+        close = 1e-11 if loading_rate > 1e8 else 1e-8
         assert np.abs(across - exact).max() <= close * np.abs(exact).max()
         assert found.std(axis=1 + still).max() <= 1e-10 * np.abs(exact).max()
     for name in ("critical_position", "median_rupture_speed"):

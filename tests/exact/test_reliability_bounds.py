@@ -51,10 +51,10 @@ def test_bounds_follow_load_and_initial_stress():
     assert float(onset["critical_stress"].min()) > below.lower_bound
 
 
-def rigid(marginal, rate):
+def rigid(marginal, weakening_rate):
     """A strip whose drive is held: slip lowers the mean stress before anything is unstable."""
     block = st.Blocks(height=0.03, thickness=6e-3, drive=st.Platen(stiffness=math.inf))
-    problem = make_problem(40, mode="III", weakening_rate=rate * 1e9 / 0.06)
+    problem = make_problem(40, mode="III", weakening_rate=weakening_rate * 1e9 / 0.06)
     problem = dataclasses.replace(problem, specimen=block)
     return problem, st.RandomField(marginal, st.SquaredExponentialSpectrum(0.02), True)
 

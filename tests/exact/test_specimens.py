@@ -74,7 +74,7 @@ def assert_gradient(problem, strength):
     [*zip(DRIVES, itertools.cycle(("II", "III")), strict=False), ("platen", "III")],
 )
 def test_path_against_brute_force_and_its_gradient(name, mode):
-    problem = crooked(nodes=56, rate=0.12e12, drive=DRIVES[name], mode=mode)
+    problem = crooked(nodes=56, weakening_rate=0.12e12, drive=DRIVES[name], mode=mode)
     follow(problem, rough(problem, 3))
     assert_gradient(problem, rough(problem, 7, 2))
 
@@ -90,7 +90,11 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     """No patch is unstable; the largest stress is that under dead load."""
     soft, stiff = (
         crooked(
-            height=0.004, rate=0.02e12, drive=st.Platen(stiffness=k), mode="III", load=st.Load()
+            height=0.004,
+            weakening_rate=0.02e12,
+            drive=st.Platen(stiffness=k),
+            mode="III",
+            load=st.Load(),
         )
         for k in (0.0, INF)
     )
@@ -106,8 +110,8 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
 
 
 LAWS = {
-    "linear": {"nodes": 64, "residual": 0.2e6, "rate": 0.12e12},
-    "out of plane": {"nodes": 64, "residual": 0.2e6, "rate": 0.12e12, "mode": "III"},
+    "linear": {"nodes": 64, "residual": 0.2e6, "weakening_rate": 0.12e12},
+    "out of plane": {"nodes": 64, "residual": 0.2e6, "weakening_rate": 0.12e12, "mode": "III"},
     "two pieces": {
         "nodes": 48,
         "friction": st.PiecewiseWeakening(
@@ -150,8 +154,8 @@ UNLOADING = np.array([[1.0, 0.35, 0.0], [0.35, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 def slip_state(law, slip, relief=0.0, max_slipping=3):
     """Three nodes, the last of which never slips; each weakens at a rate of 0.425 at first."""
-    strength, profile, rate = np.array([1.0, 1.1, 9.0]), np.ones(3), np.full(3, 0.425)
-    sample = make_sample(strength, np.zeros(3), profile, rate, pieces_of(law))
+    strength, profile, weakening_rate = np.array([1.0, 1.1, 9.0]), np.ones(3), np.full(3, 0.425)
+    sample = make_sample(strength, np.zeros(3), profile, weakening_rate, pieces_of(law))
     workspace = make_workspace(DenseEntries(UNLOADING.flatten(), 3, relief), 3, max_slipping)
     return SlipState(sample, slip, UNLOADING @ slip, workspace, True)
 
@@ -198,8 +202,8 @@ def test_windows_bound_the_onset_and_become_it():
 @pytest.mark.parametrize(("wavy", "close"), [(0.0, 0.01), (0.4, 0.07)])
 def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
     """Rates that vary have the windows of the lowest one, which are less close."""
-    rate = 0.19e12 * (1.0 + wavy * np.sin(7.0 * np.linspace(0.0, 1.0, 96)))
-    problem = crooked(rate=rate, residual=0.0)
+    weakening_rate = 0.19e12 * (1.0 + wavy * np.sin(7.0 * np.linspace(0.0, 1.0, 96)))
+    problem = crooked(weakening_rate=weakening_rate, residual=0.0)
     strength = rough(problem, 11, 8)
     exact = first(problem, strength)
     program, rows = DenseProgram(problem), problem.sample(strength)
@@ -210,7 +214,7 @@ def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
         assert multiplier.min() >= 0.0
         assert multiplier @ sample.profile == pytest.approx(1.0)
         assert multiplier @ sample.excess == pytest.approx(bound)
-        pushed = problem.blocks.stiffness @ multiplier - sample.rate * multiplier
+        pushed = problem.blocks.stiffness @ multiplier - sample.weakening_rate * multiplier
         assert pushed.max() < 1e-12 * np.abs(pushed).max()
         above.append(bound / (stress - problem.load.initial_stress.mean()) - 1.0)
     assert min(above) > -1e-12
@@ -249,7 +253,10 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     """A pusher near the interface: of three samples, those closer than a fiftieth of the fall."""
     monkeypatch.setattr(DenseProgram, "widest_gap", -1.0)
     problem = crooked(
-        nodes=128, residual=0.61e6, rate=0.25e12, drive=st.Pusher(height=0.004, width=0.003)
+        nodes=128,
+        residual=0.61e6,
+        weakening_rate=0.25e12,
+        drive=st.Pusher(height=0.004, width=0.003),
     )
     strength, found = rough(problem, 3, 4), []
     texts = warning_texts(lambda: found.append(exact_onset(problem, strength)))
@@ -268,7 +275,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
 
 def test_nucleation_length_at_a_free_end_and_in_the_middle():
     """In units of G*/W; 1.158 in the middle, half of it at an end in mode III."""
-    problem = crooked(nodes=256, height=0.4, mode="III", rate=0.06e12)
+    problem = crooked(nodes=256, height=0.4, mode="III", weakening_rate=0.06e12)
     places = problem.blocks.windows(0.12e12, 0.12e12)
     unit = problem.effective_modulus / 0.12e12 / problem.interface.spacing
     lengths = places.widths / unit

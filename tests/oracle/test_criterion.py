@@ -149,9 +149,9 @@ def test_a_line_slides_above_its_exact_onset_only(ratio):
     problem = make_problem(256, 0.03, load=load, friction=st.LinearWeakening())
     field = lognormal(0.5 * LENGTH, 0.3)
     tau_p = np.maximum(field.sample(problem.interface, samples=12, seed=4), 3e5)
-    rate = RATE * (1.0 + 0.3 * np.sin(3.0 * x))
+    weakening_rate = RATE * (1.0 + 0.3 * np.sin(3.0 * x))
     given = {
-        "strength": tau_p, "residual_strength": ratio * tau_p, "weakening_rate": rate
+        "strength": tau_p, "residual_strength": ratio * tau_p, "weakening_rate": weakening_rate
     }  # fmt: skip
     exact = exact_onset(problem, given)
     assert (exact.arrested_events > 0).any()
@@ -177,8 +177,10 @@ def test_a_line_slides_above_its_exact_onset_only(ratio):
 )
 def test_behind_a_machine_the_local_criterion_returns_a_stress_and_not_the_drive(drive, mode):
     """Its drive is an upper bound; the slip of the patch takes most of what the exact slip does."""
-    rate = 0.16e12 if mode == "II" else 0.3e12  # below it nodes reach their residual strength
-    problem = crooked(drive=drive, mode=mode, rate=rate, residual=0.0)
+    weakening_rate = (
+        0.16e12 if mode == "II" else 0.3e12
+    )  # below it nodes reach their residual strength
+    problem = crooked(drive=drive, mode=mode, weakening_rate=weakening_rate, residual=0.0)
     tau_p = rough(problem, 5, 12)
     local, exact = local_onset(problem, tau_p), exact_onset(problem, tau_p, slip=True)
     relief = problem.blocks.mean_relief(exact.slip.values)

@@ -85,7 +85,8 @@ def test_nucleation_stress_is_the_least_weighted_mean_over_a_patch():
 
 def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
     """The smallest of each shape on whose nodes K has an eigenvalue up to W, by whole matrices."""
-    shape, spacings, rate = PLANE.interface.shape, PLANE.interface.spacings, PLANE.uniform_rate
+    shape, spacings = PLANE.interface.shape, PLANE.interface.spacings
+    W = PLANE.uniform_weakening_rate
     matrix = dense(symbol_of(PLANE), shape)
     x, y = (np.fft.fftfreq(n, 1.0 / (n * h)) for n, h in zip(shape, spacings, strict=True))
     least = np.inf
@@ -95,7 +96,7 @@ def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
         for bound in 1.000001 * np.sort(square):
             inside = square <= bound
             values, vectors = np.linalg.eigh(matrix[np.ix_(inside, inside)])
-            if values[0] <= rate:
+            if values[0] <= W:
                 break
         weight = np.zeros(square.size)
         weight[inside] = np.abs(vectors[:, 0]) / np.abs(vectors[:, 0]).sum()

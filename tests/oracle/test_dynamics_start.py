@@ -46,14 +46,14 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ("ratio", "rate", "samples"),
+    ("ratio", "loading_rate", "samples"),
     [
         *((0.25, 2e8, 3), (0.5, 2e7, 3), (2.0, 2e5, 3)),
         *(pytest.param(r, v, 20, marks=SLOW) for r in (0.25, 1.0) for v in (2e5, 2e7, 2e8)),
     ],
 )
-def test_same_onset_as_from_rest(ratio, rate, samples):
-    near, rest = both(profiles(ratio, samples), loading_rate=rate)
+def test_same_onset_as_from_rest(ratio, loading_rate, samples):
+    near, rest = both(profiles(ratio, samples), loading_rate=loading_rate)
     assert_agree(near, rest)
     begun = near["start_error"] > 0.0
     assert begun.any()
@@ -135,10 +135,12 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     program, rows = static_program(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
     state = slow_start(program, run, rows, 0, 1e7)
     static, impedance = sample_of(rows, program.pieces, 0), run.medium.impedance
-    load = state.now["load"] - impedance * state.rate.mean() / 1.2  # <p>
+    load = state.now["load"] - impedance * state.slip_rate.mean() / 1.2  # <p>
     step = 0.01 * (program.solve(static).load - load)
     slips = [program.solve(static, load + side * step).slip for side in (-1.0, 1.0)]
-    rate = 1e7 * (slips[1] - slips[0]) / (2.0 * step)
+    slip_rate = 1e7 * (slips[1] - slips[0]) / (2.0 * step)
     # Extrapolated as at a fold, by 1/16; on this grid the path is straight there.
-    assert np.all((state.rate >= 0.999 * rate) & (state.rate <= 1.07 * rate))
+    assert np.all(
+        (state.slip_rate >= 0.999 * slip_rate) & (state.slip_rate <= 1.07 * slip_rate)
+    )
     assert abs(radiated_energy(run, state)) < 1e-12 * state.now["work"]

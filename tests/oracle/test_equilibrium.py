@@ -14,11 +14,15 @@ from stiction.methods.equilibrium.sample import PathStatus, Search, at_rest, sam
 from stiction.methods.equilibrium.solver import follow_to_sliding
 
 
-def assert_first(problem, tau_p, rate=None):
+def assert_first(problem, tau_p, weakening_rate=None):
     """The first instability is that of the linear programme; returns all results."""
     onset = exact_onset(problem, tau_p)
-    rates = [rate] * len(tau_p) if rate is None else rate
-    theirs = [largest_load(problem, *given)[0] for given in zip(tau_p, rates, strict=True)]
+    weakening_rates = (
+        [weakening_rate] * len(tau_p) if weakening_rate is None else weakening_rate
+    )
+    theirs = [
+        largest_load(problem, *given)[0] for given in zip(tau_p, weakening_rates, strict=True)
+    ]
     found = onset.critical_load if np.ndim(problem.load.profile) else onset.first_instability
     np.testing.assert_allclose(found, theirs, rtol=1e-11)
     return onset
@@ -39,8 +43,8 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
 def test_linear_programme_with_everything_varying(make_strength):
     angle = turns(256)
     load = st.Load(profile=1.0 + 0.3 * np.cos(angle), initial_stress=1e5 * np.sin(2 * angle))
-    rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
-    problem = make_problem(load=load, mode="III", weakening_rate=rate)
+    weakening_rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
+    problem = make_problem(load=load, mode="III", weakening_rate=weakening_rate)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
     ours = assert_first(problem, tau_p)
     assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
@@ -57,8 +61,8 @@ def test_uniform_critical_slip(make_strength):
 
 def test_interface_shorter_than_a_critical_patch(make_strength):
     # h_n is twice the period: no window is unstable by itself, yet the whole interface is.
-    rate = 2.0 * 0.57888694185 * SOLID.effective_modulus() / 0.2
-    problem = make_problem(128, weakening_rate=rate)
+    weakening_rate = 2.0 * 0.57888694185 * SOLID.effective_modulus() / 0.2
+    problem = make_problem(128, weakening_rate=weakening_rate)
     tau_p = make_strength(2.0).sample(problem.interface, samples=4, seed=10)
     onset = assert_first(problem, tau_p)
     assert np.all(onset.first_instability.values <= tau_p.mean(axis=1) * (1 + 1e-12))
@@ -66,8 +70,8 @@ def test_interface_shorter_than_a_critical_patch(make_strength):
 
 def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch):
     """Lines on which very many nodes slip are solved as planes are."""
-    rate = 0.5e12 * (1.0 + 0.4 * np.sin(5 * turns(1024)))
-    problem = make_problem(1024, weakening_rate=rate)
+    weakening_rate = 0.5e12 * (1.0 + 0.4 * np.sin(5 * turns(1024)))
+    problem = make_problem(1024, weakening_rate=weakening_rate)
     program = DenseProgram(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=3, seed=12))
     samples = [sample_of(rows, program.pieces, row) for row in range(3)]

@@ -23,10 +23,10 @@ FIELD = beta_strength(8e-3)
 def least_slip(stiffness, sample, load, inside):
     """The least equilibrium, from below: K d is solved for with the strengths of the moment."""
     K = stiffness[np.ix_(inside, inside)]
-    peak, residual, rate, initial = (rows[0][inside] for rows in sample[:4])
+    peak, residual, weakening_rate, initial = (rows[0][inside] for rows in sample[:4])
     drive, slip = load * sample.load_profile[inside] + initial, np.zeros(len(K))
     for _ in range(20_000):
-        strength = np.maximum(peak - rate * slip, residual)
+        strength = np.maximum(peak - weakening_rate * slip, residual)
         moves, before = (slip > 0.0) | (drive - K @ slip > strength), slip.copy()
         if moves.any():
             grown = np.linalg.solve(K[np.ix_(moves, moves)], (drive - strength)[moves])
@@ -116,8 +116,10 @@ def test_the_event_that_breaks_a_fault_is_not_arrested_and_slip_that_restarts_is
     strength = strength.sample(fault.interface, samples=8, seed=1)
     exact = exact_onset(fault, strength)
     # The load rises by 2e-5 and 2e-3 of the stress scale while waves cross the fault.
-    for rate, close in ((1e6, 3e-5), (1e8, 3e-3)):
-        found = st.onset(fault, strength, method=st.Rupture(loading_rate=rate), progress=False)
+    for loading_rate, close in ((1e6, 3e-5), (1e8, 3e-3)):
+        found = st.onset(
+            fault, strength, method=st.Rupture(loading_rate=loading_rate), progress=False
+        )
         np.testing.assert_array_equal(found.arrested_events, 0)  # inertia carries one through
         np.testing.assert_allclose(found.critical_load, exact.critical_load, rtol=close)
 

@@ -17,8 +17,8 @@ SLOW = pytest.mark.slow
 
 def problem(nodes=128, share=0.1, residual_ratio=None, **load):
     """An interface of 0.1 m with a nucleation length of a share of it."""
-    rate = 2.0 * 0.5788869418506 * QUARTER.effective_modulus() / (share * 0.1)
-    friction = st.LinearWeakening(weakening_rate=rate, residual_ratio=residual_ratio)
+    weakening_rate = 2.0 * 0.5788869418506 * QUARTER.effective_modulus() / (share * 0.1)
+    friction = st.LinearWeakening(weakening_rate=weakening_rate, residual_ratio=residual_ratio)
     return st.Problem(QUARTER, st.Interface(0.1, nodes), friction, st.Load(**load))
 
 
@@ -47,7 +47,7 @@ CASES = {
     "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
     "lap joint in which nodes stop": (
         crooked(
-            nodes=24, height=0.009, rate=0.04e12, residual=0.2e6,
+            nodes=24, height=0.009, weakening_rate=0.04e12, residual=0.2e6,
             drive=st.Pusher(height=0.004, width=0.003, side="both", stiffness=np.inf),
         ), beta, EXACT, *LARGE, 30,
     ),

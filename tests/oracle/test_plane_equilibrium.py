@@ -46,10 +46,10 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     if seed == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
     profile = 1.0 + 0.4 * smooth_noise(6.0, rng, shape)
-    rate = RATE * (0.8 + 0.4 * smooth_noise(6.0, rng, shape))
-    given = (field.ravel() for field in (rate, strength, profile))
+    weakening_rate = RATE * (0.8 + 0.4 * smooth_noise(6.0, rng, shape))
+    given = (field.ravel() for field in (weakening_rate, strength, profile))
     exact, _, multiplier = by_linear_programme(dense(plane.symbol(shape), shape), *given)
-    found = plane_onset(plane, strength, profile, rate, gap=1e-9)
+    found = plane_onset(plane, strength, profile, weakening_rate, gap=1e-9)
     assert found.closed
     assert found.lower <= exact * (1.0 + 1e-12)  # round-off of either programme
     assert found.upper >= exact * (1.0 - 1e-12)
@@ -62,13 +62,13 @@ def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
     """What is lifted to A y <= 0 bounds the linear programme from above; A z < 0 throughout."""
     rng, shape = np.random.default_rng(8), (14, 12)
     symbol = Lattice((3.0 * LENGTH, 2.3 * LENGTH), moduli(1e9, 0.33)).symbol(shape)
-    rate = np.maximum(RATE * (noise(3.0, rng, shape) - 0.3), 0.0)
+    weakening_rate = np.maximum(RATE * (noise(3.0, rng, shape) - 0.3), 0.0)
     strength, profile = 0.7e6 + 1e6 * noise(2.0, rng, shape), 1.3 + 0.4 * noise(3.0, rng, shape)
-    assert 20 < np.sum(rate == 0.0) < 120
-    matrix = dense(symbol, shape) - np.diag(rate.ravel())
-    given = (field.ravel() for field in (rate, strength, profile))
+    assert 20 < np.sum(weakening_rate == 0.0) < 120
+    matrix = dense(symbol, shape) - np.diag(weakening_rate.ravel())
+    given = (field.ravel() for field in (weakening_rate, strength, profile))
     exact, _, multiplier = by_linear_programme(dense(symbol, shape), *given)
-    bracket = Bracket(symbol, rate, strength, profile)
+    bracket = Bracket(symbol, weakening_rate, strength, profile)
     lifting, lifted = bracket.lifting
     assert lifting.min() > 0.0
     assert lifted.min() > 1e-3 * RATE
@@ -143,11 +143,16 @@ def test_arrest_equals_relaxation_node_by_node(wide):
 def first_loss_of_stability(problem, strength, load, slip):
     """Follow slip node by node from a state; the load at which K - W is no longer definite."""
     stiff = dense(symbol_of(problem), problem.interface.shape)
-    rate, residual = problem.friction.weakening_rate, problem.friction.residual_strength
-    critical = (strength - residual) / rate
+    weakening_rate, residual = (
+        problem.friction.weakening_rate,
+        problem.friction.residual_strength,
+    )
+    critical = (strength - residual) / weakening_rate
     fallen, inside = slip >= critical * (1.0 - 1e-9), slip > 0.0
     while True:
-        matrix = (stiff - np.diag(np.where(fallen, 0.0, rate)))[np.ix_(inside, inside)]
+        matrix = (stiff - np.diag(np.where(fallen, 0.0, weakening_rate)))[
+            np.ix_(inside, inside)
+        ]
         if np.linalg.eigvalsh(matrix)[0] < 0.0:
             return load
         carried = np.where(fallen, residual, strength)
@@ -230,10 +235,12 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
     stiffness, slopes = dense(symbol_of(problem), (24, 20)), sample.pieces.slopes
     first = (sample.excess / sample.profile).min()
 
-    def least(rate):
+    def least(weakening_rate):
         """The lowest eigenvalue of A on the nodes that slip, over K of one node."""
         at = np.flatnonzero(slip > 0.0)
-        matrix = stiffness[np.ix_(at, at)] - np.diag((rate * sample.rate)[at])
+        matrix = stiffness[np.ix_(at, at)] - np.diag(
+            (weakening_rate * sample.weakening_rate)[at]
+        )
         return eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0] / stiffness[0, 0]
 
     slip, taken, refused, spared = np.zeros(480), 0, 0, 0

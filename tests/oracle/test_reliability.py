@@ -117,7 +117,9 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
 def test_failure_probability_of_a_lap_joint_is_that_of_counting(event):
     """Behind a rigid machine, where nodes stop: fields of its own, some by brute force."""
     drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=math.inf)
-    problem = crooked(nodes=24, height=0.009, rate=0.04e12, residual=0.2e6, drive=drive)
+    problem = crooked(
+        nodes=24, height=0.009, weakening_rate=0.04e12, residual=0.2e6, drive=drive
+    )
     field = st.RandomField(st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(8e-3))
     strength = field.sample(problem.interface, samples=1500, seed=11)
     counted = st.onset(problem, strength, method=EXACT, progress=False)

@@ -40,11 +40,13 @@ def fresh_run(profile, method=METHOD):
 
 
 @settings(max_examples=5, deadline=None)
-@given(seed=some.integers(0, 10_000), rate=some.sampled_from([1e4, 1e7, 1e9]))
-def test_energy_is_never_created_and_stress_never_above_strength(seed, rate):
+@given(seed=some.integers(0, 10_000), loading_rate=some.sampled_from([1e4, 1e7, 1e9]))
+def test_energy_is_never_created_and_stress_never_above_strength(seed, loading_rate):
     profile = strength(seed)
     save = st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=5)
-    run = simulate_rupture(PROBLEM, profile, method=Rupture(loading_rate=rate), save=save)
+    run = simulate_rupture(
+        PROBLEM, profile, method=Rupture(loading_rate=loading_rate), save=save
+    )
     total = run["work"].values[-1]
     assert run.attrs["stopped"] == "sliding"
     # Rounding of a difference of terms that are 1e3 times larger.

@@ -24,9 +24,9 @@ def profile(seed, roughness):
 
 
 def problem_of(length, wave=0.0, varying=False):
-    rate = 0.5e12 * (1.0 + 0.5 * np.cos(2 * ANGLE)) if varying else 0.5e12
+    weakening_rate = 0.5e12 * (1.0 + 0.5 * np.cos(2 * ANGLE)) if varying else 0.5e12
     load = st.Load(profile=1.0 + wave * np.sin(ANGLE)) if wave else st.Load()
-    return make_problem(NODES, length, load=load, weakening_rate=rate)
+    return make_problem(NODES, length, load=load, weakening_rate=weakening_rate)
 
 
 lengths = hs.floats(2e-3, 0.04)  # half a critical patch to twelve of them

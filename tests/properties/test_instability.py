@@ -23,9 +23,9 @@ def exact():
     return exact_onset(CROOKED, CROOKED_STRENGTH)
 
 
-def held(top, rate=2e7, back=1.0, **options):
+def held(top, loading_rate=2e7, back=1.0, **options):
     """A load that rises to `top`, holds, and then goes to a share of it."""
-    end = top / rate
+    end = top / loading_rate
     values = [0.0, top, top, back * top, back * top]
     return st.Rupture(load=(end * np.array([0.0, 1.0, 1.5, 2.0, 3.0]), values), **options)
 
@@ -54,14 +54,16 @@ def test_below_the_onset_nothing_is_unstable(exact, share, back, stop):
         assert (found.seismic_moment.item() > 0.0) == (share > 0.973)
 
 
-@pytest.mark.parametrize("rate", [2e5, 2e7])
-def test_above_it_the_onset_is_that_of_equilibrium_however_the_load_goes_on(exact, rate):
+@pytest.mark.parametrize("loading_rate", [2e5, 2e7])
+def test_above_it_the_onset_is_that_of_equilibrium_however_the_load_goes_on(
+    exact, loading_rate
+):
     """At 2e7 Pa/s inertia lifts it by some 1e-4."""
-    top, close = 1.003 * exact.critical_load.item(), 1e-5 if rate < 1e6 else 3e-4
-    straight = st.onset(CROOKED, CROOKED_STRENGTH, method=st.Rupture(loading_rate=rate))
+    top, close = 1.003 * exact.critical_load.item(), 1e-5 if loading_rate < 1e6 else 3e-4
+    straight = st.onset(CROOKED, CROOKED_STRENGTH, method=st.Rupture(loading_rate=loading_rate))
     for back in (1.0, 0.3):
         with warnings.catch_warnings(action="error"):
-            method = held(top, rate, back, end_time=3.0 * top / rate)
+            method = held(top, loading_rate, back, end_time=3.0 * top / loading_rate)
             found = st.onset(CROOKED, CROOKED_STRENGTH, method=method)
         for name in ("critical_stress", "first_instability"):
             assert found[name].item() == pytest.approx(exact[name].item(), rel=close)

@@ -167,8 +167,8 @@ def test_no_sample_lies_beyond_the_bounds(
     )
     specimen = blocks and st.Blocks(height=0.019, thickness=0.006, drive=blocks)
     # A little steeper than a strip unloads: much of the specimen slips before the instability.
-    rate = 3.4e10 if blocks else 0.3e12
-    law = st.LinearWeakening(weakening_rate=rate, residual_strength=1e5)
+    weakening_rate = 3.4e10 if blocks else 0.3e12
+    law = st.LinearWeakening(weakening_rate=weakening_rate, residual_strength=1e5)
     with collect_warnings():
         mode = "III" if system == "rigid" else "II"
         problem = st.Problem(SOLID, interface, law, load, mode=mode, specimen=specimen)

@@ -28,11 +28,11 @@ class Inputs:
         moved = value * (1.0 + self.change * self.rng.uniform(-1.0, 1.0, value.shape))
         return moved if moved.ndim else float(moved)
 
-    def problem(self, nodes=128, length=0.05, rate=0.5e12, residual=0.5e6, **given):
+    def problem(self, nodes=128, length=0.05, weakening_rate=0.5e12, residual=0.5e6, **given):
         solid = {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0}
         lengths = tuple(map(self, length)) if isinstance(length, tuple) else self(length)
         friction = given.pop("friction", None) or st.LinearWeakening(
-            weakening_rate=self(rate), residual_strength=self(residual)
+            weakening_rate=self(weakening_rate), residual_strength=self(residual)
         )
         return st.Problem(
             solid=st.Solid(**{name: self(value) for name, value in solid.items()}),
@@ -58,7 +58,7 @@ class Inputs:
         blocks = st.Blocks(
             height=self(height), thickness=self(0.006), drive=drive or st.Platen(), **given
         )
-        return self.problem(nodes, rate=0.2e12, specimen=blocks, mode="II")
+        return self.problem(nodes, weakening_rate=0.2e12, specimen=blocks, mode="II")
 
 
 def onset(problem, strength, method):

@@ -40,7 +40,7 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
             assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())
             pieces = present_pieces(sample, after.slip)
             load = before.load * sample.profile - problem.blocks.stiffness @ after.slip
-            over = load - (pieces.strength - pieces.rate * after.slip)
+            over = load - (pieces.strength - pieces.weakening_rate * after.slip)
             assert over.max() < 1e-9 * sample.excess.max()
 
 

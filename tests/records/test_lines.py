@@ -77,8 +77,8 @@ def a_law_that_rests_and_steepens():
 @calls("difference quotients of 20 Pa, to 1e-7", close=1e-5)
 def sensitivity_of_a_law_of_two_pieces():
     """Of so wide a range that weak nodes pass corners before the first instability."""
-    rate = {"weakening_rate": 2.9e11, "slip": (0.05, 1.0), "strength": (0.8, 0.0)}
-    problem = make_problem(96, 0.037, friction=st.PiecewiseWeakening(**rate))
+    scale = {"weakening_rate": 2.9e11, "slip": (0.05, 1.0), "strength": (0.8, 0.0)}
+    problem = make_problem(96, 0.037, friction=st.PiecewiseWeakening(**scale))
     rough = 1e5 + 3.0 * (TWO - TWO.min(axis=1, keepdims=True))
     return st.onset(problem, rough, method=st.Equilibrium(sensitivity=True, slip=True))
 

@@ -88,8 +88,8 @@ def loaded(**load):
     return dataclasses.replace(PROBLEM, load=st.Load(**load))
 
 
-def on_plane(lengths, rate=RATE):
-    problem = make_problem((48, 48), lengths, weakening_rate=rate)
+def on_plane(lengths, weakening_rate=RATE):
+    problem = make_problem((48, 48), lengths, weakening_rate=weakening_rate)
     return sampled(problem, beta_strength(1e-3))
 
 

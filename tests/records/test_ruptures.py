@@ -205,7 +205,7 @@ def onsets_and_waves_of_slow_loads():
     arrested = np.where(np.abs(at - 0.4) < 0.25, 0.8e6 + 1e3 * at, 6e6)  # not symmetric
     end = {"stop": "time", "end_time": 0.8e6 / 1e8 + 2.2e-4}  # four times the period over c_s
     method, save = st.Rupture(loading_rate=1e8, **end), st.Save([], every=500)
-    line, _ = wavy_line(1024, rate=0.5e12)
+    line, _ = wavy_line(1024, weakening_rate=0.5e12)
     found["waves"] = st.simulate_rupture(line, arrested, method=method, save=save).mean_slip
     problem = st.paper.problem(nodes=512)
     field = st.paper.strength(problem, correlation_ratio=0.5)

@@ -96,8 +96,10 @@ def test_everything_beside_the_strength_is_read_alike():
     np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
     np.testing.assert_allclose(rows.initial_stress, 1e4)
     load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=0.1 * u.MPa)
-    rate = np.full(NODES, 0.2) * u.MPa / u.um
-    problem = make_problem(NODES, weakening_rate=rate, residual_strength=tau_r, load=load)
+    weakening_rate = np.full(NODES, 0.2) * u.MPa / u.um
+    problem = make_problem(
+        NODES, weakening_rate=weakening_rate, residual_strength=tau_r, load=load
+    )
     assert problem.friction.weakening_rate == pytest.approx(np.full(NODES, 0.2e12))
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + X)

@@ -20,7 +20,9 @@ from stiction.cli import commands
 def joint(samples, **options):
     """Samples of a lap joint behind a stiff machine, in many of which a node that slipped stops."""
     drive = st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf"))
-    problem = crooked(nodes=48, height=0.05, drive=drive, rate=0.06e12, residual=0.2e6)
+    problem = crooked(
+        nodes=48, height=0.05, drive=drive, weakening_rate=0.06e12, residual=0.2e6
+    )
     given = {"method": st.Equilibrium(), "samples": samples, "progress": False} | options
     with pytest.warns(st.AccuracyWarning) as caught:
         st.monte_carlo(problem, beta_strength(1.75e-3), **given)

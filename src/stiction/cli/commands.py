@@ -372,10 +372,11 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
         ("standard deviation", unit): field.standard_deviation,
         ("correlation length", "m (to 1/e)"): field.efolding_length(),
     }
-    if problem.uniform_rate is None:  # the nucleation length varies along the interface
+    W = problem.uniform_weakening_rate
+    if W is None:  # the nucleation length varies along the interface
         return numbers
     numbers["nucleation length", "m"] = problem.nucleation_length
-    numbers["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(problem.uniform_rate))
+    numbers["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(W))
     return numbers
 
 

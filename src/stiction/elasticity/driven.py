@@ -77,13 +77,13 @@ class Driven:
         return moved
 
 
-def _unstable(matrix: Array, rate: float, begin: int, end: int) -> bool:
+def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
     block = matrix[begin:end, begin:end].copy()
-    block.flat[:: end - begin + 1] -= rate
+    block.flat[:: end - begin + 1] -= W
     return bool(scipy.linalg.lapack.dpotrf(block, lower=1, overwrite_a=1)[1] > 0)
 
 
-def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
+def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
 
     The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a
@@ -100,9 +100,9 @@ def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
     while begin < n:
         end = min(max(end, begin + 1), n)
         # 1. and 2.
-        while not (unstable := _unstable(matrix, rate, begin, end)) and end < n:
+        while not (unstable := _unstable(matrix, W, begin, end)) and end < n:
             end += 1
-        while unstable and end - begin > 1 and _unstable(matrix, rate, begin, end - 1):
+        while unstable and end - begin > 1 and _unstable(matrix, W, begin, end - 1):
             end -= 1
         if not unstable and step == 1:
             break
@@ -117,9 +117,9 @@ def shortest_runs(matrix: Array, rate: float) -> list[tuple[int, int]]:
 
 
 @lru_cache(maxsize=32)
-def _windows_at(blocks: Driven, rate: float) -> Windows:
+def _windows_at(blocks: Driven, weakening_rate: float) -> Windows:
     matrix = blocks.stiffness
-    runs = shortest_runs(matrix, rate)
+    runs = shortest_runs(matrix, weakening_rate)
     modes = np.zeros((len(runs), max((end - begin for begin, end in runs), default=1)))
     for row, (begin, end) in zip(modes, runs, strict=True):
         _, vectors = scipy.linalg.eigh(
@@ -128,7 +128,7 @@ def _windows_at(blocks: Driven, rate: float) -> Windows:
         row[: end - begin] = np.abs(vectors[:, 0])
         row /= row.sum()
     starts, ends = np.array(runs, dtype=np.int64).reshape(-1, 2).T
-    return Windows(np.full(len(runs), rate), starts.copy(), ends - starts, modes)
+    return Windows(np.full(len(runs), weakening_rate), starts.copy(), ends - starts, modes)
 
 
 @lru_cache(maxsize=8)

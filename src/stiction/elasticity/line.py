@@ -133,21 +133,21 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     return value, mode
 
 
-def _narrowest(nodes: int, widths: Sequence[int], rate: float) -> int:
+def _narrowest(nodes: int, widths: Sequence[int], W: float) -> int:
     """Step 1: return the index of the first unstable width, or the number of widths."""
     # The width in the continuum is off by about a node, or more on a large part
     # of the circle.
-    i = min(bisect.bisect_left(widths, _continuous_width(nodes, rate)), len(widths) - 1)
-    while i < len(widths) and window_mode(nodes, widths[i])[0] > rate:
+    i = min(bisect.bisect_left(widths, _continuous_width(nodes, W)), len(widths) - 1)
+    while i < len(widths) and window_mode(nodes, widths[i])[0] > W:
         i += 1
-    while i > 0 and window_mode(nodes, widths[i - 1])[0] <= rate:
+    while i > 0 and window_mode(nodes, widths[i - 1])[0] <= W:
         i -= 1
     return i
 
 
-def _continuous_width(nodes: int, rate: float) -> int:
+def _continuous_width(nodes: int, weakening_rate: float) -> int:
     """Return the number of nodes in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
-    return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * rate), 1.0) * nodes)
+    return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * weakening_rate), 1.0) * nodes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -169,7 +169,7 @@ def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]
         widths = ladder[:-1]
     elif _continuous_width(nodes, highest) > 1.2 * widest:
         return ()
-    first, last = (_narrowest(nodes, widths, rate) for rate in (highest, lowest))
+    first, last = _narrowest(nodes, widths, highest), _narrowest(nodes, widths, lowest)
     return tuple(widths[first : last + 1])
 
 
@@ -178,6 +178,6 @@ def _windows(nodes: int, widths: tuple[int, ...], unit: float) -> Windows:
     modes = np.zeros((max(len(widths), 1), max(widths, default=1)))
     for i, width in enumerate(widths):
         modes[i, :width] = window_mode(nodes, width)[1]
-    rates = np.array([window_mode(nodes, width)[0] * unit for width in widths])
+    weakening_rates = np.array([window_mode(nodes, width)[0] * unit for width in widths])
     anywhere = np.full(len(widths), ANYWHERE, dtype=np.int64)
-    return Windows(rates, anywhere, np.array(widths, dtype=np.int64), modes)
+    return Windows(weakening_rates, anywhere, np.array(widths, dtype=np.int64), modes)

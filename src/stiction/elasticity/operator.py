@@ -128,7 +128,7 @@ class Operator(NamedTuple):
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
-    rate: Array  # (nodes,): W, Pa/m, zero at residual nodes
+    weakening_rate: Array  # (nodes,): W, Pa/m, zero at residual nodes
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
     z: Array  # (nodes,): overwritten by conjugate gradients, like the next two
     direction: Array  # last direction; of negative curvature, if the solver returns it
@@ -138,15 +138,15 @@ class Operator(NamedTuple):
     phi: Array  # (nodes,): patch that the spring holds, of unit norm
 
 
-def make_operator(symbol: Array, rate: Array | float, shape: tuple[int, ...]) -> Operator:
+def make_operator(symbol: Array, W: Array | float, shape: tuple[int, ...]) -> Operator:
     """Return the operator for a symbol and a weakening rate (Pa/m), a number or an array."""
-    rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), shape).flatten()
-    typical = float(rates[rates > 0.0].mean()) if (rates > 0.0).any() else float(symbol.max())
+    W = np.broadcast_to(np.asarray(W, dtype=np.float64), shape).flatten()
+    typical = float(W[W > 0.0].mean()) if (W > 0.0).any() else float(symbol.max())
     flat = symbol.flatten()
     spectrum, no_field = np.empty(flat.size, dtype=np.complex128), np.empty(0)
-    z, direction, image = np.empty((3, rates.size))
+    z, direction, image = np.empty((3, W.size))
     return Operator(
-        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), rates, spectrum, z,
+        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), W, spectrum, z,
         direction, image, soft_mode=no_field, spring=0.0, phi=no_field,
     )  # fmt: skip
 
@@ -161,9 +161,9 @@ def filtered(operator: Operator, multiplier: Array, field: Array, out: Array) ->
 def product(operator: Operator, field: Array, out: Array) -> None:
     """Write (K - W) field at every node, without a spring, to `out`."""
     filtered(operator, operator.symbol, field, out)
-    rate = operator.rate
+    W = operator.weakening_rate
     for i in range(out.size):
-        out[i] -= rate[i] * field[i]
+        out[i] -= W[i] * field[i]
 
 
 @jit

@@ -41,9 +41,10 @@ class HalfSpaces(NamedTuple):
         """Return K(k), Pa/m, for the modes of an interface as in ``numpy.fft.rfftn``; read-only."""
         return _symbol(*self, shape)
 
-    def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
+    def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
         """Return h_n, m, in each direction, for a weakening rate (Pa/m)."""
-        return tuple(2.0 * SMALLEST_EIGENVALUE * modulus / rate for modulus in self.moduli)
+        double = 2.0 * SMALLEST_EIGENVALUE
+        return tuple(double * modulus / weakening_rate for modulus in self.moduli)
 
 
 @functools.lru_cache(maxsize=16)
@@ -73,7 +74,7 @@ class Windows(NamedTuple):
     grid.
     """
 
-    rates: Array  # (count,): smallest unstable weakening rate of each, Pa/m, never rising
+    weakening_rates: Array  # (count,): smallest that is unstable, Pa/m, never rising
     starts: NDArray[np.int64]  # (count,): first node, or `ANYWHERE`
     widths: NDArray[np.int64]  # (count,): number of nodes
     modes: Array  # (count or 1, largest width): eigenvectors of unit sum, zero beyond it

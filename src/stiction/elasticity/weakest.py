@@ -40,45 +40,45 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 
 
 @jit_inside
-def _count_fast(rate: Array, threshold: float, length: Array) -> None:
+def _count_fast(W: Array, threshold: float, length: Array) -> None:
     """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
-    n = rate.shape[0]
+    n = W.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
         i = q if q < n else q - n
-        run = run + 1.0 if rate[i] >= threshold else 0.0
+        run = run + 1.0 if W[i] >= threshold else 0.0
         length[i] = run
 
 
 @jit
 def weakest_window(
-    excess: Array, profile: Array, rate: Array, windows: Windows, bound: float, allowed: Array
+    excess: Array, profile: Array, W: Array, windows: Windows, bound: float, allowed: Array
 ) -> tuple[float, int, int]:
     """Steps 1 to 3: return the lowest bound (Pa), its window, and the first node of the window.
 
     If no window gives a bound below `bound`, return `bound`, `NO_WINDOW` and 0.
     `allowed` (n,) is a workspace.
     """
-    n = rate.shape[0]
+    n = W.shape[0]
     best, window, start = bound, NO_WINDOW, 0
-    lowest, highest, counted = rate[0], rate[0], -1.0
+    lowest, highest, counted = W[0], W[0], -1.0
     uniform = True
     for i in range(n):
         uniform = uniform and profile[i] == profile[0]
-        lowest = min(lowest, rate[i])
-        highest = max(highest, rate[i])
-    for c in range(windows.rates.shape[0]):
+        lowest = min(lowest, W[i])
+        highest = max(highest, W[i])
+    for c in range(windows.weakening_rates.shape[0]):
         # 1.
-        threshold = windows.rates[c]
+        threshold = windows.weakening_rates[c]
         if threshold > highest:
             continue
-        if c > 0 and threshold < windows.rates[c - 1] <= lowest:
+        if c > 0 and threshold < windows.weakening_rates[c - 1] <= lowest:
             break
         # 2.
         width, mode = windows.widths[c], windows.modes[c]
         everywhere = threshold <= lowest
         if not everywhere and threshold != counted:
-            _count_fast(rate, threshold, allowed)
+            _count_fast(W, threshold, allowed)
             counted = threshold
         # 3. A fixed place.
         first = windows.starts[c]
@@ -115,20 +115,20 @@ def weakest_window(
 
 @jit
 def window_bound(
-    excess: Array, profile: Array, rate: Array, windows: Windows, allowed: Array, y: Array
+    excess: Array, profile: Array, W: Array, windows: Windows, allowed: Array, y: Array
 ) -> float:
     """Return the lowest bound from windows and from sliding as a whole, Pa. Write its multiplier.
 
     The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
     """
-    n = rate.shape[0]
+    n = W.shape[0]
     # 4.
     total_s = total_p = 0.0
     for i in range(n):
         total_s += excess[i]
         total_p += profile[i]
     bound = total_s / total_p
-    best, window, start = weakest_window(excess, profile, rate, windows, bound, allowed)
+    best, window, start = weakest_window(excess, profile, W, windows, bound, allowed)
     for i in range(n):
         y[i] = 1.0 if window == NO_WINDOW else 0.0
     if window != NO_WINDOW:

@@ -226,15 +226,15 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
 
 def no_single_length(problem: Problem, random: Any) -> str | None:
     """Return the reason why the local criterion cannot be used, or None."""
-    rate = problem.uniform_rate
+    weakening_rate = problem.uniform_weakening_rate
     if not problem.friction.linear:
         return "strength does not fall linearly with slip"
-    if rate is None or set(SCALES) & random.varying:
+    if weakening_rate is None or set(SCALES) & random.varying:
         return "the weakening rate is not uniform"
     try:
         if problem.specimen is None:
-            windows_of(problem, rate)
-        elif not problem.blocks.windows(rate, rate).starts.size:
+            windows_of(problem, weakening_rate)
+        elif not problem.blocks.windows(weakening_rate, weakening_rate).starts.size:
             return "no part of the specimen becomes unstable by itself"
     except InputError:
         return "a critical patch does not fit on the interface"

@@ -130,8 +130,8 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     """
     need(run, "moment_rate", "moment_rate_spectrum", "onset_time")
     since, begin = _since_onset(run)
-    rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
-    fast = since[rate.values > SHOWN_RATE * rate.values.max()]
+    moment_rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
+    fast = since[moment_rate.values > SHOWN_RATE * moment_rate.values.max()]
     ends = (fast[0], fast[-1]) if fast.size else (since[0], since[-1])
     beside = BESIDE_PULSE * (ends[1] - ends[0])
     shown = (since >= ends[0] - beside) & (since <= ends[1] + beside)
@@ -139,10 +139,10 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     figure = new_figure(PAGE, 2.6)
     with paper_style():
         left, right = figure.subplots(1, 2)
-        left.plot(since[shown] * factor, rate.values[shown], color=INK)
+        left.plot(since[shown] * factor, moment_rate.values[shown], color=INK)
         left.set(
             xlabel=with_unit(f"time{begin}", unit),
-            ylabel=with_unit("moment rate", rate.attrs["units"]),
+            ylabel=with_unit("moment rate", moment_rate.attrs["units"]),
             ylim=(0.0, None),
         )
         if spectrum.size:
@@ -321,11 +321,11 @@ def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
     return run[times].values, ""
 
 
-def _rates(rate: Array, decades: float) -> tuple[Any, LogNorm]:
+def _masked_by_decade(slip_rate: Array, decades: float) -> tuple[Any, LogNorm]:
     """Return slip rates, masked if they are decades below the largest, and their colours."""
-    top = max(float(rate.max()), 1e-12)
+    top = max(float(slip_rate.max()), 1e-12)
     low = top * 10.0**-decades
-    return np.ma.masked_less(rate, low), LogNorm(low, top)
+    return np.ma.masked_less(slip_rate, low), LogNorm(low, top)
 
 
 def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
@@ -336,18 +336,19 @@ def _strength(run: xr.Dataset) -> tuple[Array, float, str]:
 
 def _draw_space_time(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     interface = problem.interface
-    (since, begin), (rate, norm) = _since_onset(run), _rates(run["slip_rate"].values, DECADES)
+    since, begin = _since_onset(run)
+    slip_rate, norm = _masked_by_decade(run["slip_rate"].values, DECADES)
     beside = BEFORE * interface.measure / problem.solid.shear_wave_speed
-    slips = since[np.ma.getdata(rate).any(axis=1)]  # and a little before and after
+    slips = since[np.ma.getdata(slip_rate).any(axis=1)]  # and a little before and after
     near = (since >= -beside) & (since <= slips.max(initial=-np.inf) + beside)
     if near.sum() > 2:
-        since, rate = since[near], rate[near]
+        since, slip_rate = since[near], slip_rate[near]
     factor, unit = unit_for("s", since)
     length, _ = unit_for("m", interface.lengths)
     along = interface.x[0] + (np.arange(interface.size + 1) - 0.5) * interface.spacing
     edges = np.concatenate([since[:1], 0.5 * (since[1:] + since[:-1]), since[-1:]])
     mesh = axes.pcolormesh(
-        along * length, edges * factor, rate, norm=norm, cmap=SLIP_RATE, rasterized=True
+        along * length, edges * factor, slip_rate, norm=norm, cmap=SLIP_RATE, rasterized=True
     )
     if begin:
         place = float(run["critical_position"]) * length
@@ -403,7 +404,7 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     x, (strength, factor, unit) = run["x"].values * length, _strength(run)
     strength, stress = strength * factor, run["shear_stress"].values * factor
     top = max(float(run["slip_rate"].max()), 1e-12)
-    rate = np.maximum(run["slip_rate"].values, 1e-10 * top)
+    slip_rate = np.maximum(run["slip_rate"].values, 1e-10 * top)
     figure = Figure(figsize=(PAGE * 0.9, 3.8))
     above, below = figure.subplots(2, 1, sharex=True)
     above.plot(x, strength, color=PALE, linewidth=1.0, label=r"$\tau_p$")
@@ -414,28 +415,29 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     margin = 0.06 * (highest - min(np.nanmin(strength), broken.min()))
     above.set_ylim(min(0.0, broken.min()) - margin, max(highest, broken.max()) + margin)
     above.legend(loc="upper right", ncols=2)
-    (slip,) = below.semilogy(x, rate[0], color=ACCENT)
+    (slip,) = below.semilogy(x, slip_rate[0], color=ACCENT)
     below.set_ylim(10.0**-DECADES * top, 3.0 * top)
     first, last = x[breaks[0]], x[breaks[-1]] + x[1] - x[0]
     beside = 0.05 * (last - first) * (breaks.size < x.size)
     below.set_xlim(first - beside, last + beside)
     below.set_xlabel(f"position $x$ ({length_unit})")
     below.set_ylabel("slip rate (m/s)")
-    return figure, [(line, "ydata", stress), (slip, "ydata", rate), _clock(figure, run)]
+    return figure, [(line, "ydata", stress), (slip, "ydata", slip_rate), _clock(figure, run)]
 
 
 def _plane_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     interface = problem_of(run).interface
-    (rate, norm), stress = _rates(run["slip_rate"].values, 4.0), run["shear_stress"].values
+    slip_rate, norm = _masked_by_decade(run["slip_rate"].values, 4.0)
+    stress = run["shear_stress"].values
     factor, unit = unit_for("Pa", stress)
     stress = stress * factor
     breaks = np.isfinite(run["peak_strength"].values)
     low, high = np.quantile(stress[:, breaks], [0.001, 0.999])
     figure = Figure(figsize=(PAGE * 1.15, 3.4))
     left, right = figure.subplots(1, 2, sharey=True)
-    slip = draw_map(left, interface, rate[0], "slip rate (m/s)", norm=norm, cmap=SLIP_RATE)
+    slip = draw_map(left, interface, slip_rate[0], "slip rate (m/s)", norm=norm, cmap=SLIP_RATE)
     text, ends = f"shear stress ({unit})", {"vmin": low, "vmax": high}
     load = draw_map(right, interface, stress[0], text, cmap="cividis", **ends)
     right.label_outer()
-    moving = [(slip, "data", rate.swapaxes(1, 2)), (load, "data", stress.swapaxes(1, 2))]
+    moving = [(slip, "data", slip_rate.swapaxes(1, 2)), (load, "data", stress.swapaxes(1, 2))]
     return figure, [*moving, _clock(figure, run)]

@@ -144,10 +144,10 @@ class Problem:
             raise InputError(problems)
         if self.specimen is not None:
             self._check_drive()
-        rate = self.friction.weakening_rate
-        if rate is not None:
-            self._check_resolution(float(np.max(rate)))
-            self._warn_if_short(float(np.median(rate)))
+        weakening_rate = self.friction.weakening_rate
+        if weakening_rate is not None:
+            self._check_resolution(float(np.max(weakening_rate)))
+            self._warn_if_short(float(np.median(weakening_rate)))
         return self
 
     def _of_specimen(self) -> list[str]:
@@ -231,8 +231,8 @@ class Problem:
                 object.__setattr__(self, part, dataclasses.replace(owner, **placed))
         return problems
 
-    def _warn_if_short(self, rate: float) -> None:
-        patch = self.nucleation_lengths(rate * self.friction.steepening)[0]
+    def _warn_if_short(self, weakening_rate: float) -> None:
+        patch = self.nucleation_lengths(weakening_rate * self.friction.steepening)[0]
         length = min(self.interface.lengths)
         if self.specimen is None and patch >= length:
             warn_user(
@@ -318,9 +318,9 @@ class Problem:
         fixed = {} if given is None else dict([given])
         for scale, value in (scales or fixed).items():
             fall = np.array(strength - residual)
-            steep = max(float(friction.rate(fall, scale, np.median(value))), 1e-300)
-            self._warn_if_short(steep)
-            self._check_resolution(steep)
+            W = max(float(friction.weakening_rate_of(fall, scale, np.median(value))), 1e-300)
+            self._warn_if_short(W)
+            self._check_resolution(W)
 
     @property
     def blocks(self) -> Driven:
@@ -428,10 +428,10 @@ class Problem:
         return self.solid.effective_modulus(self.mode)
 
     @property
-    def uniform_rate(self) -> float | None:
+    def uniform_weakening_rate(self) -> float | None:
         """The problem's weakening rate, Pa/m, if it is the same at all nodes."""
-        rate = self.friction.weakening_rate
-        return None if rate is None or np.ptp(rate) > 0.0 else float(np.max(rate))
+        W = self.friction.weakening_rate
+        return None if W is None or np.ptp(W) > 0.0 else float(np.max(W))
 
     @property
     def nucleation_length(self) -> float:
@@ -440,37 +440,39 @@ class Problem:
         If the law steepens, W is the steepest rate. An `InputError` says that the rate
         varies along the interface or follows from other parameters.
         """
-        if self.uniform_rate is None:
+        if self.uniform_weakening_rate is None:
             raise InputError(
                 "friction.weakening_rate: must be uniform for a nucleation length, about"
                 " (strength - residual_strength)/critical_slip. st.Equilibrium() works without it"
             )
-        return self.nucleation_lengths(self.uniform_rate * self.friction.steepening)[0]
+        steepest = self.uniform_weakening_rate * self.friction.steepening
+        return self.nucleation_lengths(steepest)[0]
 
-    def nucleation_lengths(self, rate: float) -> tuple[float, ...]:
+    def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
         """Return h_n, m, in each direction, for a uniform weakening rate (Pa/m).
 
         On a plane, the length along x belongs to mode II and the length along y to
         mode III.
         """
-        if not rate > 0.0:
-            raise InputError(f"rate: must be a positive number, got {describe(rate)}")
-        return self.half_spaces.nucleation_lengths(rate)
+        if not weakening_rate > 0.0:
+            given = describe(weakening_rate)
+            raise InputError(f"weakening_rate: must be a positive number, got {given}")
+        return self.half_spaces.nucleation_lengths(weakening_rate)
 
-    def nodes_in_nucleation_length(self, rate: float) -> tuple[float, ...]:
+    def nodes_in_nucleation_length(self, weakening_rate: float) -> tuple[float, ...]:
         """Return how many nodes span the nucleation length at a weakening rate (Pa/m).
 
         There is a number for each direction. If the law steepens, its steepest rate
         is used.
         """
-        lengths = self.nucleation_lengths(rate * self.friction.steepening)
+        lengths = self.nucleation_lengths(weakening_rate * self.friction.steepening)
         return tuple(np.divide(lengths, self.interface.spacings).tolist())
 
-    def _check_resolution(self, highest_rate: float) -> None:
-        resolution = self.nodes_in_nucleation_length(highest_rate)
+    def _check_resolution(self, highest_weakening_rate: float) -> None:
+        resolution = self.nodes_in_nucleation_length(highest_weakening_rate)
         if min(resolution) >= MIN_NODES_IN_NUCLEATION:
             return self._check_extent(resolution)
-        steepest = highest_rate * self.friction.steepening
+        steepest = highest_weakening_rate * self.friction.steepening
         length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
         if min(resolution) < HARDLY_RESOLVED:
             raise InputError(
@@ -512,7 +514,7 @@ class Problem:
 
     def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
         """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
-        resolution = self.nodes_in_nucleation_length(sample.steepest_rate)
+        resolution = self.nodes_in_nucleation_length(sample.steepest_weakening_rate)
         if min(resolution) < enough:
             spanned = f"{resolution[0]:.1f} nodes"
             if self.interface.is_plane:
@@ -614,7 +616,7 @@ class Problem:
                 f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
                 " % of the nodes. These do not weaken: their strength is constant"
             )
-        self._check_resolution(sample.steepest_rate)
+        self._check_resolution(sample.steepest_weakening_rate)
         return sample, reduce(np.logical_and, measured)
 
     def constants(self, strength: Any) -> dict[str, Any]:
@@ -665,15 +667,15 @@ class Problem:
             strength = np.where(self.interface.breakable, strength, np.inf)
         if problems := self._impossible(strength, residual, initial, accept):
             raise InputError(problems)
-        rates = self._rates(strength, residual, scale, value)
+        W = self._rates_of(strength, residual, scale, value)
         constant = strength <= residual
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no
             # consequence.
             residual = np.minimum(residual, strength)
             along = self.interface.axes
-            slowest = np.min(rates, axis=along, where=~constant, initial=np.inf, keepdims=True)
-            rates = np.where(constant, slowest, rates)
+            slowest = np.min(W, axis=along, where=~constant, initial=np.inf, keepdims=True)
+            W = np.where(constant, slowest, W)
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
@@ -681,7 +683,7 @@ class Problem:
             )
         shape = self.interface.shape
         load_profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=float)
-        return Sample(strength, residual, rates, initial, load_profile, pressure, self)
+        return Sample(strength, residual, W, initial, load_profile, pressure, self)
 
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return messages about values that profiles or random properties would replace.
@@ -775,15 +777,15 @@ class Problem:
             )
         return problems
 
-    def _rates(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
+    def _rates_of(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
         """Return weakening rates, Pa/m, from the given scale of slip."""
-        rates = self.friction.rate(strength - residual, scale, value)
+        W = self.friction.weakening_rate_of(strength - residual, scale, value)
         barriers = np.isinf(strength)
         if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
             along = self.interface.axes
-            fastest = np.where(barriers, 0.0, rates).max(axis=along, keepdims=True)
-            rates = np.where(barriers, fastest, rates)
-        return rates
+            fastest = np.where(barriers, 0.0, W).max(axis=along, keepdims=True)
+            W = np.where(barriers, fastest, W)
+        return W
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

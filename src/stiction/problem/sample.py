@@ -26,22 +26,22 @@ BARRIER = 10.0
 nodes that weaken."""
 
 
-def steepest_rate(strength: Array, residual: Array, rate: Array) -> float:
+def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
     """Return the largest weakening rate, Pa/m, among nodes that may break.
 
     Arrays have shape (samples, *shape). Barriers do not count: with a uniform
     critical slip they weaken steeply but never slip.
     """
     drop = strength - residual
-    if drop.max() <= BARRIER * drop.min() or rate.max() == rate.min():
-        return float(rate.max())
+    if drop.max() <= BARRIER * drop.min() or weakening_rate.max() == weakening_rate.min():
+        return float(weakening_rate.max())
     drop = drop.reshape(drop.shape[0], -1)
     weakens = np.isfinite(drop) & (drop > 0.0)
     count = weakens.sum(axis=1, keepdims=True)
     # numpy's quantile takes 20 times as long.
     ordered = np.sort(np.where(weakens, drop, -np.inf), axis=1)
     typical = np.take_along_axis(ordered, drop.shape[1] - count + (count - 1) // 4, axis=1)
-    return float(rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
+    return float(weakening_rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
 
 
 class _Profiles(NamedTuple):
@@ -125,9 +125,10 @@ class Sample(Result, _Profiles):
         return float(self.strength.mean(where=np.isfinite(self.strength)))
 
     @property
-    def steepest_rate(self) -> float:
+    def steepest_weakening_rate(self) -> float:
         """Largest weakening rate, Pa/m, among nodes that may break."""
-        return steepest_rate(self.strength, self.residual_strength, self.weakening_rate)
+        rates = self.weakening_rate
+        return steepest_weakening_rate(self.strength, self.residual_strength, rates)
 
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at loads tau_0 with shape (samples,)."""

@@ -87,9 +87,9 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     True
     """
     scale, load, initial = stationary(problem, strength)
-    rate = problem.uniform_rate
-    assert rate is not None  # checked by `stationary`
-    (window,) = windows_of(problem, rate, stretches=(1.0,))
+    weakening_rate = problem.uniform_weakening_rate
+    assert weakening_rate is not None  # checked by `stationary`
+    (window,) = windows_of(problem, weakening_rate, stretches=(1.0,))
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
     mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
     return NucleationStatistics(
@@ -128,7 +128,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
         ),
         "strength: is conditioned on measured values": strength.conditions is not None,
         "friction.weakening_rate: varies or follows from the strength": (
-            problem.uniform_rate is None
+            problem.uniform_weakening_rate is None
         ),
     }
     why = "so the nucleation stress is not stationary. Sample it with st.monte_carlo instead"

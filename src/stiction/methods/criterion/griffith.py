@@ -132,8 +132,8 @@ def griffith_length(
 
     def runs(lengths: Array, tau: Array) -> Any:
         resting, unit = _intensity_factors(problem, drops, lengths, centre)
-        rate = _release_rate(problem, resting + tau * unit)
-        return rate.min(axis=-1) > fracture_energy
+        release_rate = _release_rate(problem, resting + tau * unit)
+        return release_rate.min(axis=-1) > fracture_energy
 
     # 2.
     lengths = problem.interface.spacing * np.append(
@@ -194,5 +194,5 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
 
 def _release_rate(problem: Problem, factor: Array) -> Array:
     """Return G = K|K|/(2 G*), J/m²."""
-    rate: Array = factor * np.abs(factor) / (2.0 * problem.effective_modulus)
-    return rate
+    release_rate: Array = factor * np.abs(factor) / (2.0 * problem.effective_modulus)
+    return release_rate

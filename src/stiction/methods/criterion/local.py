@@ -114,7 +114,7 @@ class LocalCriterion:
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
                 f" as at zero slip, but the local criterion uses the rate at zero slip{INSTEAD}"
             )
-        if friction.weakening_rate is not None and problem.uniform_rate is None:
+        if friction.weakening_rate is not None and problem.uniform_weakening_rate is None:
             reasons.append(
                 "friction.weakening_rate: varies along the interface, so the nucleation length is"
                 f" not defined{INSTEAD}"
@@ -169,9 +169,9 @@ class LocalCriterion:
             excess, profile = excess_of(sample), sample.load_profile
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
-            for rate, rows in _rates(sample):
+            for weakening_rate, rows in _weakening_rates(sample):
                 # 1.
-                windows = windows_of(problem, rate)
+                windows = windows_of(problem, weakening_rate)
                 # 2.
                 load[rows], place[rows], chosen = least_average(
                     interface, windows, excess[rows], profile
@@ -200,9 +200,9 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     excess, spacing = excess_of(sample), problem.interface.spacing
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
-    for rate, rows in _rates(sample):
+    for weakening_rate, rows in _weakening_rates(sample):
         # 1.
-        windows = blocks.windows(rate, rate)
+        windows = blocks.windows(weakening_rate, weakening_rate)
         if not windows.starts.size:
             raise InputError(
                 "interface.length: no part of the specimen becomes unstable by itself, so the local"
@@ -227,7 +227,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
             if blocks.relief > 0.0 or problem.interface.is_held:  # 3.
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
-                relief[i] = _relief_of_patch(problem, rate, run, drive)
+                relief[i] = _relief_of_patch(problem, weakening_rate, run, drive)
     stress = sample.mean_stress(load - relief)
     return {
         "critical_load": load,
@@ -238,7 +238,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     }
 
 
-def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) -> float:
+def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> float:
     """Step 3: return the mean stress that slip on a patch releases before its instability.
 
     Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the
@@ -247,10 +247,10 @@ def _relief_of_patch(problem: Problem, rate: float, run: slice, drive: Array) ->
     more stress.
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
-    matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - rate * np.eye(len(matrix) - 1)
+    matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - W * np.eye(len(matrix) - 1)
     # The last row and column are the added equation and its unknown force, scaled
     # like the others.
-    matrix[[0, -2], -1] = matrix[-1, [0, -2]] = rate
+    matrix[[0, -2], -1] = matrix[-1, [0, -2]] = W
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]
     return problem.relief(np.maximum(slip, 0.0))
@@ -298,11 +298,11 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
-    ((rate, _), *further_rates) = _rates(sample)
-    if further_rates:
+    ((weakening_rate, _), *further_weakening_rates) = _weakening_rates(sample)
+    if further_weakening_rates:
         raise InputError("weakening_rate: differs between samples. Pass each sample alone")
     excess, profile = excess_of(sample), sample.load_profile
-    windows = windows_of(problem, rate)
+    windows = windows_of(problem, weakening_rate)
     samples = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(fields)) for fields in samples])
     # These bounds hold for the exact average. Round-off of the transforms may
@@ -347,13 +347,13 @@ def excess_of(sample: Sample) -> Array:
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 
 
-def _rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:
+def _weakening_rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:
     """Yield each weakening rate (Pa/m) with the numbers of its samples."""
     if not sample.uniform_weakening:
         raise InputError(
             "weakening_rate: varies along the interface, so the nucleation length of the local"
             f" criterion is not defined{INSTEAD}"
         )
-    rates = sample.weakening_rate.reshape(sample.samples, -1)[:, 0]
-    for rate in np.unique(rates):
-        yield float(rate), np.flatnonzero(rates == rate)
+    weakening_rates = sample.weakening_rate.reshape(sample.samples, -1)[:, 0]
+    for weakening_rate in np.unique(weakening_rates):
+        yield float(weakening_rate), np.flatnonzero(weakening_rates == weakening_rate)

@@ -75,10 +75,10 @@ def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
     bounds = np.zeros(sample.samples)
     with one_blas_thread():
         for i in range(sample.samples):
-            initial, rate = sample.initial_stress[i], sample.weakening_rate[i]
+            initial, weakening_rate = sample.initial_stress[i], sample.weakening_rate[i]
             peak, residual = sample.strength[i] - initial, sample.residual_strength[i] - initial
             load = (stress[i] - initial.mean()) / sample.load_profile.mean()
-            nodes = peak, residual, rate, load * sample.load_profile
+            nodes = peak, residual, weakening_rate, load * sample.load_profile
             bounds[i] = max(_least_difference(column, *nodes, side) for side in (-1, 1))
             if np.isinf(bounds[i]):
                 break
@@ -86,12 +86,12 @@ def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
 
 
 def _least_difference(
-    column: Array, peak: Array, residual: Array, rate: Array, load: Array, side: int
+    column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array, side: int
 ) -> float:
     """Return the widest bracket, on a given side, that does not contain the onset, or 0."""
     least = 0.0
     for width in BRACKETS:
-        sliding = slides(column, peak, residual, rate, (1.0 + side * width) * load)
+        sliding = slides(column, peak, residual, weakening_rate, (1.0 + side * width) * load)
         if sliding is None:
             return np.inf
         if sliding == (side > 0):
@@ -101,7 +101,7 @@ def _least_difference(
 
 
 def slides(
-    column: Array, peak: Array, residual: Array, rate: Array, load: Array
+    column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> bool | None:
     """Return whether a line slides under a load because it has no equilibrium. `None` if undecided.
 
@@ -111,18 +111,18 @@ def slides(
         First column of K, Pa/m.
     peak, residual : (nodes,) arrays
         tau_p - tau_i and tau_r - tau_i, Pa.
-    rate : (nodes,) array
+    weakening_rate : (nodes,) array
         W, Pa/m.
     load : (nodes,) array
         tau_0 p, Pa.
     """
     nodes, symbol = column.size, np.fft.rfft(column)
-    critical, scale = (peak - residual) / rate, float(peak.mean())
-    crack = GRIFFITH_MARGIN * _unstoppable_nodes(column, peak, residual, rate, load)
+    critical, scale = (peak - residual) / weakening_rate, float(peak.mean())
+    crack = GRIFFITH_MARGIN * _unstoppable_nodes(column, peak, residual, weakening_rate, load)
     slip, frozen, operations = np.zeros(nodes), 0, 0
     while operations < MAX_OPERATIONS:
         # 1.
-        strength = np.maximum(peak - rate * slip, residual)
+        strength = np.maximum(peak - weakening_rate * slip, residual)
         overstress = load - np.fft.irfft(symbol * np.fft.rfft(slip), nodes) - strength
         # 2.
         intact = np.flatnonzero(slip < critical)
@@ -142,7 +142,7 @@ def slides(
         left = (critical - slip)[moving]
         unstable = True
         if not frozen:
-            weakening = np.where(left > 0.0, rate[moving], 0.0)
+            weakening = np.where(left > 0.0, weakening_rate[moving], 0.0)
             _, growth, unstable = dposv(stiffness - np.diag(weakening), force)
             reached = (weakening > 0.0) & (growth >= left)
             if not unstable and reached.any():  # up to the first corner, and just beyond it
@@ -157,7 +157,7 @@ def slides(
 
 
 def _unstoppable_nodes(
-    column: Array, peak: Array, residual: Array, rate: Array, load: Array
+    column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> float:
     """Return the length, in nodes, of an unstoppable crack. Infinite without a stress drop.
 
@@ -166,5 +166,5 @@ def _unstoppable_nodes(
     spacing.
     """
     drop = float(np.min(load - residual))
-    energy = float(np.max((peak - residual) ** 2 / (2.0 * rate)))
+    energy = float(np.max((peak - residual) ** 2 / (2.0 * weakening_rate)))
     return 16.0 * column[0] * energy / (np.pi * drop) ** 2 if drop > 0.0 else np.inf

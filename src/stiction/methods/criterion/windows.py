@@ -70,7 +70,7 @@ class Window(NamedTuple):
 
 
 def windows_of(
-    problem: Problem, rate: float, stretches: Sequence[float] = STRETCHES
+    problem: Problem, W: float, stretches: Sequence[float] = STRETCHES
 ) -> list[Window]:
     """Return the critical windows for a weakening rate (Pa/m), or raise an `InputError`.
 
@@ -79,7 +79,7 @@ def windows_of(
     critical length in mode III. Every window must fit on the interface.
     """
     interface, solid = problem.interface, problem.solid
-    length = problem.nucleation_lengths(rate)[0]
+    length = problem.nucleation_lengths(W)[0]
     advice = "The local criterion does not hold there, use st.Equilibrium()"
     if not interface.is_plane:
         if length > interface.measure:
@@ -88,11 +88,11 @@ def windows_of(
                 f" interface ({interface.measure:.4g} m). {advice} or st.Rupture()"
             )
         weights = _line_weights(0.5 * length / interface.spacing, interface.size)
-        return _within_extent(interface, [Window(1.0, (length,), length, rate, *weights)])
+        return _within_extent(interface, [Window(1.0, (length,), length, W, *weights)])
     middle = float(1.0 / np.sqrt(1.0 - solid.poisson_ratio))
     windows = []
     for aspect in (middle * stretch for stretch in stretches):
-        window = _ellipse(problem.half_spaces, interface.shape, rate, aspect)
+        window = _ellipse(problem.half_spaces, interface.shape, W, aspect)
         if window is None:
             size = " x ".join(f"{side:.4g}" for side in interface.lengths)
             raise InputError(
@@ -135,17 +135,17 @@ def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=64)
 def _ellipse(
-    half_spaces: HalfSpaces, shape: tuple[int, ...], rate: float, aspect: float
+    half_spaces: HalfSpaces, shape: tuple[int, ...], W: float, aspect: float
 ) -> Window | None:
     symbol = half_spaces.symbol(shape)
-    return ellipse_window(symbol, shape, half_spaces.lengths, rate, aspect)
+    return ellipse_window(symbol, shape, half_spaces.lengths, W, aspect)
 
 
 def ellipse_window(
     symbol: Array,
     shape: tuple[int, ...],
     lengths: tuple[float, ...],
-    rate: float,
+    W: float,
     aspect: float,
 ) -> Window | None:
     """Return the smallest unstable ellipse with an aspect, or `None` if it meets its images.
@@ -165,7 +165,7 @@ def ellipse_window(
         x, y = steps_x * spacings[0], steps_y * spacings[1]
         distance = x[:, None] ** 2 + (aspect * y[None, :]) ** 2
         # 2.
-        ellipse = _smallest_unstable(column[nodes], distance, rate, stable_square, axis**2)
+        ellipse = _smallest_unstable(column[nodes], distance, W, stable_square, axis**2)
         if ellipse is not None:
             weight = np.zeros(shape)
             weight[nodes] = np.maximum(ellipse.vector, 0.0)
@@ -189,7 +189,7 @@ class Ellipse(NamedTuple):
 
 
 def _smallest_unstable(
-    column: Array, distance: Array, rate: float, stable_square: float, max_square: float
+    column: Array, distance: Array, W: float, stable_square: float, max_square: float
 ) -> Ellipse | None:
     """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or `None`, by bisection.
 
@@ -197,9 +197,9 @@ def _smallest_unstable(
     (0, 0). Ellipses up to `stable_square` are known to be stable.
     """
     symbol = np.fft.rfft2(column).real
-    operator = make_operator(symbol, rate, column.shape)._replace(
-        rate=np.zeros(column.size),
-        inverse=1.0 / (np.maximum(symbol.flatten(), 0.0) + 0.5 * rate),
+    operator = make_operator(symbol, W, column.shape)._replace(
+        weakening_rate=np.zeros(column.size),
+        inverse=1.0 / (np.maximum(symbol.flatten(), 0.0) + 0.5 * W),
     )
     radii = np.unique(distance)
     is_last_of_equals = np.append(np.diff(radii) > RADIUS_RTOL * radii[1:], True)
@@ -217,10 +217,10 @@ def _smallest_unstable(
             operator,
             inside.reshape(-1),
             vector.reshape(-1),
-            EIGENVECTOR_RTOL * rate,
+            EIGENVECTOR_RTOL * W,
             MAX_ELLIPSE_ITERATIONS,
         )
-        if value <= rate:
+        if value <= W:
             high, ellipse = middle, Ellipse(float(radii[middle]), value, vector)
         else:
             low, probe = middle, 2 * probe

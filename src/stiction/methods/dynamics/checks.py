@@ -23,7 +23,8 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn if the grid does not resolve the nucleation length, with the expected error."""
     # A power law through the largest errors of rough fields, relative to 126 nodes: 16 %, 3 % and
     # 0.6 % at 8, 16 and 32 nodes (docs/validation.md).
-    percent = 3.0 * (16.0 / min(problem.nodes_in_nucleation_length(rows.steepest_rate))) ** 2.4
+    nodes = min(problem.nodes_in_nucleation_length(rows.steepest_weakening_rate))
+    percent = 3.0 * (16.0 / nodes) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
     problem.warn_if_coarse(
         rows,
@@ -35,15 +36,15 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn about nodes that weaken too steeply for the grid, or whose stress would reverse slip."""
-    rates, interface, now = run.setting.nodes.weakening, run.medium.interface, state.now
+    W, interface, now = (run.setting.nodes.weakening, run.medium.interface, state.now)
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
-    steep = np.flatnonzero((state.slip > 0.0) & (rates > steepest))
+    steep = np.flatnonzero((state.slip > 0.0) & (steepest < W))
     if steep.size:
         warn_accuracy(
             f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
-            f"where the strength falls by up to {rates[steep].max():.3g} Pa/m, too steeply for this"
-            " grid. Take more nodes, or end the interface there (interface.extent)"
+            f"where the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
+            " for this grid. Take more nodes, or end the interface there (interface.extent)"
         )
     if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(
@@ -99,18 +100,19 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 def warn_of_fast_loading(run: Run, results: Sequence[Any]) -> None:
     """Warn if the load rises so fast that arrested events differ from events at a slow load."""
     arrested = sum(int(np.nan_to_num(result["arrested_events"])) for result in results)
-    lengths = run.medium.problem.nucleation_lengths(run.steepest_rate)
+    lengths = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     crossing = lengths[0] / run.medium.problem.solid.shear_wave_speed
     if not arrested:
         return
     loads = [float(result["applied_load"]) for result in results]
-    rate, scale = run.slope(run.first_slip()), run.scale_at(np.nanmax(loads))
-    rise = rate * crossing / scale
+    loading_rate, scale = run.slope(run.first_slip()), run.scale_at(np.nanmax(loads))
+    rise = loading_rate * crossing / scale
+    slow_rate = FAST_RISE / rise * loading_rate
     if rise > FAST_RISE:
         warn_accuracy(
             f"loading_rate: while shear waves cross the nucleation length, in {crossing:.2g} s, the"
             f" load rises by {rise:.2g} of the stress scale, {scale:.2g} Pa. Number and size of"
-            f" arrested events then depend on the rate; load at {FAST_RISE / rise * rate:.1g} Pa/s"
+            f" arrested events then depend on the rate; load at {slow_rate:.1g} Pa/s"
             " or slower to read them as quasi-static"
         )
 

@@ -138,12 +138,12 @@ def _begin_event(now: Any) -> None:
 
 
 @jit_inside
-def end_event(now: Any, unstable_rate: float, radiated: float) -> None:
+def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
     """Step 3: end an event, because the mean stress has recovered or the interface is calm."""
     if now.in_event:
         now.in_event = 0
         # Once all nodes have broken the event cannot have been arrested.
-        now.last_arrested = not now.all_broken and now.event_slip_rate > unstable_rate
+        now.last_arrested = not now.all_broken and now.event_slip_rate > unstable_slip_rate
         now.arrested_events += now.last_arrested
         _set_maximum(now, radiated)
 
@@ -164,7 +164,7 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
         # 3. The end of an instability.
         now.event_slip_rate = max(now.event_slip_rate, now.top_slip_rate)
         if now.whole_stress > now.maximum_stress:
-            end_event(now, thresholds.unstable_rate, radiated)
+            end_event(now, thresholds.unstable_slip_rate, radiated)
     elif now.whole_stress > now.maximum_stress:
         # 4. Another maximum, or the beginning of an instability.
         _set_maximum(now, radiated)
@@ -204,15 +204,16 @@ def finish_step(
     `increments` is the slip of the nodes in the step (m), and `strength` is their strength after
     the step (Pa). If the record has no rows, it stays empty.
     """
-    now, slip, rate, stress = state.diagnostics[0], state.slip, state.rate, state.stress
+    now = state.diagnostics[0]
+    slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival
     front_share = setting.thresholds.front_share
-    top_rate, top_node, weakened, slip_sum, change = -1.0, 0, 0, 0.0, 0.0
+    top_slip_rate, top_node, weakened, slip_sum, change = -1.0, 0, 0, 0.0, 0.0
     peak = setting.nodes.peak
     margin, margin_node = now.reverse_margin, now.reverse_node
     for i in range(slip.size):
-        if rate[i] > top_rate:
-            top_rate, top_node = rate[i], i
+        if slip_rate[i] > top_slip_rate:
+            top_slip_rate, top_node = slip_rate[i], i
         if stress[i] + strength[i] < margin:
             margin, margin_node = stress[i] + strength[i], i
         if slip[i] >= residual_slip[i]:
@@ -234,7 +235,7 @@ def finish_step(
         now.mean_stress = _mean_where_breakable(
             setting.nodes.peak, stress, setting.thresholds.breakable
         )
-    now.top_slip_rate, now.top_node = top_rate, top_node
+    now.top_slip_rate, now.top_node = top_slip_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / setting.thresholds.breakable
     now.mean_slip_rate = (
@@ -242,7 +243,7 @@ def finish_step(
     )
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, setting.thresholds, step.radiated)
-    if top_rate > setting.thresholds.unstable_rate and not now.event_begun:
+    if top_slip_rate > setting.thresholds.unstable_slip_rate and not now.event_begun:
         now.fast_since = now.time if np.isnan(now.fast_since) else now.fast_since
         now.fast_until = now.time
     if now.maximum_time == now.time:  # an event may begin here
@@ -253,6 +254,6 @@ def finish_step(
         record.steps[row] = now
         for s in range(setting.stations.size):
             node, station = setting.stations[s], record.stations[row, s]
-            station.slip, station.slip_rate = slip[node], rate[node]
+            station.slip, station.slip_rate = slip[node], slip_rate[node]
             station.shear_stress = stress[node]
     return fall

@@ -62,17 +62,17 @@ _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of t
 
 @jit_inside
 def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTables) -> None:
-    """Write equation (1), the stress if `rate_hat` acts for a step, to `tables.transfer`."""
-    rate_hat, response, shared = tables.rate_hat, tables.response, tables.shared
+    """Write equation (1), the stress if `slip_rate_hat` acts for a step, to `tables.transfer`."""
+    slip_rate_hat, response, shared = tables.slip_rate_hat, tables.response, tables.shared
     offset, step = grid.offset, tables.step
     static, dynamic = grid.stiffness[0], grid.stiffness[1]
     shared[0] = 0.0
     for q in range(1, shared.size):
-        o, rate = offset[q], rate_hat[q]
+        o, v_hat = offset[q], slip_rate_hat[q]
         g, b, c = static[q], response[q], dynamic[q]
-        slip = slip_hat[q] + step * rate  # at its end
-        real = c * (memory_sum[o] + b * rate.real) - g * slip.real
-        imaginary = c * (memory_sum[o + ENTRIES] + b * rate.imag) - g * slip.imag
+        slip = slip_hat[q] + step * v_hat  # at its end
+        real = c * (memory_sum[o] + b * v_hat.real) - g * slip.real
+        imaginary = c * (memory_sum[o + ENTRIES] + b * v_hat.imag) - g * slip.imag
         shared[q] = complex(real, imaginary)
     backward(grid.transform, shared, tables.transfer)
 
@@ -83,11 +83,12 @@ def _predict(
 ) -> None:
     """Step 1: write to `predicted` the rate at the end if the present rate acts all the time."""
     nodes, law = setting.nodes, setting.law
-    slip, rate, transfer, predicted = state.slip, state.rate, tables.transfer, tables.predicted
+    slip, slip_rate = state.slip, state.slip_rate
+    transfer, predicted = tables.transfer, tables.predicted
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial, step = nodes.profile, nodes.initial, tables.step
     for i in range(slip.size):
-        next_slip = slip[i] + step * rate[i]
+        next_slip = slip[i] + step * slip_rate[i]
         limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
         predicted[i] = max(at_rest - limit, 0.0) / impedance
@@ -102,21 +103,21 @@ def _correct(
     Return the work (without the cell) and the sum of V.
     """
     nodes, law, step = setting.nodes, setting.law, tables.step
-    slip, rate, stress = state.slip, state.rate, state.stress
+    slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     transfer, predicted, increments = tables.transfer, tables.predicted, tables.increments
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial = nodes.profile, nodes.initial
     work, total = 0.0, 0.0
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     for i in range(slip.size):
-        increment = 0.5 * step * (rate[i] + predicted[i])
+        increment = 0.5 * step * (slip_rate[i] + predicted[i])
         next_slip = slip[i] + increment
         limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
         v = max(at_rest - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])
-        increments[i], tables.strength[i] = 0.5 * step * (rate[i] + v), limit
-        slip[i], rate[i], stress[i] = next_slip, v, at_rest - impedance * v
+        increments[i], tables.strength[i] = 0.5 * step * (slip_rate[i] + v), limit
+        slip[i], slip_rate[i], stress[i] = next_slip, v, at_rest - impedance * v
         total += v
     return work, total
 
@@ -128,7 +129,7 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     Slip rates due to waves come and go. Creep is slow, or as fast as when the count
     began.
     """
-    scale, before, top = now.scale, now.calm_rate, now.top_slip_rate
+    scale, before, top = now.scale, now.calm_slip_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
     # Once all nodes have broken only the load drives steady slip, however fast it is.
@@ -136,7 +137,7 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     if quiet or (steady and slow):
         now.calm_steps += 1
     else:
-        now.calm_steps, now.calm_rate = 0, top
+        now.calm_steps, now.calm_slip_rate = 0, top
     return now.calm_steps >= thresholds.calm_count
 
 
@@ -155,34 +156,34 @@ def explicit_steps(
     """
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
-    rate_hat, slip_hat = tables.rate_hat, state.slip_hat
+    slip_rate_hat, slip_hat = tables.slip_rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
     while taken < count and reason == Reason.DONE and not (now.event_begun or now.event_calm):
         time = now.time + step
         load = value_at(setting.load, time)
         # 1. Predict.
-        forward(grid.transform, state.rate, rate_hat)
+        forward(grid.transform, state.slip_rate, slip_rate_hat)
         _transfer(grid, slip_hat, state.memory_sum, tables)
         _predict(state, setting, tables, load, impedance)
         # 2. Correct.
         forward(grid.transform, tables.predicted, tables.shared)
-        for q in range(rate_hat.size):
-            rate_hat[q] = 0.5 * (rate_hat[q] + tables.shared[q])
+        for q in range(slip_rate_hat.size):
+            slip_rate_hat[q] = 0.5 * (slip_rate_hat[q] + tables.shared[q])
         _transfer(grid, slip_hat, state.memory_sum, tables)
         work, total = _correct(state, setting, tables, load, impedance)
         if not np.isfinite(total):
             for i in range(n):
-                if not np.isfinite(state.rate[i]):
+                if not np.isfinite(state.slip_rate[i]):
                     now.non_finite_node = i
                     break
             now.time = time
             reason = Reason.NOT_FINITE
             break
         # 3. Advance slip and memory of the modes.
-        for q in range(rate_hat.size):
-            slip_hat[q] += step * rate_hat[q]
-        pack(grid.offset, rate_hat, tables.packed)
+        for q in range(slip_rate_hat.size):
+            slip_hat[q] += step * slip_rate_hat[q]
+        pack(grid.offset, slip_rate_hat, tables.packed)
         advance_memory(
             state.memory, tables.table, tables.packed, state.memory_sum,
             grid.poles.size, grid.multiplicity,
@@ -201,7 +202,7 @@ def explicit_steps(
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED
         elif calm:
-            end_event(now, thresholds.unstable_rate, radiated)
+            end_event(now, thresholds.unstable_slip_rate, radiated)
             now.event_calm = now.event_open
             if thresholds.rest_stop and now.instabilities > 0:
                 reason = Reason.AT_REST

@@ -149,7 +149,7 @@ def _assemble(
         trial[i] += attempt.load * profile[i] + initial[i]
         largest = max(largest, abs(trial[i]))
         tables.increment[i] = state.past[i] * size
-        tables.slipping[i] = 1 if state.rate[i] > 0.0 else 0
+        tables.slipping[i] = 1 if state.slip_rate[i] > 0.0 else 0
     # Round-off of the transforms limits the accuracy.
     return max(_SOLVED_STRESS * state.diagnostics[0].scale, _ROUND_OFF_SHARE * largest)
 
@@ -209,25 +209,25 @@ def _accept(
     """Step 5: take the step in place and return it. Write the strength after it."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
     law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.transfer
-    rate_hat, slope_hat, transfer_hat = tables.rate_hat, tables.slope_hat, tables.work
+    slip_rate_hat, slope_hat, transfer_hat = tables.slip_rate_hat, tables.slope_hat, tables.work
     stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
-    forward(grid.transform, u, rate_hat)
-    for q in range(rate_hat.size):
-        slip_hat[q] += rate_hat[q]
-        mean = complex(rate_hat[q].real / size, rate_hat[q].imag / size)
-        rate_hat[q], past = mean, tables.past_hat[q]
+    forward(grid.transform, u, slip_rate_hat)
+    for q in range(slip_rate_hat.size):
+        slip_hat[q] += slip_rate_hat[q]
+        mean = complex(slip_rate_hat[q].real / size, slip_rate_hat[q].imag / size)
+        slip_rate_hat[q], past = mean, tables.past_hat[q]
         slope_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
     advance_with_ramp(grid, state.memory, tables)
     transfer_hat[0] = 0.0
     for q in range(1, transfer_hat.size):
         response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
-        memory, v, a, slip = tables.memory_sum[q], rate_hat[q], slope_hat[q], slip_hat[q]
+        memory, v, a, slip = tables.memory_sum[q], slip_rate_hat[q], slope_hat[q], slip_hat[q]
         g, c = stiffness[0, q], stiffness[1, q]
         real = c * (memory.real + response * v.real + ramp * a.real) - g * slip.real
         imaginary = c * (memory.imag + response * v.imag + ramp * a.imag) - g * slip.imag
         transfer_hat[q] = complex(real, imaginary)
     backward(grid.transform, transfer_hat, transfer)
-    slip, rate, past, stress = state.slip, state.rate, state.past, state.stress
+    slip, slip_rate, past, stress = state.slip, state.slip_rate, state.past, state.stress
     peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     profile, initial = nodes.profile, nodes.initial
     mean_load = 0.5 * (load + state.diagnostics[0].load)
@@ -235,9 +235,9 @@ def _accept(
     for i in range(u.size):
         work += u[i] * (mean_load * profile[i] + initial[i])
         slip[i] += u[i]
-        rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
+        slip_rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
-        stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * rate[i]
+        stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * slip_rate[i]
         tables.strength[i] = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
     return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
 

@@ -49,7 +49,7 @@ from stiction.problem.friction.kernels import strengths
 # Shares of the stress scale:
 _OVERSTRESS = 1e-6  # stress above the strength from which a run begins with explicit steps
 _RESTING_STRESS = 1e-9  # Z V below which the interface rests
-_STOPPED_SHARE = 0.1  # slip rate, over `unstable_rate`, above which an interface slides on
+_STOPPED_SHARE = 0.1  # slip rate, over `unstable_slip_rate`, above which an interface slides on
 _REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
 _STEPS_BETWEEN_CHECKS = 1000  # steps after which a run checks whether it has ended
 
@@ -68,7 +68,7 @@ class Run:
     medium: Medium
     setting: Setting
     stop: str  # as `Rupture.stop`
-    steepest_rate: float  # largest weakening rate at any slip of nodes that may break, Pa/m
+    steepest_weakening_rate: float  # largest at any slip of nodes that may break, Pa/m
     # Load below which no patch runs away: the mean strength of the weakest nodes
     # that make up half a nucleation length, Pa. A few nodes of almost no strength
     # hardly lower this mean.
@@ -139,11 +139,11 @@ class Run:
         stress = self.elastic_stress(slip_hat, load)
         limit = self.strength_after(delta)
         excess = stress - limit
-        rate = np.maximum(excess, 0.0) / impedance
+        slip_rate = np.maximum(excess, 0.0) / impedance
         # A node that has just reached its strength has not begun to slip: drop
         # round-off.
-        rate[rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
-        stress = stress - impedance * rate
+        slip_rate[slip_rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
+        stress = stress - impedance * slip_rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
         now = diagnostics[0]
         now["time"] = now["maximum_time"] = time
@@ -154,7 +154,7 @@ class Run:
         weakens = np.isfinite(limit)
         now["strength_change"] = (limit[weakens] - nodes.peak[weakens]).sum() / limit.size
         # Stress above the strength counts as strength.
-        now["maximum_strength"] = now["strength_change"] + impedance * rate.mean()
+        now["maximum_strength"] = now["strength_change"] + impedance * slip_rate.mean()
         now["maximum_breakable"] = now["maximum_stress"]
         if thresholds.held:
             now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)
@@ -168,7 +168,7 @@ class Run:
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
         now["reverse_margin"], now["reverse_node"] = margin.min(), int(np.argmin(margin))
-        now["top_slip_rate"], now["mean_slip"] = rate.max(), self.mean(delta)
+        now["top_slip_rate"], now["mean_slip"] = slip_rate.max(), self.mean(delta)
         now["weakened_nodes"] = np.count_nonzero(delta >= nodes.residual_slip)
         scale = max(0.0, self.scale_at(load))
         now["scale"] = scale
@@ -176,15 +176,15 @@ class Run:
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
-        explicit = thresholds.explicit_only or impedance * rate.max() > _OVERSTRESS * scale
+        explicit = thresholds.explicit_only or impedance * slip_rate.max() > _OVERSTRESS * scale
         now["phase"] = Phase.EXPLICIT if explicit else Phase.IMPLICIT
         now["next_size"] = min(max(size, first), LARGEST_STEP)
         return RuptureState(
             slip=delta,
-            rate=rate,
+            slip_rate=slip_rate,
             stress=stress,
             slip_hat=slip_hat,
-            past=rate.copy(),
+            past=slip_rate.copy(),
             memory=memory,
             memory_sum=memory_sum,
             arrival=arrival,
@@ -211,7 +211,8 @@ class Run:
             not state.explicit
             and state.now["time"] >= times[-1]
             and values[-1] <= values[-2]
-            and self.medium.impedance * state.rate.max() <= _RESTING_STRESS * state.now["scale"]
+            and self.medium.impedance * state.slip_rate.max()
+            <= _RESTING_STRESS * state.now["scale"]
         )
         return "rest" if self.stop != "time" and resting else None
 
@@ -266,7 +267,7 @@ class Run:
             slip, load, work = state.slip, "load", "work"
         thresholds = self.setting.thresholds
         slides = rests and now["all_broken"] and not thresholds.held
-        slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_rate
+        slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
         if now["event_open"] and np.isfinite(now["fast_since"]) and not slides:
             event = np.zeros((), event_type(slip.size))
             event["time"] = now["event_time"]
@@ -311,11 +312,11 @@ class Run:
     def _to_explicit(self, state: RuptureState) -> None:
         tables = self._explicit_tables()
         to_explicit(self.medium.grid, state, tables.step, tables.table, state.memory_sum)
-        state.now["calm_steps"], state.now["calm_rate"] = 0, state.rate.max()
+        state.now["calm_steps"], state.now["calm_slip_rate"] = 0, state.slip_rate.max()
 
     def _to_implicit(self, state: RuptureState) -> None:
         to_implicit(self.medium.grid, state, self.medium.step)
-        state.past[:] = state.rate
+        state.past[:] = state.slip_rate
         state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
         state.now["two_step"] = 0  # the first implicit step is of first order
-        state.now["previous_radiated"] = self.medium.impedance * state.rate.mean()
+        state.now["previous_radiated"] = self.medium.impedance * state.slip_rate.mean()

@@ -155,15 +155,15 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
     decay, gain = np.exp(z), kappa * phi(z)
     response = float(np.sum(kernel.weights * gain).real)
     state = np.eye(2 + 2 * pairs)
-    rate, slip = state[0], state[1]
+    slip_rate, slip = state[0], state[1]
     memory = state[2 : 2 + pairs] + 1j * state[2 + pairs :]
     memory_sum = ((kernel.weights * decay) @ memory).real
-    predicted = -stiffness * (slip + kappa * rate) + memory_sum + response * rate
-    mean = 0.5 * (rate + predicted)
+    predicted = -stiffness * (slip + kappa * slip_rate) + memory_sum + response * slip_rate
+    mean = 0.5 * (slip_rate + predicted)
     slip = slip + kappa * mean
     memory = decay[:, None] * memory + gain[:, None] * mean
-    rate = -stiffness * slip + memory_sum + response * mean
-    return np.vstack([rate, slip, memory.real, memory.imag])
+    slip_rate = -stiffness * slip + memory_sum + response * mean
+    return np.vstack([slip_rate, slip, memory.real, memory.imag])
 
 
 def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:

@@ -173,7 +173,7 @@ def pack(offset: Array, spectrum: Array, packed: Array) -> None:
 
 @jit_inside
 def advance_memory(
-    memory: Array, table: Array, rate: Array, memory_sum: Array, pairs: int, multiplicity: int
+    memory: Array, table: Array, V_hat: Array, memory_sum: Array, pairs: int, multiplicity: int
 ) -> None:
     """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
@@ -189,7 +189,7 @@ def advance_memory(
             block = table_block * multiplicity + copy
             y = memory[block * size :][:size]
             v, c = (
-                rate[block * TWO_ROWS :][:TWO_ROWS],
+                V_hat[block * TWO_ROWS :][:TWO_ROWS],
                 memory_sum[block * TWO_ROWS :][:TWO_ROWS],
             )
             for j in range(TWO_ROWS):
@@ -360,9 +360,9 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
 
 @jit_inside
 def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
-    """Step 2: set psi <- E psi + B V + R a with V = `rate_hat` (m/s), a = `slope_hat` (m/s²)."""
+    """Step 2: set psi <- E psi + B V + R a with V = `slip_rate_hat`, a = `slope_hat` (m/s²)."""
     pairs, multiplicity = grid.poles.size, grid.multiplicity
-    pack(grid.offset, tables.rate_hat, tables.packed)
+    pack(grid.offset, tables.slip_rate_hat, tables.packed)
     pack(grid.offset, tables.slope_hat, tables.second_packed)
     for block in range(memory.size // (FOUR_ROWS * pairs)):
         v, a = (
@@ -387,20 +387,22 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
                 )
 
 
-def grown_memory(grid: Grid, memory: Floats, rate_hat: Spectrum, growth: float) -> Spectrum:
+def grown_memory(
+    grid: Grid, memory: Floats, slip_rate_hat: Spectrum, growth: float
+) -> Spectrum:
     """Set psi = V/(growth - s |k| c_s) for a slip rate that has always grown as exp(growth t).
 
     Returns Re sum w psi for all modes.
     """
-    total = np.zeros(rate_hat.size, dtype=np.complex128)
-    rate, entry, pairs = rate_hat[1:], grid.entry[1:], grid.poles.size
+    total = np.zeros(slip_rate_hat.size, dtype=np.complex128)
+    slip_rate, entry, pairs = slip_rate_hat[1:], grid.entry[1:], grid.poles.size
     first = grid.offset[1:] // TWO_ROWS * pairs * FOUR_ROWS + grid.offset[1:] % ENTRIES
     for p in range(pairs):
         share = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]
         gain = 1.0 / (growth - grid.poles[p] * grid.frequency[entry])
         place = first + p * FOUR_ROWS
-        for row, signal in enumerate((rate.real, rate.imag)):
+        for row, signal in enumerate((slip_rate.real, slip_rate.imag)):
             memory[place + row * TWO_ROWS] = gain.real * signal
             memory[place + row * TWO_ROWS + ENTRIES] = gain.imag * signal
-        total[1:] += share * (grid.weights[p] * gain).real * rate
+        total[1:] += share * (grid.weights[p] * gain).real * slip_rate
     return total

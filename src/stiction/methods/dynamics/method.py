@@ -30,7 +30,7 @@ from stiction.methods.dynamics.summary import arrested_events, scalars, summary
 from stiction.methods.equilibrium.events import event_table, event_variables, of_samples
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables
-from stiction.problem.sample import Sample, steepest_rate
+from stiction.problem.sample import Sample, steepest_weakening_rate
 
 ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
@@ -296,16 +296,18 @@ class Rupture:
         """Return a solver for samples of a problem. The memory kernel is fitted once."""
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.program(problem))
-        medium, rate = self.medium(problem), self.loading_rate
-        from_equilibrium = self.start == "equilibrium" and self.implicit and rate is not None
-        static = static_program(problem) if from_equilibrium else None
+        medium, loading_rate = self.medium(problem), self.loading_rate
+        from_rest = self.start != "equilibrium" or not self.implicit
+        static = None if from_rest or loading_rate is None else static_program(problem)
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_if_coarse(problem, rows)
             summaries = []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
-                start = slow_start(static, run, rows, i, rate) if static and rate else None
+                start = None
+                if static and loading_rate:
+                    start = slow_start(static, run, rows, i, loading_rate)
                 summaries.append(self._summary_of(run, start, rows, i))
             checks.warn_of_survival(self.stop, summaries)
             checks.warn_of_fast_loading(run, summaries)
@@ -370,7 +372,7 @@ def make_run(
         )
     profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
-    steepest = steepest_rate(strength[None], residual[None], weakening[None])
+    steepest = steepest_weakening_rate(strength[None], residual[None], weakening[None])
     steepest *= friction.steepest_slope / friction.initial_slope
     load = method.load
     if load is None:
@@ -435,7 +437,7 @@ def _thresholds(
         slip_step=method.slip_step,
         load_step=method.load_step,
         smallest_step=_EXPLICIT_STEPS_IN_IMPLICIT * medium.step,
-        unstable_rate=UNSTABLE_STRESS * typical / medium.impedance,
+        unstable_slip_rate=UNSTABLE_STRESS * typical / medium.impedance,
         front_share=float(front_share),
         curved=not friction.linear,
         explicit_only=not method.implicit,

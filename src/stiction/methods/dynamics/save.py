@@ -229,17 +229,17 @@ class Recorder:
         frame: dict[str, Any] = {name: float(now[name]) for name in _FROM_DIAGNOSTICS}
         frame |= {
             "mean_slip": float(run.mean(state.slip)),
-            "top_slip_rate": float(state.rate.max()),
+            "top_slip_rate": float(state.slip_rate.max()),
             "weakened_fraction": float(now["weakened_nodes"])
             / run.setting.thresholds.breakable,
             "seismic_moment": moment_of(medium.problem, state.slip),
-            "moment_rate": moment_of(medium.problem, state.rate),
+            "moment_rate": moment_of(medium.problem, state.slip_rate),
         }
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             frame |= energy_balance(run, state)
         fields = {
             "slip": state.slip,
-            "slip_rate": state.rate,
+            "slip_rate": state.slip_rate,
             "shear_stress": state.stress,
             "strength": run.strength_after(state.slip),
         }

@@ -191,11 +191,11 @@ def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, 
     """Return the spectrum of the highest instability, up to the next one or the end of the run."""
     problem, interface = run.medium.problem, run.medium.interface
     stiffness = problem.solid.shear_modulus * interface.breakable_measure
-    rate = stiffness * dataset["step_mean_slip_rate"].values
+    moment_rate = stiffness * dataset["step_mean_slip_rate"].values
     time, onset = dataset["step_time"].values, float(state.now["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]
     inside = (time >= onset) & (time <= min(later, default=np.inf))
-    return rate_spectrum(problem, time[inside], rate[inside])
+    return rate_spectrum(problem, time[inside], moment_rate[inside])
 
 
 def _complete(

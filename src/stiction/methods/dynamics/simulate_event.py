@@ -146,7 +146,7 @@ class EventRecord:
             "slip": waves.slip.copy(),
             "slip_rate": waves.slip_rate.copy(),
             "shear_stress": (waves.stress if self.frames else self.event.start) + initial,
-            "strength": pieces.strength - pieces.rate * waves.slip + initial,
+            "strength": pieces.strength - pieces.weakening_rate * waves.slip + initial,
         }
         self.frames.append(
             {name: fields[name] for name in self.save.fields}
@@ -173,10 +173,10 @@ class EventRecord:
         """Return the energies of both blocks, J/m, in the middle of the last step."""
         # Rates are known in the middle of a step, and displacements at its end.
         mesh, waves = self.event.mesh, self.event.waves
-        rates = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
+        velocities = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
         lag = mesh.viscous_time + 0.5 * mesh.step
         # w holds displacement and viscous time times rate, at the end of the step.
-        w = np.hstack([waves.u, waves.v]).astype(float) - lag * rates
+        w = np.hstack([waves.u, waves.v]).astype(float) - lag * velocities
         strain = 0.0
         for row, matrix in enumerate(self._layers):
             corners = np.concatenate([w[row], w[row + 1]])
@@ -186,7 +186,7 @@ class EventRecord:
         speed = waves.now[SPEED]
         if np.isfinite(mesh.stiffness):
             strain += mesh.stiffness * (waves.now[TRAVEL] - 0.5 * mesh.step * speed) ** 2
-        kinetic = (mesh.mass[:, None] * rates**2).sum() + mesh.drive_mass * speed**2
+        kinetic = (mesh.mass[:, None] * velocities**2).sum() + mesh.drive_mass * speed**2
         work = mesh.spacing * self.event.start @ added
         friction = 2.0 * waves.now[FRICTION]
         return {
@@ -212,11 +212,11 @@ class EventRecord:
         values |= {
             "peak_strength": self.rows.strength[0],
             "arrival_time": arrival,
-            "block_velocity": np.array([rates for _, rates in self.blocks]),
+            "block_velocity": np.array([velocities for _, velocities in self.blocks]),
             "critical_load": self.event.before.load,
             "critical_position": interface.x[first],
             "onset_time": arrival[first] if reached else np.nan,
-            **front_speeds(problem, self.rows.steepest_rate, arrival),
+            **front_speeds(problem, self.rows.steepest_weakening_rate, arrival),
         }
         variables = {name: along(interface, FIELDS[name]) for name in self.save.fields}
         variables |= OVER_TIME | OF_EVENT

@@ -56,11 +56,11 @@ def static_program(problem: Problem) -> DenseProgram | None:
 
 
 def slow_start(
-    program: DenseProgram, run: Run, rows: Sample, number: int, rate: float
+    program: DenseProgram, run: Run, rows: Sample, number: int, loading_rate: float
 ) -> RuptureState | None:
     """Return the state closest to the onset with a small error, or `None` without such a state.
 
-    `number` is the row of the sample, `rate` the loading rate (Pa/s).
+    `number` is the row of the sample, the loading rate is in Pa/s.
     """
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):
@@ -71,14 +71,14 @@ def slow_start(
         return None
     # 1. The onset, and the first distance.
     allowed = _MAX_ERROR * run.scale_at(onset.load)
-    crossing = program.problem.nucleation_lengths(run.steepest_rate)[0] / (
+    crossing = program.problem.nucleation_lengths(run.steepest_weakening_rate)[0] / (
         program.problem.solid.shear_wave_speed
     )
-    distance = max(_CROSSINGS * crossing * rate, 1e-6 * allowed)
+    distance = max(_CROSSINGS * crossing * loading_rate, 1e-6 * allowed)
     for _ in range(_MAX_TRIALS):
         if onset.load - (1.0 + _RATE_SHARE) * distance <= run.first_load:  # 6.
             return None
-        state = _state_at(program, run, static, onset.load, distance, rate)
+        state = _state_at(program, run, static, onset.load, distance, loading_rate)
         # 5. Close enough, or a greater distance.
         if state is None:
             distance *= 4.0
@@ -95,7 +95,7 @@ def _state_at(
     static: StaticSample,
     onset: float,
     distance: float,
-    rate: float,
+    loading_rate: float,
 ) -> RuptureState | None:
     """Steps 2 to 5: return the state at a distance (Pa) below the onset. `None` if unknown.
 
@@ -113,21 +113,21 @@ def _state_at(
     arrived = present.slip[weakens] >= front[weakens]
     if np.any(arrived) or np.any(present.slip[~weakens] > 0.0):
         return None
-    interval, growth = load_rise / rate, 0.5 * rate / distance
-    mean_rate = np.maximum(present.slip - before.slip, 0.0) / interval
-    slip_rate = mean_rate * (1.0 + 0.5 * growth * interval)
+    interval, growth = load_rise / loading_rate, 0.5 * loading_rate / distance
+    mean_slip_rate = np.maximum(present.slip - before.slip, 0.0) / interval
+    slip_rate = mean_slip_rate * (1.0 + 0.5 * growth * interval)
     # 3. and 4. Memory, load and stress.
     radiated = run.medium.impedance * float(slip_rate.mean())
     applied = load + radiated / run.setting.mean_profile
-    state = run.start(applied / rate, present.slip)
-    rate_hat = run.medium.interface.transform(slip_rate)
-    memory = grown_memory(grid, state.memory, rate_hat, growth)
+    state = run.start(applied / loading_rate, present.slip)
+    slip_rate_hat = run.medium.interface.transform(slip_rate)
+    memory = grown_memory(grid, state.memory, slip_rate_hat, growth)
     stress = run.elastic_stress(state.slip_hat, applied)
     stress += run.medium.interface.inverse_transform(grid.stiffness[1] * memory)
     stress -= run.medium.impedance * slip_rate
     # 5. The difference of stress and strength estimates the error.
     missed = np.abs(stress - run.strength_after(present.slip))[present.slip > 0.0]
-    state.rate[:], state.past[:], state.stress[:] = slip_rate, mean_rate, stress
+    state.slip_rate[:], state.past[:], state.stress[:] = slip_rate, mean_slip_rate, stress
     now = state.now
     now["phase"], now["two_step"] = Phase.IMPLICIT, 1
     now["previous_size"], now["top_slip_rate"] = interval, slip_rate.max()

@@ -239,7 +239,7 @@ class RuptureSolver(OnsetSolver):
     ) -> dict[str, Any]:
         speeds = dict.fromkeys(SPEEDS, np.nan)
         if path.arrival is not None:
-            speeds = front_speeds(self.problem, rows.steepest_rate, path.arrival)
+            speeds = front_speeds(self.problem, rows.steepest_weakening_rate, path.arrival)
         return super()._values(rows, row, sample, path) | speeds
 
 
@@ -249,9 +249,9 @@ def refuse_overstress(rows: Sample) -> None:
         raise InputError("initial_stress: on specimens, it must not be above the strength")
 
 
-def front_speeds(problem: Problem, steepest_rate: float, arrival: Array) -> dict[str, float]:
+def front_speeds(problem: Problem, weakening_rate: float, arrival: Array) -> dict[str, float]:
     """Return the largest and the median speed of a front, m/s."""
-    nucleation = problem.nucleation_lengths(steepest_rate)[0]
+    nucleation = problem.nucleation_lengths(weakening_rate)[0]
     return {
         name: front_speed(name, problem.interface, 0, arrival, nucleation) for name in SPEEDS
     }

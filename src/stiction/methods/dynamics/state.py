@@ -132,7 +132,7 @@ DIAGNOSTICS = np.dtype(
         ("explicit_steps", "i8"),
         ("implicit_steps", "i8"),
         ("calm_steps", "i8"),  # calm steps in a row
-        ("calm_rate", "f8"),  # largest slip rate when the row began, m/s
+        ("calm_slip_rate", "f8"),  # largest slip rate when the row began, m/s
         # The whole run so far.
         ("scale", "f8"),  # stress scale of the largest load
         ("start_load", "f8"),  # load at the start of the run
@@ -182,7 +182,7 @@ class Thresholds(NamedTuple):
     slip_step: float  # weakening of a node in an implicit step, in units of tau_p - tau_r
     load_step: float  # largest rise of the load in a step, in units of the stress scale
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
-    unstable_rate: float  # slip rate, m/s, that only an instability reaches
+    unstable_slip_rate: float  # slip rate, m/s, that only an instability reaches
     front_share: float  # slip at which a front arrives, as a share of `Nodes.residual_slip`
     curved: bool  # whether the law is not linear; a linear law's pieces are met to the bit
     explicit_only: bool
@@ -234,7 +234,7 @@ class RuptureState(NamedTuple):
     """Variables of a run. Runs from equal states are equal to the bit."""
 
     slip: Floats  # (nodes,), m; flat, also on a plane
-    rate: Floats  # m/s
+    slip_rate: Floats  # m/s
     stress: Floats  # Pa
     slip_hat: Spectrum  # (modes,) real transform of the slip
     past: Floats  # mean slip rate in the last implicit step, m/s
@@ -268,7 +268,7 @@ class ExplicitTables(NamedTuple):
     table: Array  # [block][pair][4][64]: E = exp(s |k| c_s h) and w E B, B = h phi(s |k| c_s h)
     response: Array  # (modes,): Re sum_p w B, weight of the current slip rate, s
     packed: Array
-    rate_hat: Spectrum
+    slip_rate_hat: Spectrum
     shared: Spectrum
     transfer: Array  # (nodes,), like the rest
     predicted: Array  # slip rate at the end of the step, if the rate before acts all along
@@ -288,7 +288,7 @@ class ImplicitTables(NamedTuple):
     inverse: Array
     memory_sum: Spectrum  # (modes,), like the next four
     past_hat: Spectrum
-    rate_hat: Spectrum
+    slip_rate_hat: Spectrum
     slope_hat: Spectrum  # of the slip rate in the step
     work: Spectrum
     trial_stress: Array  # (nodes,), like the rest up to `slipping`

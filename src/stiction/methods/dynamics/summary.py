@@ -63,7 +63,7 @@ def scalars(interface: Interface) -> dict[str, Variable]:
 
 
 def rate_spectrum(
-    problem: Problem, time: Array, rate: Array
+    problem: Problem, time: Array, moment_rate: Array
 ) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
     """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N, or N m on a plane.
 
@@ -82,8 +82,8 @@ def rate_spectrum(
     for i, omega in enumerate(2.0 * np.pi * frequencies):
         # Integrated twice by parts: a straight line leaves the changes of its slope.
         phases = np.exp(-1j * omega * (time - time[0]))
-        ends = rate[0] * phases[0] - rate[-1] * phases[-1]
-        bends = np.diff(phases) @ (np.diff(rate) / steps)
+        ends = moment_rate[0] * phases[0] - moment_rate[-1] * phases[-1]
+        bends = np.diff(phases) @ (np.diff(moment_rate) / steps)
         amplitude[i] = abs(ends / (1j * omega) + bends / omega**2)
     variable = per_area(problem.interface, SPECTRUM)
     return (frequencies, Variable("Hz", "frequency", ("frequency",))), (amplitude, variable)
@@ -140,7 +140,7 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
 def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
     """Return the speed of the front, m/s, along each axis on the line through the onset."""
     interface = run.medium.interface
-    nucleation = run.medium.problem.nucleation_lengths(run.steepest_rate)
+    nucleation = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
     speeds = []

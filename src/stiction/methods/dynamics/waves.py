@@ -115,13 +115,13 @@ def _force(
 
 
 @jit_inside
-def _move(w: Any, rate: Any, force: Any, keep: Any, gain: Any, step: Any, lag: Any) -> None:
+def _move(w: Any, velocity: Any, force: Any, keep: Any, gain: Any, step: Any, lag: Any) -> None:
     """Step 2: move a row of nodes by a step. `lag` is the viscous time."""
     for i in range(w.shape[0]):
-        before = rate[i]
+        before = velocity[i]
         after = keep * before + gain * force[i]
         w[i] += (step + lag) * after - lag * before
-        rate[i] = after
+        velocity[i] = after
 
 
 @jit_inside
@@ -137,11 +137,11 @@ def _slide(
 ) -> int:
     """Step 3: move the nodes of the interface. Return how many nodes never slipped."""
     dx, step = mesh.spacing, mesh.step
-    slip, rates, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
+    slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
     never, fast = 0, False
     for i in range(slip.shape[0]):
         # In double precision, since slip adds up many small increments.
-        before = np.float64(rates[i])
+        before = np.float64(velocities[i])
         strength = strength_at(sample, slip, i)
         free = keep * before + gain * (force[i] + dx * (start[i] - waves.corrected[i]))
         after = free - gain * dx * strength
@@ -158,7 +158,7 @@ def _slide(
         # The work of friction, with the mean of the rates before and after the step.
         now[FRICTION] += 0.5 * dx * step * waves.stress[i] * (before + after)
         u[i] += np.float32(step * after + mesh.viscous_time * (after - before))
-        rates[i] = np.float32(after)
+        velocities[i] = np.float32(after)
         never += slip[i] == 0.0
         fast |= 2.0 * after > now[FAST_RATE]
     if fast:
@@ -196,10 +196,10 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     now[SPEED] = after
     now[TRAVEL] += step * after
     now[FORCE] = -mesh.stiffness * now[TRAVEL]
-    w, rate = np.float32(now[TRAVEL] + mesh.viscous_time * after), np.float32(after)
+    w, velocity = np.float32(now[TRAVEL] + mesh.viscous_time * after), np.float32(after)
     for i in range(force.shape[0]):
         waves.u[top, i] = w
-        waves.u_rate[top, i] = rate
+        waves.u_rate[top, i] = velocity
 
 
 @jit_inside

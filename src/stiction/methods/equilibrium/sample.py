@@ -108,13 +108,13 @@ class StaticSample(NamedTuple):
     excess: Array  # tau_p - tau_i, Pa
     residual: Array  # tau_r - tau_i, Pa
     profile: Array  # of the load
-    rate: Array  # W at zero slip, Pa/m
+    weakening_rate: Array  # W at zero slip, Pa/m
     critical: Array  # d_c, the slip at which the strength is residual, m
     pieces: Pieces
 
 
 def make_sample(
-    excess: Array, residual: Array, profile: Array, rate: Array, pieces: Pieces
+    excess: Array, residual: Array, profile: Array, W: Array, pieces: Pieces
 ) -> StaticSample:
     """Return a sample, or many samples along the first axis.
 
@@ -127,10 +127,10 @@ def make_sample(
         scale = scale.mean(axis=-1, keepdims=True, where=np.isfinite(excess))
         constant = ~(fall > CONSTANT_STRENGTH_RTOL * scale)
         residual = np.where(constant, excess, residual)
-        fall, rate = np.where(constant, 0.0, (fall, rate))
+        fall, W = np.where(constant, 0.0, (fall, W))
     with np.errstate(invalid="ignore", divide="ignore"):
-        critical = np.where(rate > 0.0, pieces.first_slope * fall / rate, 0.0)
-    return StaticSample(excess, residual, profile, rate, critical, pieces)
+        critical = np.where(W > 0.0, pieces.first_slope * fall / W, 0.0)
+    return StaticSample(excess, residual, profile, W, critical, pieces)
 
 
 def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
@@ -141,14 +141,14 @@ def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> S
     residual = (rows.residual_strength[row] - initial).reshape(shape)
     # Copy the rate: numba would compile each kernel again for a read-only array,
     # as laws return.
-    rate = rows.weakening_rate[row].reshape(shape).copy()
-    return make_sample(excess, residual, rows.load_profile.flatten(), rate, pieces)
+    weakening_rate = rows.weakening_rate[row].reshape(shape).copy()
+    return make_sample(excess, residual, rows.load_profile.flatten(), weakening_rate, pieces)
 
 
 def row_of(samples: StaticSample, row: int) -> StaticSample:
     """Return a sample from a batch that `sample_of` made. This saves a tenth of the time."""
-    excess, residual, profile, rate, critical, pieces = samples
-    return StaticSample(excess[row], residual[row], profile, rate[row], critical[row], pieces)
+    excess, residual, profile, W, critical, pieces = samples
+    return StaticSample(excess[row], residual[row], profile, W[row], critical[row], pieces)
 
 
 class Present(NamedTuple):
@@ -156,7 +156,7 @@ class Present(NamedTuple):
 
     piece: NDArray[np.int64]
     strength: Array
-    rate: Array
+    weakening_rate: Array
 
 
 @dataclass
@@ -287,7 +287,8 @@ def start_of(sample: StaticSample, i: int, piece: int) -> float:
 def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
     """Return the strength of node i minus initial stress after some slip, Pa."""
     piece = piece_at(sample.pieces, sample.critical[i], slip[i])
-    return start_of(sample, i, piece) - sample.pieces.slopes[piece] * sample.rate[i] * slip[i]
+    W = sample.pieces.slopes[piece] * sample.weakening_rate[i]
+    return start_of(sample, i, piece) - W * slip[i]
 
 
 @jit
@@ -296,7 +297,7 @@ def _find_pieces(sample: StaticSample, slip: Array, present: Present) -> None:
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
         present.piece[i] = piece
         present.strength[i] = start_of(sample, i, piece)
-        present.rate[i] = sample.pieces.slopes[piece] * sample.rate[i]
+        present.weakening_rate[i] = sample.pieces.slopes[piece] * sample.weakening_rate[i]
 
 
 def present_pieces(sample: StaticSample, slip: Array) -> Present:

@@ -333,7 +333,8 @@ def _quotients(
         excess, residual = sample.excess.copy(), sample.residual.copy()
         excess[node] += step
         residual[node] += step * (sample.critical[node] == 0.0)  # its strength is constant
-        raised = make_sample(excess, residual, sample.profile, sample.rate, sample.pieces)
+        W = sample.weakening_rate
+        raised = make_sample(excess, residual, sample.profile, W, sample.pieces)
         state = program.next(raised)
         derivative[node] = (state.load - problem.relief(state.slip) - stress_before) / step
     return derivative

@@ -28,7 +28,7 @@ def _line(law: Any, *numbers: float) -> tuple[float, float]:
 
 
 @overload(_line)
-def _line_of(law, peak, residual, rate, slip, ahead):
+def _line_of(law, peak, residual, weakening_rate, slip, ahead):
     return _by_type(law.instance_class)
 
 
@@ -42,21 +42,21 @@ def compiled(parameters: Any) -> Any:
 def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
     """Return `line_at` for a type of parameters."""
 
-    def linear(law, peak, residual, rate, slip, ahead):
-        if peak - rate * (slip + ahead) > residual:
-            return peak - rate * slip, rate
+    def linear(law, peak, residual, weakening_rate, slip, ahead):
+        if peak - weakening_rate * (slip + ahead) > residual:
+            return peak - weakening_rate * slip, weakening_rate
         return residual, 0.0
 
     if parameters is Linear:
         return linear
     shape = compiled(parameters)
 
-    def line(law, peak, residual, rate, slip, ahead):
+    def line(law, peak, residual, weakening_rate, slip, ahead):
         drop, first = peak - residual, law.initial_slope
         if drop <= 0.0:
             return residual, 0.0
-        f, steep = shape(law, rate * (slip + ahead) / (drop * first))
-        falling = rate * steep / first
+        f, steep = shape(law, weakening_rate * (slip + ahead) / (drop * first))
+        falling = weakening_rate * steep / first
         return residual + drop * f + falling * ahead, falling
 
     return line
@@ -64,7 +64,7 @@ def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
 
 @jit
 def line_at(
-    law: Any, peak: float, residual: float, rate: float, slip: float, ahead: float
+    law: Any, peak: float, residual: float, weakening_rate: float, slip: float, ahead: float
 ) -> tuple[float, float]:
     """Return the straight line that the strength follows at ``slip + ahead``.
 
@@ -78,19 +78,19 @@ def line_at(
     peak, residual, rate, slip, ahead : float
         tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), and slips (m).
     """
-    return _line(law, peak, residual, rate, slip, ahead)
+    return _line(law, peak, residual, weakening_rate, slip, ahead)
 
 
 @jit
-def strength_at(law: Any, peak: float, residual: float, rate: float, slip: float) -> float:
+def strength_at(law: Any, peak: float, residual: float, W: float, slip: float) -> float:
     """Return the strength tau_f, Pa, at a slip. The parameters are the same as in `line_at`."""
-    return _line(law, peak, residual, rate, slip, 0.0)[0]
+    return _line(law, peak, residual, W, slip, 0.0)[0]
 
 
 @jit_allocating
-def strengths(law: Any, peak: Array, residual: Array, rate: Array, slip: Array) -> Array:
+def strengths(law: Any, peak: Array, residual: Array, W: Array, slip: Array) -> Array:
     """Return the strength tau_f, Pa, at every node. Parameters of `line_at` are (nodes,) arrays."""
     result = np.empty(slip.size)
     for i in range(slip.size):
-        result[i] = strength_at(law, peak[i], residual[i], rate[i], slip[i])
+        result[i] = strength_at(law, peak[i], residual[i], W[i], slip[i])
     return result

@@ -149,7 +149,7 @@ class FrictionLaw(ABC):
             return np.asarray(self.residual_strength, dtype=np.float64)
         return np.asarray(self.residual_ratio) * strength
 
-    def rate(self, drop: Array, scale: str, value: Any) -> Array:
+    def weakening_rate_of(self, drop: Array, scale: str, value: Any) -> Array:
         """Return the weakening rate W at zero slip, Pa/m.
 
         `drop` is tau_p - tau_r, Pa. `value` is the value of a scale, in Pa/m, m or
@@ -163,20 +163,20 @@ class FrictionLaw(ABC):
                 return self.initial_slope * self.integral * drop**2 / value
         return np.broadcast_to(value, np.broadcast_shapes(value.shape, drop.shape))
 
-    def critical_slip_of(self, drop: Array, rate: Array) -> Array:
+    def critical_slip_of(self, drop: Array, weakening_rate: Array) -> Array:
         """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
-        return self.initial_slope * drop / rate
+        return self.initial_slope * drop / weakening_rate
 
-    def dissipated(self, slip: Array, drop: Array, rate: Array) -> Array:
+    def dissipated(self, slip: Array, drop: Array, weakening_rate: Array) -> Array:
         """Return the energy that slip up to `slip` dissipates above the residual strength, J/m².
 
-        `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `rate` = W
+        `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `weakening_rate` = W
         (Pa/m) have shape (nodes,).
         """
         if self.linear:
-            weakened = np.minimum(slip, drop / rate)
-            return weakened * (drop - 0.5 * rate * weakened)
-        critical = self.critical_slip_of(drop, rate)
+            weakened = np.minimum(slip, drop / weakening_rate)
+            return weakened * (drop - 0.5 * weakening_rate * weakened)
+        critical = self.critical_slip_of(drop, weakening_rate)
         u = np.divide(slip, critical, out=np.zeros(np.shape(slip)), where=critical > 0.0)
         return drop * critical * self.area(u)
 

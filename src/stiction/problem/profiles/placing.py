@@ -288,8 +288,8 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     interface, position = problem.interface, result["critical_position"]
     if np.all(measured):
         return result
-    rate, places = problem.uniform_rate, position.values.reshape(-1, len(interface.dims))
-    lengths = interface.spacings if rate is None else problem.nucleation_lengths(rate)
+    W, places = problem.uniform_weakening_rate, position.values.reshape(-1, len(interface.dims))
+    lengths = interface.spacings if W is None else problem.nucleation_lengths(W)
     near: Any = True
     for axis, (dim, length) in enumerate(zip(interface.dims, interface.lengths, strict=True)):
         apart = interface.coordinates[dim] - places[:, axis, np.newaxis]

@@ -243,9 +243,9 @@ class Workspace(NamedTuple):
     rhs: Array  # a right side
     K_resting: Array  # K times the slip of nodes that slipped and rest
     solution: Array  # in S
-    v: Array  # rate of slip with the load, in S
+    v: Array  # growth of slip with the load, m/Pa, in S
     direction: Array
-    Kv: Array  # K times a rate
+    Kv: Array  # K times v
 
 
 def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> Workspace:

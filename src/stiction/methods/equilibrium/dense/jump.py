@@ -272,7 +272,7 @@ def _step_with_true_pieces(
     overload = workspace.rhs
     for i in range(slip.shape[0]):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
-        W = sample.pieces.slopes[piece] * sample.rate[i]
+        W = sample.pieces.slopes[piece] * sample.weakening_rate[i]
         true_pieces.is_slipping[i] = workspace.is_slipping[i]
         true_pieces.diagonal[i] = entry(workspace.stiffness, i, i) - W
         overload[i] = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]

@@ -209,7 +209,7 @@ def solve_program(
     n_slipping = ZERO
     n_known = ZERO  # nodes that slip already, until they have joined
     for i in range(slip.shape[0]):
-        workspace.diagonal[i] = entry(workspace.stiffness, i, i) - sample.rate[i]
+        workspace.diagonal[i] = entry(workspace.stiffness, i, i) - sample.weakening_rate[i]
         is_slipping[i] = False
         Kd[i] = 0.0
         if slip[i] > 0.0:
@@ -277,7 +277,7 @@ def certificate(
     excess_y = 0.0
     count = ZERO
     for i in range(n):
-        balance = sample.excess[i] + Kd[i] - sample.rate[i] * slip[i]
+        balance = sample.excess[i] + Kd[i] - sample.weakening_rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
         if multiplier[i] > 0.0:
             excess_y += multiplier[i] * sample.excess[i]
@@ -291,5 +291,5 @@ def certificate(
         p_y += multiplier[i] * sample.profile[i]
         # Round-off may leave A y slightly positive. Its effect on the bound, <A
         # y, d>, is added.
-        infeasible += max(Ky[i] - sample.rate[i] * multiplier[i], 0.0) * slip[i]
+        infeasible += max(Ky[i] - sample.weakening_rate[i] * multiplier[i], 0.0) * slip[i]
     return max((excess_y + infeasible) / p_y - lower, 0.0)

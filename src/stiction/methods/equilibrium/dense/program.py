@@ -106,11 +106,11 @@ class DenseProgram:
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the bound from the weakest window of a sample (Pa), and its multiplier."""
-        low, high = _rates(sample)
+        low, high = _range_of_weakening_rates(sample)
         windows = self.elastic.windows(low, high) if high > 0.0 else NONE
         workspace, multiplier = np.empty((2, self.nodes))
         bound = window_bound(
-            sample.excess, sample.profile, sample.rate, windows, workspace, multiplier
+            sample.excess, sample.profile, sample.weakening_rate, windows, workspace, multiplier
         )
         return bound, multiplier
 
@@ -119,7 +119,7 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         """Return the critical load (at most `cap`) with its proofs, or `None` if the search stalls.
 
-        Only the first piece of the friction law is used: `excess` and `rate`. `state`
+        Only the first piece of the friction law is used: `excess` and `weakening_rate`. `state`
         is a known equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
@@ -135,7 +135,7 @@ class DenseProgram:
                     return solution
         slip, Kd = np.zeros((2, self.nodes))
         start = top = min(bound, cap)
-        low, high = _rates(sample)
+        low, high = _range_of_weakening_rates(sample)
         if state is not None:
             start, slip = state.load, state.slip.copy()
         elif low < high:  # the bound is not close: at too high a load far too many nodes join
@@ -156,8 +156,8 @@ class DenseProgram:
             return None
         try:
             onset = plane_onset(
-                half_spaces, sample.excess, sample.profile, sample.rate, TRANSFORMS_GAP_RTOL,
-                None if state is None else state.slip,
+                half_spaces, sample.excess, sample.profile, sample.weakening_rate,
+                TRANSFORMS_GAP_RTOL, None if state is None else state.slip,
             )  # fmt: skip
         except TooSmallError:
             return None
@@ -313,9 +313,9 @@ class DenseProgram:
         y = multiplier_of(sample, state)
         if not (self.driven or self.ends):
             return y
-        rate = present_pieces(sample, state.slip).rate
+        W = present_pieces(sample, state.slip).weakening_rate
         slips, p = np.flatnonzero(state.slip > 0.0), sample.profile
-        block = self.elastic.block(slips) - np.diag(rate[slips])
+        block = self.elastic.block(slips) - np.diag(W[slips])
         slip_rate = np.zeros(y.size)  # d'
         slip_rate[slips] = np.linalg.solve(block, p[slips])
         if not self.ends:
@@ -332,20 +332,20 @@ class DenseProgram:
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
     """Return, for `solve`, the linear sample with the pieces on which nodes are after a slip.
 
-    `excess` and `rate` belong to these pieces, continued to zero slip. The law has no
+    `excess` and `weakening_rate` belong to these pieces, continued to zero slip. The law has no
     further effect.
     """
     present = present_pieces(sample, slip)
-    return sample._replace(excess=present.strength, rate=present.rate)
+    return sample._replace(excess=present.strength, weakening_rate=present.weakening_rate)
 
 
-def _rates(sample: StaticSample) -> tuple[float, float]:
+def _range_of_weakening_rates(sample: StaticSample) -> tuple[float, float]:
     """Return the lowest and the highest non-zero weakening rate, or zeros if all rates are zero.
 
     Rates that differ only by round-off are returned as equal.
     """
-    rates = sample.rate[sample.rate > 0.0]
-    if rates.size == 0:
+    weakening_rates = sample.weakening_rate[sample.weakening_rate > 0.0]
+    if weakening_rates.size == 0:
         return 0.0, 0.0
-    low, high = float(rates.min()), float(rates.max())
+    low, high = float(weakening_rates.min()), float(weakening_rates.max())
     return low, (high if low < high * (1.0 - WEAKENING_RATE_RTOL) else low)

@@ -139,7 +139,7 @@ def _find_slipping(
     for i in range(slip.shape[0]):
         piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
         q[i] = start_of(sample, i, piece[i])
-        W = sample.pieces.slopes[piece[i]] * sample.rate[i]
+        W = sample.pieces.slopes[piece[i]] * sample.weakening_rate[i]
         workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
         is_slipping = slip[i] > 0.0
         if may_stop and is_slipping:
@@ -178,8 +178,8 @@ def _first_to_stop(
     share = np.inf
     for t in range(n_slipping):
         if new[t] < -NEGATIVE_RATE_RTOL * largest:
-            rate = v_nodes[slipping[t]]
-            zero_at = rate / ((0.0 if endless else rate) - new[t])
+            v_now = v_nodes[slipping[t]]
+            zero_at = v_now / ((0.0 if endless else v_now) - new[t])
             if zero_at < share or (zero_at == share and new[t] < new[first]):
                 first = t
                 share = zero_at
@@ -187,7 +187,7 @@ def _first_to_stop(
 
 
 @jit_inside
-def _move_rates(
+def _move_v(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
 ) -> None:
     """Move the rates by a share of the way to `new` (in S). See `_first_to_stop`."""
@@ -211,7 +211,7 @@ def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> i
 
 
 @jit_inside
-def _solve_rates(workspace: Workspace, n_slipping: int) -> None:
+def _solve_v(workspace: Workspace, n_slipping: int) -> None:
     """Step 2: write the solution v of (2) to `workspace.v`."""
     for t in range(n_slipping):
         workspace.v[t] = workspace.Linv_p[t]
@@ -233,10 +233,10 @@ def _stop_unloaded(
         first, share = _first_to_stop(state, n_slipping, v_nodes, v, endless=False)
         if first == NOBODY:
             break
-        _move_rates(state, n_slipping, v_nodes, v, share, endless=False)
+        _move_v(state, n_slipping, v_nodes, v, share, endless=False)
         n_slipping = _stop(state, n_slipping, first, v_nodes)
         _substitute(state, q, ZERO, n_slipping)
-        _solve_rates(workspace, n_slipping)
+        _solve_v(workspace, n_slipping)
         some_stopped = True
     for t in range(n_slipping):
         v_nodes[workspace.slipping[t]] = max(v[t], 0.0)
@@ -301,7 +301,7 @@ def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: 
     z[n_factored] = 1.0
     first, share = _first_to_stop(state, n_factored + 1, v_nodes, z, endless=True)
     if first != NOBODY:
-        _move_rates(state, n_factored + 1, v_nodes, z, share, endless=True)
+        _move_v(state, n_factored + 1, v_nodes, z, share, endless=True)
     return first
 
 
@@ -340,10 +340,10 @@ def _pass_corner(
     pieces = sample.pieces
     i = workspace.slipping[corner]
     slip[i] = pieces.ends[piece[i]] * sample.critical[i]
-    W_before = pieces.slopes[piece[i]] * sample.rate[i]
+    W_before = pieces.slopes[piece[i]] * sample.weakening_rate[i]
     piece[i] += 1
     q[i] = start_of(sample, i, piece[i])
-    W = pieces.slopes[piece[i]] * sample.rate[i]
+    W = pieces.slopes[piece[i]] * sample.weakening_rate[i]
     workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
     if W_before >= W:
         raise_diagonal(workspace.factor, n_slipping, corner, W_before - W, workspace.rotations)
@@ -433,7 +433,7 @@ def follow_stable_path(
         _substitute(state, q, first_changed, n_slipping)
 
         # 2. The rates of slip and of K d. In S the latter follow from (2): K v = p + W v.
-        _solve_rates(workspace, n_slipping)
+        _solve_v(workspace, n_slipping)
         if may_stop:
             n_slipping, some_stopped = _stop_unloaded(state, q, n_slipping, v_nodes)
             stopped = stopped or some_stopped

@@ -64,7 +64,7 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
     """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A."""
     lifting = np.where(can_break, guess, 0.0)
     value, _ = lowest_eigenvector(
-        operator, can_break, lifting, LIFTING_RTOL * float(operator.rate.max()),
+        operator, can_break, lifting, LIFTING_RTOL * float(operator.weakening_rate.max()),
         MAX_EIGENVECTOR_ITERATIONS,
     )  # fmt: skip
     if value >= 0.0:
@@ -82,10 +82,10 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     smallest positive W. For a Z-matrix, 0 <= g < 1. Then -A z is 0.4 w (1 - g) at
     nodes with W = 0, and at least W - 0.4 (w + W) g > 0 at other nodes.
     """
-    lifting = np.ones(operator.rate.shape)
-    free = operator.rate <= 0.0
+    lifting = np.ones(operator.weakening_rate.shape)
+    free = operator.weakening_rate <= 0.0
     if free.any() and not free.all():
-        w = float(operator.rate[~free].min())
+        w = float(operator.weakening_rate[~free].min())
         g = np.empty_like(lifting)
         filtered(operator, w / (operator.symbol + w), free.astype(np.float64), g)
         lifting -= LIFTING_SHARE * g
@@ -108,12 +108,12 @@ class Bracket:
     def __init__(
         self,
         symbol: Array,
-        rate: Array | float,
+        weakening_rate: Array | float,
         excess: Array,
         profile: Array,
         lifting: Array | None = None,
     ) -> None:
-        self.operator = make_operator(symbol, rate, excess.shape)
+        self.operator = make_operator(symbol, weakening_rate, excess.shape)
         self.excess, self.profile = excess.flatten(), profile.flatten()
         self.residual, self.slip, self.multiplier = np.zeros((3, excess.size))
         self.inside = np.zeros(excess.size, dtype=np.bool_)
@@ -215,7 +215,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             operator,
             inside,
             vector,
-            EIGENVALUE_RTOL * float(operator.rate.max()),
+            EIGENVALUE_RTOL * float(operator.weakening_rate.max()),
             MAX_EIGENVECTOR_ITERATIONS,
         )
         if value <= 0.0:

@@ -75,7 +75,7 @@ def _equilibrium_near(
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
-        status, slip = solve_pieces(operator, drive, present.rate, slip, tolerance)
+        status, slip = solve_pieces(operator, drive, present.weakening_rate, slip, tolerance)
         if status != SOLVED:
             break
         if np.array_equal(present.piece, present_pieces(sample, slip).piece):
@@ -95,8 +95,8 @@ def follow_to_turn(
     if start is None:
         return None
     slip, inside, pieces = start, start > 0.0, sample.pieces
-    piece, strength, rate = present_pieces(sample, slip)
-    operator = operator._replace(rate=rate)  # `rate` is changed in place below
+    piece, strength, weakening_rate = present_pieces(sample, slip)
+    operator = operator._replace(weakening_rate=weakening_rate)  # changed in place below
     v, image = _solution(operator, inside, sample.profile), np.empty_like(slip)
     for _ in range(MAX_EVENTS):
         if v is None:
@@ -126,9 +126,9 @@ def follow_to_turn(
             piece[node] += 1
             share = pieces.starts[piece[node]]
             strength[node] = share * sample.excess[node] + (1.0 - share) * sample.residual[node]
-            W_before, slip[node] = rate[node], corner[node]
-            rate[node] = pieces.slopes[piece[node]] * sample.rate[node]
-            change = W_before - rate[node]
+            W_before, slip[node] = weakening_rate[node], corner[node]
+            weakening_rate[node] = pieces.slopes[piece[node]] * sample.weakening_rate[node]
+            change = W_before - weakening_rate[node]
             pivot, push = 1.0 + change * y[node], -change * v[node]
         else:  # 4.
             product(operator, unit, image)

@@ -148,7 +148,7 @@ def plane_onset(
     half_spaces: HalfSpaces,
     excess: Array,
     profile: Array,
-    rate: Array,
+    W: Array,
     gap: float = 1e-6,
     slip: Array | None = None,
     corner: Array | None = None,
@@ -156,7 +156,7 @@ def plane_onset(
     """Return the largest load that has an equilibrium before a node reaches a corner of its law.
 
     All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength
-    minus the initial stress (Pa). `profile` is the load profile p > 0. `rate` is the
+    minus the initial stress (Pa). `profile` is the load profile p > 0. `W` is the
     weakening rate (Pa/m, zero at residual nodes). `slip` (m) belongs to an equilibrium at a
     lower load, from which the search starts instead of coarse grids. `corner` is the slip
     at the next corner (m, 0 without a corner). The search stops when the bounds agree to a
@@ -165,7 +165,7 @@ def plane_onset(
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
-    fields = (excess, profile, rate, corners)
+    fields = (excess, profile, W, corners)
     grids = [tuple(np.asarray(field, dtype=np.float64) for field in fields)]
     while slip is None:
         shape = grids[-1][0].shape
@@ -227,14 +227,16 @@ class PlaneProgram:
 
     def _operator(self, sample: StaticSample) -> Operator:
         return make_operator(
-            self.elastic.symbol(self.shape), sample.rate.reshape(self.shape), self.shape
+            self.elastic.symbol(self.shape),
+            sample.weakening_rate.reshape(self.shape),
+            self.shape,
         )
 
     def _onset(self, sample: StaticSample, corner: Array) -> PlaneOnset:
         """Return the onset without corners, or on a coarse grid on which a node passes a corner."""
-        fields = (sample.excess, sample.profile, sample.rate, corner)
-        excess, profile, rate, corner = (field.reshape(self.shape) for field in fields)
-        return plane_onset(self.elastic, excess, profile, rate, self.requested, corner=corner)
+        fields = (sample.excess, sample.profile, sample.weakening_rate, corner)
+        excess, profile, W, corner = (field.reshape(self.shape) for field in fields)
+        return plane_onset(self.elastic, excess, profile, W, self.requested, corner=corner)
 
     def next(
         self, sample: StaticSample, state: EquilibriumState | None = None

@@ -113,23 +113,23 @@ def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> fl
 
 
 def solve_pieces(
-    operator: Operator, drive: Array, rate: Array, guess: Array, tolerance: float
+    operator: Operator, drive: Array, weakening_rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
     """Solve (1) for given pieces, with drive = load p - q. Return the status and the slip."""
     slip = guess.copy()
     inside = (guess > 0.0) | (drive > 0.0)
-    operator = operator._replace(rate=rate)
+    operator = operator._replace(weakening_rate=weakening_rate)
     status, _ = equilibrate(operator, drive, inside, slip, np.empty_like(slip), tolerance)
     return status, slip
 
 
-def _is_definite(operator: Operator, rate: Array, growth: Array, slip: Array) -> bool:
-    """(a) 2: return whether K - `rate` on the nodes that slip shows no negative curvature.
+def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bool:
+    """(a) 2: return whether K - diag(W) on the nodes that slip shows no negative curvature.
 
     The search begins with the growth of slip, which is close to the direction in
     which stability is lost. It continues in the directions of conjugate gradients.
     """
-    operator, inside = operator._replace(rate=rate), slip > 0.0
+    operator, inside = operator._replace(weakening_rate=W), slip > 0.0
     solution, image = np.zeros_like(slip), np.empty_like(slip)
     product(operator, growth, image)
     curvature = inner(growth, image)
@@ -165,21 +165,23 @@ def stable_equilibrium(
             break
         drive, assumed = load * sample.profile - present.strength, present.piece
         if allowed > tolerance:
-            residual_of(operator._replace(rate=present.rate), drive, end, residual)
+            operator = operator._replace(weakening_rate=present.weakening_rate)
+            residual_of(operator, drive, end, residual)
             largest = np.where(end > 0.0, np.abs(residual), residual).max()
             allowed = max(tolerance, PIECES_RESIDUAL * float(largest))
-        status, solution = solve_pieces(operator, drive, present.rate, end, allowed)
+        status, solution = solve_pieces(operator, drive, present.weakening_rate, end, allowed)
         if status != SOLVED:
             return None
         end = np.maximum(solution, slip)
     else:
         return None
     # 2.
-    steepest = start.rate
+    steepest = start.weakening_rate
     if pieces.steepens:
         piece = np.arange(pieces.slopes.size)[:, None]
         passed = (start.piece <= piece) & (piece <= present.piece)
-        steepest = np.where(passed, pieces.slopes[:, None], 0.0).max(axis=0) * sample.rate
+        slopes = np.where(passed, pieces.slopes[:, None], 0.0)
+        steepest = slopes.max(axis=0) * sample.weakening_rate
     return end if _is_definite(operator, steepest, end - slip, end) else None
 
 
@@ -206,20 +208,22 @@ def _bound(
     finds which line applies at each node. The drive is reduced by the allowed
     residual, so that a rough slip is also a bound.
     """
-    rate = (1.0 - omitted) * present.rate - omitted * DRAG * float(sample.rate.max())
-    start = present.strength - (present.rate - rate) * slip
+    drag = DRAG * float(sample.weakening_rate.max())
+    W = (1.0 - omitted) * present.weakening_rate - omitted * drag
+    start = present.strength - (present.weakening_rate - W) * slip
     corner = np.append(sample.pieces.ends, 1e300)[present.piece] * sample.critical
-    falls, level = (present.rate > 0.0) & np.isfinite(corner), np.full(slip.size, -np.inf)
-    level[falls] = present.strength[falls] - present.rate[falls] * corner[falls]
+    falls = (present.weakening_rate > 0.0) & np.isfinite(corner)
+    level = np.full(slip.size, -np.inf)
+    level[falls] = present.strength[falls] - present.weakening_rate[falls] * corner[falls]
     is_level = np.zeros(slip.size, dtype=np.bool_)
     end, lowered = slip, tolerance if omitted > 0.0 else 0.0
     for _ in range(MAX_REVISIONS):
-        strength, slope = np.where(is_level, level, start), np.where(is_level, 0.0, rate)
+        strength, slope = np.where(is_level, level, start), np.where(is_level, 0.0, W)
         drive = load * sample.profile - strength - lowered
         status, end = solve_pieces(operator, drive, slope, end, tolerance)
         if status != SOLVED:
             return Bound(status, slip, False)
-        is_beyond = start - rate * end < level
+        is_beyond = start - W * end < level
         if np.array_equal(is_beyond, is_level):
             passed = present_pieces(sample, end).piece > present.piece
             # Beyond its last corner the true strength of a node is level, too.
@@ -241,7 +245,7 @@ def _step_to_corner(
     equilibrium is not passed.
     """
     present = present_pieces(sample, slip)
-    operator = operator._replace(rate=present.rate)
+    operator = operator._replace(weakening_rate=present.weakening_rate)
     drive = load * sample.profile - present.strength
     overload, end = np.empty_like(slip), slip.copy()
     residual_of(operator, drive, slip, overload)
@@ -251,8 +255,8 @@ def _step_to_corner(
     longest = 1.0
     if status == NEGATIVE_CURVATURE:
         direction = np.abs(operator.direction)
-        largest_rate = float(sample.rate.max())
-        lowest_eigenvector(operator, inside, direction, 1e-6 * largest_rate, MAX_ITERATIONS)
+        largest_W = float(sample.weakening_rate.max())
+        lowest_eigenvector(operator, inside, direction, 1e-6 * largest_W, MAX_ITERATIONS)
         direction = np.where(direction > DIRECTION_RTOL * direction.max(), direction, 0.0)
         longest = np.inf
     moved = slip.copy()
@@ -295,7 +299,7 @@ def least_equilibrium(
         # 1.
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
-        if float((drive + present.rate * slip).sum()) > tolerance * slip.size:
+        if float((drive + present.weakening_rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(Outcome.SLIDING, slip)
         if stops and (slip[can_break] > 0.0).all():
             return Relaxed(Outcome.SLIDING, slip)
@@ -311,7 +315,7 @@ def least_equilibrium(
         if bound.status == SOLVED:  # 4.
             still_weakens = ~residual_nodes(sample, bound.slip) & weakens
             growth = np.where(still_weakens, bound.slip - slip, 0.0)
-            fall, slip = float((present.rate * growth).max()), bound.slip
+            fall, slip = float((present.weakening_rate * growth).max()), bound.slip
             if not (growth > CREEP * sample.critical).any():
                 omitted, omitted_before = 0.0, omitted
         elif bound.status == NEGATIVE_CURVATURE and omitted < 1.0:  # 5.

@@ -100,7 +100,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
     """
     excess, profile = bracket.excess, bracket.profile
     load, amplitude = guess.load, guess.amplitude
-    stiffness = 2.0 * float(bracket.operator.rate.max())  # no curvature is below -W
+    stiffness = 2.0 * float(bracket.operator.weakening_rate.max())  # no curvature is below -W
     operator = bracket.operator._replace(spring=stiffness, phi=phi)
     slip = guess.slip.copy()
     inside = bracket.inside
@@ -140,7 +140,7 @@ def _other_patch(bracket: Bracket) -> Array | None:
         bracket.operator,
         bracket.inside,
         vector,
-        PATCH_EIGENVALUE_RTOL * float(bracket.operator.rate.max()),
+        PATCH_EIGENVALUE_RTOL * float(bracket.operator.weakening_rate.max()),
         MAX_PATCH_ITERATIONS,
     )
     if value <= 0.0:
