@@ -63,7 +63,7 @@ def test_stress_is_the_strength_of_the_law_wherever_it_slides(runs, name):
     run, law = runs[name], LAWS[name]
     peak = run.peak_strength.values
     drop = peak - 0.2e6
-    W = law.W(drop, *law.scale)
+    W = law.weakening_rate_of(drop, *law.scale)
     expected = 0.2e6 + drop * law.fraction(run.slip.values / law.critical_slip_of(drop, W))
     np.testing.assert_allclose(run.strength, expected, rtol=1e-12)
     sliding = run.slip_rate.values[1:] > 0.0

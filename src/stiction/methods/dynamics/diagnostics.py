@@ -33,7 +33,7 @@ Algorithm, after each step of a run (`observe`)
    maximum. At slow loading, all creeping patches are about equally slow at the
    maximum. The unstable patch is faster only just after the maximum.
 3. An instability ends when <tau> rises above the maximum at which it began. It
-   was arrested if a node slipped faster than `Thresholds.unstable_rate`, which
+   was arrested if a node slipped faster than `Thresholds.unstable_slip_rate`, which
    the waves of an earlier instability do not reach. The present <tau> is the next
    maximum. (Explicit steps also end an instability when the interface is calm (see
    `explicit`).)

@@ -111,8 +111,8 @@ DIAGNOSTICS = np.dtype(
         ("event_time", "f8"),  # when it began, s, at this load, Pa, after this work, J/m
         ("event_load", "f8"),
         ("event_work", "f8"),
-        ("fast_since", "f8"),  # when a node first and last slipped faster than `unstable_rate`
-        ("fast_until", "f8"),  # in it, s
+        ("fast_since", "f8"),  # first and last time above `unstable_slip_rate`
+        ("fast_until", "f8"),  # in the event, s
         ("arrested_events", "i8"),
         ("last_arrested", "i8"),  # whether the last instability is among them
         ("first_stress", "f8"),  # mean stress at the first instability
