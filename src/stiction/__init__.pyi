@@ -51,8 +51,8 @@ from stiction.random.spectra import CustomSpectrum as CustomSpectrum
 from stiction.random.spectra import ExponentialSpectrum as ExponentialSpectrum
 from stiction.random.spectra import PowerLawSpectrum as PowerLawSpectrum
 from stiction.random.spectra import SquaredExponentialSpectrum as SquaredExponentialSpectrum
-from stiction.reliability.failure import design_stress as design_stress
-from stiction.reliability.failure import failure_curve as failure_curve
+from stiction.reliability.curve import failure_curve as failure_curve
+from stiction.reliability.design import design_stress as design_stress
 from stiction.reliability.failure import failure_probability as failure_probability
 from stiction.study.study import Study as Study
 from stiction.study.study import open_run as open_run

@@ -22,7 +22,7 @@ from stiction.inference.specimens import (
     grid_of_profiles,
 )
 from stiction.random.equally_likely import EquallyLikely
-from stiction.reliability.factors import solve
+from stiction.reliability.factors import solve_specimens
 
 sys.path.append(str(Path(__file__).parents[2] / "validation"))
 import design_force_closed as closed
@@ -89,19 +89,20 @@ def test_specimens_of_each_solved_sample_are_those_of_its_draws():
     several = [scattering(1e6, 0.2, cv) for cv in (0.05, 0.1)] + [scattering(9e5, 0.1, 0.08)]
     random = EquallyLikely(tuple(several))
     state = LimitState(Experiment(LINE, random, LOCAL["method"], seed=4))
-    counts = solve(state, 0, 20)
+    counts = solve_specimens(state, 0, 20)
     assert counts.values.shape == (20, 128)
     group = np.where(counts.members == 2, 1, 0)
     assert np.all(np.ptp(group, axis=1) == 0)
     assert {*counts.members.ravel().tolist()} == {0, 1, 2}
     picks = np.arange(0, 20 * 128, 37)
-    draws = counts.draws(picks)
+    draws = counts[picks]
     np.testing.assert_allclose(state(draws), counts.values.ravel()[picks], rtol=1e-9)
     np.testing.assert_array_equal(state.member(draws), counts.members.ravel()[picks])
     stress = np.quantile(counts.values, 0.1)
-    assert np.all(state(counts.failing(stress, 20)) < stress)
-    _, lowest = counts.lowest(stress, 50)
-    assert 0.25 < np.mean(lowest < stress) < 0.75
+    population, near = counts.tail.repetitions[0].around(stress)
+    assert len(near) == 2 * np.sum(counts.values < stress)
+    lowest = state(population.draws[near[::9]])
+    assert np.mean(lowest < stress) == pytest.approx(0.5, abs=0.02)
 
 
 @pytest.mark.parametrize("probability", [1e-2, 1e-4])

@@ -12,16 +12,10 @@ from setups import EXACT, LOCAL, ensemble, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.base.progress import SILENT
-from stiction.reliability.counting import Counted, count_failures
-from stiction.reliability.failure import curve_of
-from stiction.reliability.subset import Descent, Population
-from stiction.reliability.tail import Tail
-from stiction.reliability.uncertainty import (
-    ancestral_variance,
-    binomial_interval,
-    generator,
-    lognormal_interval,
-)
+from stiction.reliability.counting import Counted, binomial_interval, count_failures
+from stiction.reliability.curve import curve_of
+from stiction.reliability.subset import Descent, Population, ancestral_variance, generator
+from stiction.reliability.tail import Tail, lognormal_interval
 
 PROBLEM = st.paper.problem(nodes=256)
 STRENGTH = st.paper.strength(PROBLEM)

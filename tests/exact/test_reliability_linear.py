@@ -16,10 +16,9 @@ from setups import beta_strength
 import stiction as st
 from stiction.random import equally_likely
 from stiction.random.equally_likely import EquallyLikely
-from stiction.reliability.subset import Descent, Population, descend
-from stiction.reliability.tail import Tail, repeat_until_precise, share_picked
+from stiction.reliability.subset import Descent, Population, descend, generator
+from stiction.reliability.tail import Tail, log_width, repeat_until_precise, share_picked
 from stiction.reliability.two_level import _covered, bridge
-from stiction.reliability.uncertainty import generator, log_width
 
 DIMENSION = 200
 RUNS = 100

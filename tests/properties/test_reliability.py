@@ -15,8 +15,7 @@ import stiction as st
 from stiction.base.errors import collect_warnings
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
-from stiction.reliability.subset import descend
-from stiction.reliability.uncertainty import generator
+from stiction.reliability.subset import descend, generator
 
 PROBLEM = st.paper.problem(nodes=256)
 STRENGTH = st.paper.strength(PROBLEM, 0.5)

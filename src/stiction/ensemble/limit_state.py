@@ -70,6 +70,12 @@ class LimitState:
         """Return the same limit state with a different method."""
         return replace(self, experiment=self.experiment.by(method))
 
+    @property
+    def first_stage(self) -> Self | None:
+        """The same limit state by the less expensive first stage of the method, if it has one."""
+        name = optional_member(self.experiment.method, "first_stage")
+        return self.by(METHODS[name]()) if name else None
+
     def draws(self, seed: int, first: int, samples: int) -> Array:
         """Return the draws (samples, dimension) that `stiction.monte_carlo` uses."""
         return self.experiment.with_seed(seed).draws(first, samples)
@@ -195,9 +201,9 @@ def weakest_first(state: LimitState) -> LimitState:
     count = len(random.members)
     if count == 1:
         return state
-    first_stage = optional_member(experiment.method, "first_stage")
-    apt = first_stage and not no_single_length(experiment.problem, random)
-    by = state.by(METHODS[first_stage]()) if apt else state
+    by = state
+    if state.first_stage and not no_single_length(experiment.problem, random):
+        by = state.first_stage
     ranked = int(np.clip(RANKINGS // count, 4, MAX_RANKED))
     draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Annotated, Any, Self, TypeAlias
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Self, TypeAlias, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -15,9 +14,16 @@ from pydantic import Field
 from scipy.special import ndtri
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, collect_warnings, warn_accuracy
+from stiction.base.errors import (
+    InputError,
+    Warned,
+    collect_warnings,
+    merge_warnings,
+    texts_of,
+    warn_accuracy,
+)
 from stiction.base.model import Count, Real
-from stiction.base.progress import Meter
+from stiction.base.progress import Meter, Show
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
@@ -26,9 +32,9 @@ from stiction.ensemble.limit_state import LimitState, StressName
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
-from stiction.random.equally_likely import MAX_MEMBERS
-from stiction.reliability.tail import Tail, two_levels_refused
-from stiction.reliability.uncertainty import CONFIDENCE
+from stiction.random.equally_likely import MAX_MEMBERS, origin
+from stiction.reliability.counting import CONFIDENCE
+from stiction.reliability.tail import TailPoint, two_levels_refused
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
@@ -44,51 +50,17 @@ LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
 """Parts of the target for the errors by the list of interfaces and by sampling. Squares add up."""
 REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
 """Margin on the wanted number of members, and share of the mean that a warning reports."""
+FRESH = 1.5
+"""Least ratio of different members that makes a longer list worthwhile."""
 EXACT_CHECKS = (8, 64)
 """Fewest and most samples of an approximate method that are solved exactly as a check."""
 CHECK_SECONDS = 10.0
 """Seconds of one core for this check."""
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
+"""Attributes of an answer that a `TailPoint` has."""
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """A tail at a stress."""
-
-    state: LimitState
-    tail: Tail
-    stress: float
-
-    @cached_property
-    def probability(self) -> float:
-        """Probability of an onset below the stress."""
-        return self.tail.probability(self.stress)
-
-    @cached_property
-    def sampling_cv(self) -> float:
-        """Coefficient of variation of the probability due to sampling."""
-        return self.tail.cv(self.stress)
-
-    @cached_property
-    def members_cv(self) -> float:
-        """Part of `cv` due to the list of interfaces. 0 for a single interface or a mixture."""
-        if not self.state.is_sample:
-            return 0.0
-        return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
-
-    @cached_property
-    def cv(self) -> float:
-        """Coefficient of variation of the probability, due to sampling and the list."""
-        return math.hypot(self.sampling_cv, self.members_cv)
-
-    @cached_property
-    def members(self) -> Array:
-        """Probability of each of the equally likely interfaces. Empty for a single interface."""
-        if not self.state.several:
-            return np.zeros(0)
-        lows, highs = np.array(self.state.bounds_of_members()).T
-        probabilities = self.tail.of_members(self.stress, lows.size)
-        return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], probabilities)
+F = TypeVar("F", "Answer", TailPoint)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -190,18 +162,21 @@ class Answer(Result):
     doubts: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, estimate: Estimate, doubts: Sequence[str] = (), **more: Any) -> Self:
-        """Return the answer from an estimate and given values. Issue doubts as warnings."""
+    def at(cls, point: TailPoint, doubts: Sequence[str] = (), **more: Any) -> Self:
+        """Return the answer at a point of a tail, and issue doubts as warnings.
+
+        `more` contains further attributes, or replaces the attributes of the point.
+        """
         for text in doubts:
             warn_accuracy(text)
-        state, tail = estimate.state, estimate.tail
-        known = {name: getattr(estimate, name) for name in ESTIMATED if name not in more}
+        state, tail = point.state, point.tail
+        known = {name: getattr(point, name) for name in ESTIMATED if name not in more}
         return cls(
             lower_bound=state.bounds[0],
             normal_pressure=state.experiment.pressure,
             area=state.experiment.problem.area or math.nan,
             evaluations=tail.spent,
-            first_stage_evaluations=sum(o.first_stage_evaluations for o in tail.repetitions),
+            first_stage_evaluations=sum(d.first_stage_evaluations for d in tail.repetitions),
             algorithm=tail.algorithm,
             reason=tail.reason,
             survived=tail.survived,
@@ -430,7 +405,52 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     return int(min(max(REQUEST_MARGIN * count * least * least, 2 * count), MAX_MEMBERS))
 
 
-def few_members(random: Any, estimate: Answer | Estimate, target_cv: float) -> list[str]:
+def answered(
+    experiment: Experiment,
+    target_cv: float,
+    name: str,
+    progress: Show,
+    solve: Callable[[Experiment, Meter], Answer],
+) -> Answer:
+    """Return an answer, and its warnings, from as many members as the target needs."""
+    with Meter(name, show=progress) as meter, merge_warnings() as warned:
+        experiment, answer = with_enough_members(experiment, target_cv, meter, warned, solve)
+        for text in few_members(experiment.random, answer, target_cv):
+            warn_accuracy(text)
+    source = origin(experiment.random)
+    return replace(
+        answer,
+        warnings=tuple(texts_of(warned)),
+        doubts=(*getattr(source, "doubts", ()), *getattr(source, "notes", ())),
+        specimens=getattr(source, "specimens", 0),
+    )
+
+
+def with_enough_members(
+    experiment: Experiment,
+    target_cv: float,
+    meter: Meter,
+    warned: list[Warned],
+    solve: Callable[[Experiment, Meter], F],
+) -> tuple[Experiment, F]:
+    """Return a solution with enough members for the error due to the list.
+
+    A source draws more members until the error is small enough.
+    """
+    while True:
+        solution, known = solve(experiment, meter), experiment.random
+        if not (count := wanted_members(known, solution.members_cv, target_cv)):
+            return experiment, solution
+        meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
+        larger = known.larger(count, experiment.seed)
+        # The list of a posterior over a list has few more different members.
+        if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
+            return experiment, solution
+        experiment = replace(experiment, random=larger)
+        warned.clear()
+
+
+def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> list[str]:
     """Return a warning if the list makes the estimate less precise than `target_cv`."""
     by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
@@ -467,33 +487,32 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
     return chosen
 
 
-def exact_doubts(
-    state: LimitState, near: tuple[Array, Array], stress: float, probability: float
-) -> list[str]:
+def exact_doubts(point: TailPoint) -> list[str]:
     """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
 
-    `near` holds draws and stresses of the lowest samples on both sides of the stress.
-    Failures are counted, because in a tail a small change of stress may multiply the
-    probability.
+    These are some of the lowest samples on both sides of the stress. Failures are
+    counted, because in a tail a small change of stress may multiply the probability.
     """
-    experiment, (draws, values) = state.experiment, near
+    state, stress = point.state, point.stress
+    experiment, (population, near) = state.experiment, point.tail.repetitions[-1].around(stress)
     exact = exact_counterpart(experiment.problem, experiment.method)
-    if exact is None or not values.size:
+    if exact is None or not near.size:
         return []
     seconds = seconds_per_sample(experiment.problem, exact)
     count = int(np.clip(CHECK_SECONDS / seconds, *EXACT_CHECKS))
-    chosen = different(values, count, np.random.default_rng(0))
+    chosen = near[different(population.values[near], count, np.random.default_rng(0))]
     state.meter.note = f"checking by {exact.label}"
     with collect_warnings():
-        fails_exactly = state.by(exact)(draws[chosen]) < stress
-    fails = values[chosen] < stress
+        fails_exactly = state.by(exact)(population.draws[chosen]) < stress
+    fails = population.values[chosen] < stress
     failed, failed_exactly = int(fails.sum()), int(fails_exactly.sum())
     differing = int(np.sum(fails != fails_exactly))
     if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
         return []
-    there = min(probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
+    there = min(point.probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
     return [
         f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
-        f" {failed_exactly} by {exact.label}. The probability by st.Equilibrium() is"
-        f" {'about' if failed_exactly else 'below'} {there:.2g}, not {probability:.2g}. Use it"
+        f" {failed_exactly} by {exact.label}. The probability by st.{type(exact).__name__}() is"
+        f" {'about' if failed_exactly else 'below'} {there:.2g}, not {point.probability:.2g}."
+        " Use it"
     ]

@@ -19,18 +19,29 @@ Steps:
 """
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import betaincinv
 
 from stiction.base.arrays import Array
 from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.subset import Descent, Population
-from stiction.reliability.uncertainty import binomial_interval
 
+CONFIDENCE = 0.95
+"""Confidence level of every interval."""
 COUNT_BATCH = 1024
 """Most samples that are solved before failures are counted again."""
+
+
+def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
+    """Return the interval for a probability from independent samples (Clopper and Pearson)."""
+    tail, held = 0.5 * (1.0 - CONFIDENCE), samples - failures
+    low = betaincinv(failures, held + 1, tail) if failures else 0.0
+    high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
+    return float(low), float(high)
 
 
 class Counted(NamedTuple):
@@ -66,6 +77,24 @@ class Counted(NamedTuple):
         return low, high
 
 
+@dataclass(frozen=True)
+class Redrawn:
+    """Draws of plain samples that begin with `first`. They are drawn again to save memory."""
+
+    state: LimitState
+    seed: int
+    first: int
+    samples: int
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def __getitem__(self, rows: NDArray[np.int64]) -> Array:
+        """Return the draws (rows, dimension) of some of the samples."""
+        draws = [self.state.draws(self.seed, self.first + row, 1) for row in rows.tolist()]
+        return np.concatenate(draws)
+
+
 def count_failures(
     state: LimitState,
     seed: int,
@@ -80,8 +109,8 @@ def count_failures(
 
     Samples after the last counted failure are also returned.
     """
-    # 1.
-    wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))  # the error falls like 1/sqrt(r - 1)
+    # 1. Two more than the square of 1/target, since the error falls like 1/sqrt(r - 1).
+    wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))
     least = min(least, max_evaluations)
     parts: list[Array] = []
     members: list[NDArray[np.int64]] = []
@@ -90,6 +119,7 @@ def count_failures(
     while done < least or (failures < wanted and done < max_evaluations):
         size = least - done
         if size <= 0:
+            # As many as should hold the missing failures.
             size = math.ceil((wanted - failures) * done / failures) if failures else COUNT_BATCH
         size = min(size, COUNT_BATCH, max_evaluations - done)
         draws = state.draws(seed, start + done, size)
@@ -99,9 +129,13 @@ def count_failures(
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
     values = np.concatenate(parts)
     count = Counted(failures, done)
+    # 3. The first `least` samples are always counted, whether or not they hold r failures.
     if failures >= wanted:
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:
             count = Counted(wanted, last + 1, until_failure=True)
-    level = Population(math.inf, 0.0, values, np.arange(done), np.concatenate(members))
+    level = Population(
+        math.inf, 0.0, values, np.arange(done), np.concatenate(members),
+        Redrawn(state, seed, start, done),
+    )  # fmt: skip
     return count, Descent(done, [level], stress, done, complete=True)

@@ -17,7 +17,7 @@ Steps:
    these interfaces, and by factors at stratified quantiles of their distributions.
    This gives `SPECIMENS_PER_SAMPLE` specimens for each solved sample.
 4. The specimens from one solved sample form a family. The error follows from the
-   share of each family among the failures (`uncertainty.ancestral_variance`), as in
+   share of each family among the failures (`subset.ancestral_variance`), as in
    subset simulation.
 5. Solve more samples until the error is small enough.
 
@@ -27,7 +27,10 @@ to plain counting.
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +39,9 @@ from scipy.special import ndtri
 from stiction.base.arrays import Array
 from stiction.ensemble.limit_state import LimitState, scales_with_strength
 from stiction.random.mapping import from_normal
-from stiction.reliability.subset import Descent, Population
+from stiction.reliability.counting import Redrawn
+from stiction.reliability.subset import Descent, Population, generator
 from stiction.reliability.tail import Goal, Tail
-from stiction.reliability.uncertainty import generator
 
 SPECIMENS_PER_SAMPLE = 128
 """Specimens for each solved sample."""
@@ -56,38 +59,43 @@ LONG_LIST, LIST_COST = 100, 5.0
 over a long list, over the cost of an evaluation in counting."""
 
 
-class Counts(NamedTuple):
-    """Specimens by solved sample: onsets, interfaces and quantile levels of their factors."""
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """Specimens by solved sample: onsets, interfaces and quantile levels of their factors.
+
+    ``counts[numbers]`` and ``len(counts)`` give the draws and the number of specimens.
+    """
 
     state: LimitState
     values: Array  # (samples, specimens), Pa
     members: NDArray[np.int64]
     shares: Array  # NaN if the sample keeps its own factor
 
-    @property
+    def __len__(self) -> int:
+        return self.values.size
+
+    def __getitem__(self, numbers: NDArray[np.int64]) -> Array:
+        """Return the draws of the specimens with given numbers."""
+        experiment, (samples, specimens) = self.state.experiment, self.values.shape
+        plain = Redrawn(self.state, experiment.seed, 0, samples)
+        draws, shares = plain[numbers // specimens], self.shares.ravel()[numbers]
+        new = np.flatnonzero(np.isfinite(shares))
+        if new.size:
+            column = experiment.random.factor_column(experiment.problem.interface)
+            draws[new, column] = ndtri(shares[new])
+            experiment.random.select(draws, new, self.members.ravel()[numbers][new])
+        return draws
+
+    @cached_property
     def tail(self) -> Tail:
-        """The lower tail. Each solved sample counts as one ancestor."""
+        """The lower tail. Each solved sample counts as one ancestor (step 4)."""
         samples, specimens = self.values.shape
         ancestors = np.repeat(np.arange(samples), specimens)
         values, members = self.values.ravel(), self.members.ravel()
-        level = Population(math.inf, 0.0, values, ancestors, members)
+        level = Population(math.inf, 0.0, values, ancestors, members, self)
         descent = Descent(samples, [level], -math.inf, samples, complete=True)
         reason = f"counting takes fewer evaluations: {specimens} specimens of each sample"
         return Tail([descent], "plain", reason, samples)
-
-    def draws(self, picks: NDArray[np.int64]) -> Array:
-        """Return the draws of specimens with the given numbers."""
-        state, specimens = self.state, self.values.shape[1]
-        random, seed = state.experiment.random, state.experiment.seed
-        rows = [state.draws(seed, int(pick) // specimens, 1) for pick in picks]
-        draws = np.concatenate([np.empty((0, state.dimension)), *rows])
-        shares = self.shares.ravel()[picks]
-        new = np.isfinite(shares)
-        if new.any():
-            column = random.factor_column(state.experiment.problem.interface)
-            draws[new, column] = ndtri(shares[new])
-            random.select(draws, np.where(new)[0], self.members.ravel()[picks][new])
-        return draws
 
     def characteristic(self, confidence: float) -> float:
         """Return the 5 % quantile, Pa, that a share `confidence` of the interfaces exceeds.
@@ -101,12 +109,10 @@ class Counts(NamedTuple):
             return float(np.quantile(self.values, CHARACTERISTIC))
         laws, law = random.factor_laws
         first = self.members[:, 0]
-        ratios = self.values[:, 0] / random.means[first]
-        for number in np.unique(law[first]):
-            rows = np.flatnonzero(law[first] == number)
-            ratios[rows] /= laws[number].distribution.ppf(self.shares[rows, 0])
+        factor = _by_law(laws, law[first], self.shares[:, 0])
+        ratios = self.values[:, 0] / random.means[first] / factor
         steps = (np.arange(SPECIMENS_PER_SAMPLE) + 0.5) / SPECIMENS_PER_SAMPLE
-        factors = np.array([one.distribution.ppf(steps) for one in laws])
+        factors = np.array([marginal.distribution.ppf(steps) for marginal in laws])
         quantiles = []
         for number, group in enumerate(random.groups):
             group_ratios = ratios[random.groups[first] == group]
@@ -115,18 +121,14 @@ class Counts(NamedTuple):
                 quantiles.append(np.quantile(values, CHARACTERISTIC))
         return float(np.quantile(quantiles, 1.0 - confidence))
 
-    def lowest(self, stress: float, count: int) -> tuple[Array, Array]:
-        """Return the draws and onsets of the lowest specimens. Half of them are below a stress."""
-        values = self.values.ravel()
-        below = int(np.sum(values < stress))
-        order = np.argpartition(values, min(2 * below, values.size - 1))[: 2 * below]
-        picks = np.random.default_rng(0).permutation(order)[:count]
-        return self.draws(picks), values[picks]
 
-    def failing(self, stress: float, count: int) -> Array:
-        """Return the draws of some specimens below a stress."""
-        failed = np.flatnonzero(self.values.ravel() < stress)
-        return self.draws(np.random.default_rng(1).permutation(failed)[:count])
+def _by_law(laws: Sequence[Any], law: NDArray[np.int64], shares: Array) -> Array:
+    """Return the factors at quantile levels `shares` of the laws with numbers `law`."""
+    factors = np.empty(shares.shape)
+    for number in np.unique(law):
+        of_law = law == number
+        factors[of_law] = laws[number].distribution.ppf(shares[of_law])
+    return factors
 
 
 def _expands(state: LimitState) -> bool:
@@ -138,49 +140,44 @@ def _expands(state: LimitState) -> bool:
     )
 
 
-def solve(state: LimitState, first: int, samples: int) -> Counts:
+def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
     """Solve samples `first`, ... and return the specimens from each sample (steps 1 to 3)."""
     experiment = state.experiment
     random, interface = experiment.random, experiment.problem.interface
+    # 1.
     draws = state.draws(experiment.seed, first, samples)
     onsets, members = state(draws), state.member(draws)
-    column = random.factor_column(interface)
     if not _expands(state):
         return Counts(state, onsets[:, None], members[:, None], np.full((samples, 1), np.nan))
     laws, law = random.factor_laws
     # 2.
-    ratios = onsets / random.means[members]
+    ratios, own_factor = (
+        onsets / random.means[members],
+        draws[:, random.factor_column(interface)],
+    )
     for number in np.unique(law[members]):
         rows = np.flatnonzero(law[members] == number)
-        ratios[rows] /= from_normal(laws[number], draws[rows, column])
-    # 3.
-    rng = generator(experiment.seed, 5, first)
-    steps = (
-        np.arange(SPECIMENS_PER_SAMPLE) + rng.random((samples, SPECIMENS_PER_SAMPLE))
-    ) / SPECIMENS_PER_SAMPLE
-    chosen = np.empty((samples, SPECIMENS_PER_SAMPLE), np.int64)
-    group = random.groups[members]
+        ratios[rows] /= from_normal(laws[number], own_factor[rows])
+    # 3. A random place in each of equal steps: in order for the interfaces of a group, and
+    # permuted for the factors, which are independent of the interfaces.
+    rng, shape = generator(experiment.seed, 5, first), (samples, SPECIMENS_PER_SAMPLE)
+    steps = (np.arange(SPECIMENS_PER_SAMPLE) + rng.random(shape)) / SPECIMENS_PER_SAMPLE
+    chosen, group = np.empty(shape, np.int64), random.groups[members]
     for number in np.unique(group):
         alike, rows = np.flatnonzero(random.groups == number), np.flatnonzero(group == number)
         chosen[rows] = alike[(steps[rows] * alike.size).astype(np.int64)]
-    shares = rng.permuted(
-        (np.arange(SPECIMENS_PER_SAMPLE) + rng.random((samples, SPECIMENS_PER_SAMPLE)))
-        / SPECIMENS_PER_SAMPLE,
-        axis=1,
-    )
-    factors = np.empty(shares.shape)
-    for number in np.unique(law[chosen]):
-        of_law = law[chosen] == number
-        factors[of_law] = laws[number].distribution.ppf(shares[of_law])
+    shares = (np.arange(SPECIMENS_PER_SAMPLE) + rng.random(shape)) / SPECIMENS_PER_SAMPLE
+    shares = rng.permuted(shares, axis=1)
+    factors = _by_law(laws, law[chosen], shares)
     return Counts(state, ratios[:, None] * random.means[chosen] * factors, chosen, shares)
 
 
-def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail] | None:
+def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
     """Count failures up to the goal (steps 4 and 5). Return None if chains cost less."""
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
         return None
-    counts = solve(state, 0, min(FIRST_SAMPLES, budget))
+    counts = solve_specimens(state, 0, min(FIRST_SAMPLES, budget))
     while True:
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
@@ -189,20 +186,18 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts, Tail
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
         state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
-            return counts, tail
-        wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2 if math.isfinite(cv) else math.inf
+            return counts
+        # Compare the costs of counting to the target and of subset simulation.
+        wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
-        price = (
-            SUBSET_EVALUATIONS * (decades / goal.cv) ** 2 * (LIST_COST if long_list else 1.0)
-        )
-        if wanted > min(price, budget):
+        price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2
+        if wanted > min(price * (LIST_COST if long_list else 1.0), budget):
             return None
-        size = int(
-            min(max(wanted - samples, FIRST_SAMPLES), budget - samples, MOST_STEP_SAMPLES)
-        )
-        if size <= 0:
-            return counts, tail
-        more = solve(state, samples, size)
+        size = int(min(max(wanted - samples, FIRST_SAMPLES), MOST_STEP_SAMPLES))
+        more = solve_specimens(state, samples, min(size, budget - samples))
         counts = Counts(
-            state, *(np.concatenate(pair) for pair in zip(counts[1:], more[1:], strict=True))
+            state,
+            np.concatenate([counts.values, more.values]),
+            np.concatenate([counts.members, more.members]),
+            np.concatenate([counts.shares, more.shares]),
         )

@@ -3,10 +3,12 @@
 Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z,
 where the probability is so small that nearly no plain sample is below y.
 
-Source. The method follows Au and Beck (2001), Probabilistic Engineering Mechanics
+Sources. The method follows Au and Beck (2001), Probabilistic Engineering Mechanics
 16, 263, with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
 (2015). This is a preconditioned Crank-Nicolson walk, whose acceptance does not fall
-with the dimension.
+with the dimension. Chan and Lai (2013), Annals of Statistics 41, 2877, and Lee and
+Whiteley (2018), Biometrika 105, 609, derive the variance of chains from their
+genealogy.
 
 Steps. A level is the set of z with g(z) below its ceiling.
 
@@ -28,7 +30,7 @@ Steps. A level is the set of z with g(z) below its ceiling.
    to b = 1. The states are the samples of the next level. Continue with step 2.
 6. P(g < y) is the probability of the rarest level whose ceiling is at least y, times the
    share of its samples below y. The error follows from their first ancestors
-   (`uncertainty.ancestral_variance`).
+   (`ancestral_variance`).
 
 Departures. Only samples strictly below the ceiling go on. The product of the shares is
 then unbiased, although the levels are chosen from the samples (Brehier, Gazeau,
@@ -39,14 +41,13 @@ their acceptance at every step.
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.model import check_memory
-from stiction.reliability.uncertainty import ancestral_variance
 
 Function = Callable[[Array], Array]
 Label = Callable[[Array], NDArray[np.int64]]
@@ -59,8 +60,40 @@ FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEPT_POPULATIONS = 3
 """Number of the last populations that keep their draws."""
+NO_DRAWS = np.empty((0, 0))
 STORED_COPIES = KEPT_POPULATIONS + 2  # the states of the chains and their noise
 ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
+
+
+def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
+    """Return the squared cv of an estimate by subset simulation, from the ancestors of failures.
+
+    Families that descend from different first samples evolve independently. There are
+    N = `samples` first samples. The shares w_i of the families among the failures
+    therefore measure the error, v = sum (w_i - 1/N)^2. It is computed in three steps:
+
+    1. Sum the squared shares, and subtract 1/N.
+    2. If all samples fail, v is zero. Use at least (2/N)^2, as if two more samples
+       had not failed. This bounds the error as the binomial distribution does.
+    3. With k families of equal size, v is 1/k, but the variance of a mean of k values
+       needs 1/(k - 1). Therefore return v/(1 - v).
+    """
+    if ancestors.size == 0:
+        return math.inf
+    _, sizes = np.unique(ancestors, return_counts=True)
+    shares = sizes / ancestors.size
+    spread = max(float(np.sum(shares * shares)) - 1.0 / samples, (2.0 / samples) ** 2)
+    return spread / (1.0 - spread) if spread < 1.0 else math.inf
+
+
+def generator(seed: int, *key: int) -> np.random.Generator:
+    """Return an independent generator for each key under one seed.
+
+    The first number of the spawn key separates this generator from the streams of
+    random fields.
+    """
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
+    return np.random.Generator(np.random.PCG64DXSM(sequence))
 
 
 class Population(NamedTuple):
@@ -71,13 +104,14 @@ class Population(NamedTuple):
     values: Array  # (samples,)
     ancestors: NDArray[np.int64]  # the sample of the first level that each descends from
     members: NDArray[np.int64]  # (samples,), number of the interface of each
-    draws: Array = np.empty((0, 0))  # (samples, dimension); empty for early levels
+    # (samples, dimension), or an object that draws them again. Empty for early levels.
+    draws: Any = NO_DRAWS
     acceptance: float = 1.0  # share of Metropolis steps
     step: float = FIRST_STEP  # b at the end
 
     def light(self) -> Self:
         """Return the population without draws, which take nearly all of the memory."""
-        return self._replace(draws=np.empty((0, self.draws.shape[1])))
+        return self._replace(draws=NO_DRAWS)
 
 
 class Below(NamedTuple):
@@ -121,11 +155,11 @@ class Descent(NamedTuple):
 
     def light(self) -> Self:
         """Return the same repetition without draws."""
-        return self._replace(populations=[one.light() for one in self.populations])
+        return self._replace(populations=[level.light() for level in self.populations])
 
     def _holders(self, value: float) -> list[Population]:
         """Return the populations that contain a value. The rarest is last."""
-        return [one for one in self.populations if one.ceiling >= value]
+        return [level for level in self.populations if level.ceiling >= value]
 
     def probability(self, value: float) -> float:
         """Return the estimate of P(function < value) (step 6). Zero without a sample below."""
@@ -146,16 +180,16 @@ class Descent(NamedTuple):
         family = rarest.ancestors[rarest.values < value]
         return ancestral_variance(family, self.samples) + self.last_variance
 
-    def failing(self, value: float) -> tuple[Array, Array]:
-        """Return draws and values of the samples in the last population that are below a value."""
+    @property
+    def failing(self) -> tuple[Any, Array]:
+        """Draws and values of the last population, or of the failures that walks reached."""
         last = self.populations[-1]
-        below = last.values < value
-        return self.walked or (last.draws[below], last.values[below])
+        return self.walked or (last.draws, last.values)
 
-    def around(self, value: float) -> tuple[Array, Array]:
-        """Return draws and values on both sides of a value, in the correct proportions.
+    def around(self, value: float) -> tuple[Population, NDArray[np.int64]]:
+        """Return a population, and its samples on both sides of a value, in correct proportions.
 
-        They are the lowest samples of a population, twice as many as lie below the
+        They are the lowest samples of the population, twice as many as lie below the
         value. If more than half of a population lies below the value, a less rare
         population is used.
         """
@@ -163,10 +197,10 @@ class Descent(NamedTuple):
         while True:
             holder = holders.pop()
             below = int(np.sum(holder.values < value))
-            if 2 * below <= holder.values.size or not (holders and holders[-1].draws.size):
+            if 2 * below <= holder.values.size or not (holders and len(holders[-1].draws)):
                 break
-        lowest = np.argsort(holder.values, kind="stable")[: min(2 * below, len(holder.draws))]
-        return holder.draws[lowest], holder.values[lowest]
+        order = np.argsort(holder.values, kind="stable")
+        return holder, order[: min(2 * below, len(holder.draws))]
 
 
 def _share(which: NDArray[np.bool_]) -> float:

@@ -29,18 +29,22 @@ Steps:
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.limit_state import LimitState, no_single_length
-from stiction.methods.protocol import METHODS, optional_member
-from stiction.reliability.subset import Descent, descend
+from stiction.reliability.counting import CONFIDENCE
+from stiction.reliability.subset import Descent, descend, generator
 from stiction.reliability.two_level import bridge
-from stiction.reliability.uncertainty import generator, log_width
 
+FREQUENT = 0.01
+"""Probability above which counting needs no more evaluations than subset simulation."""
 UNLIMITED_EVALUATIONS = 10**18
 """More evaluations than any repetition needs."""
 SIZE_MARGIN = 1.1
@@ -79,6 +83,26 @@ class Goal(NamedTuple):
     cv: float  # coefficient of variation to reach
     stress: float = -math.inf
     probability: float = 0.0
+
+
+def log_width(cv: float) -> float:
+    """Return half the width of the interval for log(estimate).
+
+    The width uses Student's distribution, because the coefficient of variation is
+    itself estimated from about 1/cv^2 independent families.
+    """
+    if cv == 0.0:
+        return 0.0
+    freedom = max(1.0, 1.0 / (cv * cv) - 1.0)
+    return float(stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)) * math.sqrt(math.log1p(cv * cv))
+
+
+def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
+    """Return an interval within [0, 1] for an estimate whose logarithm is roughly normal."""
+    if not math.isfinite(cv):
+        return 0.0, 1.0
+    factor = math.exp(log_width(cv))
+    return probability / factor, min(1.0, probability * factor)
 
 
 class Tail(NamedTuple):
@@ -226,6 +250,46 @@ class Tail(NamedTuple):
         return low, self.quantile(min(probability * math.exp(width), 1.0))
 
 
+@dataclass(frozen=True, eq=False)
+class TailPoint:
+    """A tail at a stress: the probability of a lower onset, and its errors."""
+
+    state: LimitState
+    tail: Tail
+    stress: float
+
+    @cached_property
+    def probability(self) -> float:
+        """Probability of an onset below the stress."""
+        return self.tail.probability(self.stress)
+
+    @cached_property
+    def sampling_cv(self) -> float:
+        """Coefficient of variation of the probability due to sampling."""
+        return self.tail.cv(self.stress)
+
+    @cached_property
+    def members_cv(self) -> float:
+        """Part of `cv` due to the list of interfaces. 0 for a single interface or a mixture."""
+        if not self.state.is_sample:
+            return 0.0
+        return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
+
+    @cached_property
+    def cv(self) -> float:
+        """Coefficient of variation of the probability, due to sampling and the list."""
+        return math.hypot(self.sampling_cv, self.members_cv)
+
+    @cached_property
+    def members(self) -> Array:
+        """Probability of each of the equally likely interfaces. Empty for a single interface."""
+        if not self.state.several:
+            return np.zeros(0)
+        lows, highs = np.array(self.state.bounds_of_members()).T
+        probabilities = self.tail.of_members(self.stress, lows.size)
+        return np.select([self.stress <= lows, self.stress >= highs], [0.0, 1.0], probabilities)
+
+
 def _squares(*labels: Array) -> float:
     """Count the samples with each label, and return the sum of the squared counts."""
     _, sizes = np.unique(np.stack(labels), axis=1, return_counts=True)
@@ -277,7 +341,7 @@ def two_levels_refused(state: LimitState) -> str | None:
     experiment = state.experiment
     if state.may_survive:
         return "behind a machine, the first instability need not happen"
-    if optional_member(experiment.method, "first_stage") is None:
+    if state.first_stage is None:
         return f"{experiment.method.type!r} has no less expensive first stage"
     return no_single_length(experiment.problem, experiment.random)
 
@@ -307,7 +371,7 @@ def sample_tail(
     # 1.
     guide, auto, seed = None, algorithm == "auto", state.experiment.seed
     if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
-        guide = state.by(METHODS[state.experiment.method.first_stage]())
+        guide = state.first_stage
     if auto and guide and pilot is None:
         draws = state.draws(seed, 0, min(GUIDE_PILOT_SAMPLES, budget // 5))
         pilot = draws, state(draws)

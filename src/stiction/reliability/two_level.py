@@ -100,7 +100,7 @@ def bridge(
     guided, spent, lowest = descent.evaluations, 0, descent.populations[-1]
     best: Descent | None = None
     for population in reversed(descent.populations):
-        if population.draws.shape[0] == 0 or spent + samples + WALK_STEPS > max_evaluations:
+        if not len(population.draws) or spent + samples + WALK_STEPS > max_evaluations:
             break
         # 2. exact values of a level
         looked = rng.permutation(population.values.size)[:samples]
@@ -125,10 +125,10 @@ def bridge(
         if failed.any() and math.isfinite(population.ceiling):
             room = (max_evaluations - spent) // WALK_STEPS
             walkers = min(int(failed.sum()), max(16, samples // WALK_STEPS), room)
-            seeds, theirs = (one[:walkers] for one in walked)
+            seeds, seed_values = (part[:walkers] for part in walked)
             # The seeds themselves come first, and do not count.
             states, stresses, *_ = grow(
-                exact, seeds, theirs, limit, WALK_STEPS + 1, lowest.step, rng
+                exact, seeds, seed_values, limit, WALK_STEPS + 1, lowest.step, rng
             )
             spent += walkers * WALK_STEPS
             later = states[walkers * (1 + FORGOTTEN_STEPS) :]
@@ -138,9 +138,8 @@ def bridge(
             guided += later.shape[0]
             walked = states[-walkers:], stresses[-walkers:]
         exact_level = Population(
-            math.inf, population.log_probability, values, families, population.members[looked],
-            np.empty((0, dimension)),
-        )  # fmt: skip
+            math.inf, population.log_probability, values, families, population.members[looked]
+        )
         best = Descent(
             samples, [exact_level], limit, spent, True, guided, last, last_variance, walked
         )

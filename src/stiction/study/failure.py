@@ -41,10 +41,9 @@ from stiction.ensemble.store import Store
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member
 from stiction.problem.results import to_dataset
-from stiction.reliability.answer import Estimate
-from stiction.reliability.failure import CURVE, chances, curve_doubts, curve_of
+from stiction.reliability.curve import CURVE, chances, curve_doubts, curve_of
 from stiction.reliability.subset import Descent, Population
-from stiction.reliability.tail import OF_CURVES, Goal, Tail, repetition
+from stiction.reliability.tail import OF_CURVES, Goal, Tail, TailPoint, repetition
 
 VARIABLES = CURVE | {
     "lower_bound": Variable("Pa", "stress below which no interface slides", ())
@@ -95,9 +94,7 @@ def repetitions_in(rows: NDArray[Any]) -> Iterator[tuple[int, int, Descent]]:
         for _, level in table.groupby("level"):
             ceiling, chance = (level[name].iloc[0].item() for name in OF_LEVEL)
             values, ancestors, members = (level[name].to_numpy() for name in OF_SAMPLE)
-            populations.append(
-                Population(ceiling, chance, values, ancestors, members, np.empty((0, 0)))
-            )
+            populations.append(Population(ceiling, chance, values, ancestors, members))
         samples, threshold, evaluations, complete = (
             table[name].iloc[0].item() for name in OF_ALL
         )
@@ -222,7 +219,7 @@ def complete_curves(
                         tail = Tail([repetition_of(state, rows.smallest, 0)])
                     if tail is None:
                         continue
-                    end = Estimate(state, tail, tail.quantile(rows.smallest))
+                    end = TailPoint(state, tail, tail.quantile(rows.smallest))
                     for text in curve_doubts(end, rows.smallest):
                         warn_accuracy(text)
             store.note_pilot({"doubts": texts_of(warned)})

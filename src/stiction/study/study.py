@@ -57,7 +57,8 @@ from stiction.random.equally_likely import (
 from stiction.random.equally_likely import Uncertain as Likely
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
-from stiction.reliability.failure import design_stress, failure_probability
+from stiction.reliability.design import design_stress
+from stiction.reliability.failure import failure_probability
 from stiction.study.failure import Repetitions, complete_curves
 from stiction.study.run import AnyPart, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes

@@ -1,0 +1,202 @@
+"""Failure curves: the probability of an onset below a stress, over many stresses.
+
+Problem. Tabulate P(T < s) for the onset T from `COMMONEST` down to a smallest probability.
+
+Steps:
+
+1. Sample the tail down to the smallest probability (`tail.sample_curve`). If interfaces
+   are drawn from a fit or a posterior, draw more of them until the error due to their
+   number is small enough (`answer.with_enough_members`).
+2. Warn if the end of the curve is in doubt (`curve_doubts`).
+3. At `PER_DECADE` probabilities per decade, take the stress, its interval, and the
+   probabilities of the equally likely interfaces (`curve_of`).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.base.arrays import Array
+from stiction.base.errors import merge_warnings, warn_accuracy
+from stiction.base.model import Count, Flag, Number, Progress, checked
+from stiction.base.progress import Meter
+from stiction.base.variables import Variable
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
+from stiction.methods.protocol import MethodObject
+from stiction.problem.problem import Problem
+from stiction.problem.results import study_attributes, to_dataset
+from stiction.random.equally_likely import AnyRandom, as_random
+from stiction.reliability.answer import (
+    Budget,
+    Probability,
+    TargetCv,
+    band_of,
+    exact_doubts,
+    few_members,
+    prepare,
+    sampling_target,
+    with_enough_members,
+)
+from stiction.reliability.tail import Goal, Tail, TailPoint, lognormal_interval, sample_curve
+
+CURVE_CV = 0.3
+"""Coefficient of variation at the end of a curve by default."""
+COMMONEST, PER_DECADE = 0.5, 3
+"""Probability at the beginning of a curve, and points per decade."""
+
+CURVE: dict[str, Variable] = {
+    name: Variable(unit, text, ("point",))
+    for name, unit, text in (
+        ("stress", "Pa", "stress"),
+        ("stress_above_bound", "Pa", "stress above its lower bound"),
+        ("friction_coefficient", "1", "stress over the mean normal pressure"),
+        ("force", "N", "stress times the area of the interface"),
+        ("probability", "1", "probability of an onset below the stress"),
+        ("probability_low", "1", "lower end of the interval of the probability"),
+        ("probability_high", "1", "upper end of the 95 % interval of the probability"),
+        ("cv", "1", "coefficient of variation of the probability"),
+        ("stress_low", "Pa", "lower end of the interval of the stress"),
+        ("stress_high", "Pa", "upper end of the interval of the stress"),
+        ("band_low", "1", "probability that 5 % of the interfaces do not exceed"),
+        ("band_high", "1", "probability that 95 % of the interfaces do not exceed"),
+        ("members_cv", "1", "part of the coefficient of variation by the list of interfaces"),
+    )
+}
+CURVE["members"] = Variable("1", "probability of each interface", ("point", "member"))
+OF_A_LIST = ("band_low", "band_high", "members_cv", "members")
+
+
+@checked
+def failure_curve(
+    problem: Problem,
+    random: AnyRandom,
+    *,
+    method: MethodObject,
+    smallest: Probability = 1e-9,
+    target_cv: TargetCv = CURVE_CV,
+    seed: Number = 0,
+    max_evaluations: Budget | None = None,
+    event: StressName = "critical_stress",
+    mixture: Flag = False,
+    workers: Count | None = None,
+    progress: Progress = True,
+) -> xr.Dataset:
+    """Estimate P(onset < s) from 0.5 down to a smallest probability, with three points per decade.
+
+    Parameters
+    ----------
+    smallest : float
+        Smallest probability of the curve.
+    target_cv : float
+        Coefficient of variation to reach at the smallest probability. It is lower at
+        other points. Repetitions are added until it is reached. They are the same as
+        in `Study.failure_curve` with the same numbers.
+    problem, random, method, seed, max_evaluations, event, mixture, workers, progress
+        As in `design_stress`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over 'point': `stress` and `stress_above_bound` (Pa), `probability` with
+        `probability_low`, `probability_high` and `cv`, and `stress_low` and
+        `stress_high` (Pa). If there is a normal pressure, `friction_coefficient` is
+        the stress over the mean pressure. If the area is known, there is `force` (N).
+        `stress_above_bound` has no meaning if the attribute `lower_bound` is zero or
+        less. For a list of interfaces, `probability` is their mean, and `members`,
+        over 'point' and 'member', holds the curve of each interface. The
+        probabilities of 5 % and 95 % of the interfaces are at most `band_low` and
+        `band_high`.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid. The message lists every problem.
+
+    Warns
+    -----
+    AccuracyWarning
+        As in `failure_probability`, for the end of the curve.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> curve = st.failure_curve(problem, strength, method=st.LocalCriterion(), smallest=1e-3)
+    >>> bool((curve.stress.diff("point") < 0.0).all())
+    True
+    """
+    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
+
+    def solve(experiment: Experiment, meter: Meter) -> TailPoint:
+        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+        state = weakest_first(state)
+        goal = Goal(sampling_target(state, target_cv), probability=smallest)
+        tail = sample_curve(state, goal, budget)
+        return TailPoint(
+            state, tail, tail.quantile(smallest) if tail.complete else tail.reached
+        )
+
+    with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
+        # 1.
+        _, end = with_enough_members(experiment, target_cv, meter, warned, solve)
+        # 2.
+        for text in curve_doubts(end, smallest, target_cv):
+            warn_accuracy(text)
+    attributes = study_attributes(problem=problem, random=experiment.given, method=method)
+    attributes |= {"seed": seed} | ({"mixture": 1} if mixture else {})
+    # 3. If the event never happens, the only point is NaN.
+    last = smallest if end.tail.complete else end.probability or COMMONEST
+    return curve_of(end.tail, end.state, chances(last), attributes)
+
+
+def curve_doubts(end: TailPoint, smallest: float, target_cv: float = CURVE_CV) -> list[str]:
+    """Return the reasons not to trust the end of a curve (step 2)."""
+    if not end.tail.complete:
+        return [f"{end.tail.short_of(f'P = {smallest:g}')}. The curve ends there"]
+    return few_members(end.state.experiment.random, end, target_cv) + exact_doubts(end)
+
+
+def chances(smallest: float) -> Array:
+    """Return the probabilities of the points on a curve."""
+    decades = max(np.log10(COMMONEST / smallest), 0.0)
+    count = int(np.ceil(decades * PER_DECADE)) + 1
+    probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
+    return probabilities
+
+
+def curve_of(
+    tail: Tail, state: LimitState, wanted: Array, attributes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the labelled curve of a tail at given probabilities (step 3)."""
+    lowest, pressure = state.bounds[0], state.experiment.pressure
+    area = state.experiment.problem.area or np.nan
+    rows, members = [], []
+    for chance in wanted.tolist():
+        point = TailPoint(state, tail, stress := tail.quantile(chance))
+        members.append(point.members)
+        values = stress, stress - lowest, stress / pressure, stress * area, point.probability
+        ends = lognormal_interval(point.probability, point.cv)
+        sides = tail.stress_interval(chance, point.cv, lowest)
+        rows.append((*values, *ends, point.cv, *sides, *band_of(members[-1]), point.members_cv))
+    table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))
+    table["members"] = np.array(members)
+    # So many samples survive that no stress has this chance.
+    survive = np.isinf(table["stress"])
+    for values in table.values():
+        values[survive] = np.nan
+    known = dict.fromkeys(OF_A_LIST, state.several)
+    known |= {"friction_coefficient": np.isfinite(pressure), "force": np.isfinite(area)}
+    table = {name: values for name, values in table.items() if known.get(name, True)}
+    about = {
+        "evaluations": tail.spent,
+        "repetitions": len(tail.repetitions),
+        "lower_bound": lowest,
+        "event": state.event,
+        "method": state.experiment.method.type,
+        "survived": tail.survived,
+    }
+    return to_dataset(table, CURVE, {}, {**attributes, **about})

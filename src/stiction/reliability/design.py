@@ -1,0 +1,300 @@
+"""The design stress, and its change with the family of the factor and with assumed constants.
+
+Problem. Estimate the stress below which the interface slides with a given probability.
+Its interval contains the error of the computation. Assumptions have a larger effect:
+constants in the problem that were not measured, and the family of the factor between
+specimens. How large is this effect?
+
+Source. The method is local sensitivities with common random numbers, as in Asmussen
+and Glynn, Stochastic Simulation (2007), chapter VII.
+
+Steps:
+
+1. Count many specimens for each solved field, if this costs less (`factors`).
+   Otherwise sample the tail (`tail`). The design stress is a quantile of the onset.
+2. If so many onsets lie at their lower bound that the design stress is the bound
+   itself, return the bound.
+3. For the sensitivities, solve `SAMPLES_PER_END` samples, and take the quantile at the
+   design probability (`factors.solve`). All further steps use the same draws, so that
+   differences are accurate.
+4. For each family, take the quantile over the interfaces with this family. These
+   interfaces are draws from the posterior given the family.
+5. For each constant solve the same samples at both ends of its range: a stated range, the
+   5 and 95 % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its
+   value.
+6. Multiply the design by the ratios of the quantiles from steps 4 and 5 to the
+   quantile from step 3.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from stiction.base.errors import InputError, collect_warnings
+from stiction.base.model import Count, Flag, Number, Progress, Real, checked, is_finite
+from stiction.base.progress import Meter
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
+from stiction.methods.protocol import MethodObject
+from stiction.problem.problem import Problem
+from stiction.random.dotted_keys import with_values
+from stiction.random.equally_likely import AnyRandom, as_random
+from stiction.random.marginals import FACTOR_FAMILIES
+from stiction.random.spectra import Share
+from stiction.reliability.answer import (
+    Answer,
+    Budget,
+    Probability,
+    TargetCv,
+    answered,
+    exact_doubts,
+    imprecise,
+    prepare,
+    sampling_target,
+)
+from stiction.reliability.factors import Counts, count_tail, solve_specimens
+from stiction.reliability.tail import FREQUENT, Goal, TailPoint, sample_tail
+
+SAMPLES_PER_END = 300
+"""Samples that are solved at each end of a range."""
+USUAL_SHARE = 0.1
+"""Share of a constant below and above its value if no range is stated."""
+CONSTANTS = (
+    "friction.residual_ratio", "friction.residual_strength", "friction.weakening_rate",
+    "friction.critical_slip", "friction.fracture_energy", "load.normal_pressure",
+    "load.pressing_force", "solid.shear_modulus", "specimen.height", "specimen.drive.stiffness",
+    "specimen.drive.height",
+)  # fmt: skip
+"""Dotted keys of the constants that may be assumed, if they are numbers in a problem."""
+FAMILY = "family of the factor"
+
+
+@checked
+def design_stress(
+    problem: Problem,
+    random: AnyRandom,
+    *,
+    probability: Probability,
+    method: MethodObject,
+    target_cv: TargetCv = 0.1,
+    seed: Number = 0,
+    max_evaluations: Budget | None = None,
+    event: StressName = "critical_stress",
+    mixture: Flag = False,
+    confidence: Share = 0.75,
+    sensitivities: Flag | dict[str, tuple[Real, Real]] | None = None,
+    workers: Count | None = None,
+    progress: Progress = True,
+) -> Answer:
+    """Estimate the stress below which the interface slides with a given probability.
+
+    The design stress is a quantile of the onset stress. One set of repetitions gives
+    the quantile.
+
+    Parameters
+    ----------
+    probability : float
+        Between 0 and 1, such as 1e-6.
+    method : LocalCriterion or Equilibrium
+        `Rupture`, or a method that would take more than a quarter of an hour on
+        one core, is refused unless `max_evaluations` is 20,000 or more.
+    target_cv : float
+        Coefficient of variation to reach for the failure probability at the design
+        stress.
+    confidence : float
+        Confidence of the `characteristic_stress`.
+    sensitivities : bool or mapping, optional
+        Whether to compute how families and constants affect the design. By default
+        this is done if `random` is a fit, a posterior or `uncertain`. A mapping from
+        dotted keys in the problem to ranges, such as
+        ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 %
+        on either side.
+    problem, random, seed, max_evaluations, event, mixture, workers, progress
+        As in `failure_probability`.
+
+    Returns
+    -------
+    Answer
+        With `stress`, its 95 % `interval` due to the error of the computation (Pa),
+        and `sensitivities`.
+
+    Raises
+    ------
+    InputError
+        If any argument is invalid. The message lists every problem.
+
+    Warns
+    -----
+    AccuracyWarning
+        As in `failure_probability`, and if onsets accumulate at the bound.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> method = st.LocalCriterion()
+    >>> found = st.design_stress(problem, strength, probability=1e-3, method=method, target_cv=0.3)
+    >>> bool(found.stress > found.lower_bound)
+    True
+    """
+
+    def solve(experiment: Experiment, meter: Meter) -> Answer:
+        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+        answer = _quantile(state, probability, target_cv, budget, confidence)
+        source = getattr(experiment.random, "source", None)
+        wanted = source is not None if sensitivities is None else bool(sensitivities)
+        if wanted and math.isfinite(answer.stress):
+            stated = sensitivities if isinstance(sensitivities, dict) else {}
+            effects = sensitivities_of(state, probability, answer.stress, stated)
+            answer = replace(answer, sensitivities=effects)
+        return replace(answer, quantity="stress" if math.isnan(answer.area) else "force")
+
+    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
+    return answered(experiment, target_cv, "design_stress", progress, solve)
+
+
+def _quantile(
+    state: LimitState, probability: float, target_cv: float, budget: int, confidence: float
+) -> Answer:
+    """Return the design stress, by counting or from the tail (steps 1 and 2)."""
+    lowest = state.bounds[0]
+    goal = Goal(sampling_target(state, target_cv), probability=probability)
+    asked: dict[str, Any] = {"probability": probability, "of_stress": True}
+    # 1.
+    if counts := count_tail(state, goal, budget):
+        tail = counts.tail
+        asked |= {
+            "characteristic_stress": counts.characteristic(confidence), "confidence": confidence
+        }  # fmt: skip
+    else:
+        often = probability >= FREQUENT
+        tail = sample_tail(
+            weakest_first(state), goal, budget=budget, algorithm="subset" if often else "auto",
+            reason="frequent" if often else "rare",
+        )  # fmt: skip
+    if not tail.complete:  # the tail ends at its lowest sample
+        point = TailPoint(state, tail, tail.extent[0])
+        interval = (lowest, point.stress) if point.stress > lowest else state.bounds
+        doubts = [tail.short_of(f"P = {probability:g}")]
+        return Answer.at(point, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
+    point, doubts = TailPoint(state, tail, tail.quantile(probability)), []
+    # 2.
+    bound = TailPoint(state, tail, math.nextafter(lowest, math.inf))
+    if bound.probability >= probability:
+        point, asked["stress"] = bound, lowest
+        doubts.append(
+            f"{bound.probability:.2g} of all samples slide at the bound of {lowest:.7g} Pa, within"
+            f" the accuracy of the method. The stress at P = {probability:g} is the bound itself"
+        )
+    interval = tail.stress_interval(probability, point.cv, lowest)
+    if math.isinf(point.stress):
+        interval = interval[0], math.inf
+        doubts.append(
+            f"the event happens in {1.0 - tail.survived:.3g} of all samples, less than"
+            f" P = {probability:g}. No stress has that probability"
+        )
+    doubts += imprecise(point.sampling_cv, goal.cv, tail.spent) + exact_doubts(point)
+    return Answer.at(point, doubts, interval=interval, **asked)
+
+
+def value_at(problem: Any, key: str) -> Any:
+    """Return the value at a dotted key of a problem, or None."""
+    value = problem
+    for name in key.split("."):
+        value = getattr(value, name, None)
+    return value
+
+
+def ranges_of(problem: Any, random: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the range of each constant by dotted key without ``problem.``."""
+    ranges = {}
+    for key in CONSTANTS:
+        value = value_at(problem, key)
+        if np.ndim(value) == 0 and is_finite(value) and value > 0.0:
+            ranges[key] = value * (1.0 - USUAL_SHARE), value * (1.0 + USUAL_SHARE)
+    laws = getattr(getattr(random, "source", None), "laws", {})
+    given: dict[str, Any] = {key: law.ppf([0.05, 0.95]).tolist() for key, law in laws.items()}
+    given |= stated
+    for key, ends in given.items():
+        short = key.removeprefix("problem.")
+        if key.startswith("problem.") and value_at(problem, short) is not None:
+            ranges[short] = tuple(ends)
+        elif key in stated:
+            raise InputError(f"sensitivities: {key}: is not a constant of this problem")
+    return ranges
+
+
+def sensitivities_of(
+    state: LimitState, probability: float, stress: float, stated: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the design stress at both ends of each source, with the largest effect first."""
+    experiment = state.experiment
+    problem, random = experiment.problem, experiment.random
+    # Constants are all at their values, because their ranges are sources.
+    if getattr(random, "constants", ()):
+        random = replace(random, constants=())
+
+    def quantile_at(constants: Mapping[str, float]) -> float:
+        changed = replace(experiment, problem=with_values(problem, constants, "problem"))
+        counts = solve_specimens(replace(state, experiment=changed), 0, SAMPLES_PER_END)
+        return counts.tail.quantile(probability)
+
+    rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
+    with collect_warnings():
+        # 3. and 4.
+        experiment = replace(experiment, random=random)
+        counts = solve_specimens(replace(state, experiment=experiment), 0, SAMPLES_PER_END)
+        reference = counts.tail.quantile(probability)
+        families = _by_family(counts, probability)
+        if len(families) > 1:
+            least, most = (pick(families, key=families.__getitem__) for pick in (min, max))
+            rows.append((FAMILY, least, most, families[least], families[most]))
+        # 5.
+        for key, ends in ranges_of(problem, state.experiment.random, stated).items():
+            state.meter.note = f"what moves the design: {key}"
+            try:
+                low, high = (quantile_at({key: end}) for end in ends)
+            except InputError:  # the constant cannot have this value
+                continue
+            rows.append((f"problem.{key}", f"{ends[0]:.4g}", f"{ends[1]:.4g}", low, high))
+    # 6.
+    rows.sort(key=lambda row: -abs(row[4] - row[3]))
+    area = problem.area or np.nan
+    effects = xr.Dataset(
+        {
+            "low": ("source", np.array([row[1] for row in rows], dtype=str)),
+            "high": ("source", np.array([row[2] for row in rows], dtype=str)),
+        },
+        {"source": np.array([row[0] for row in rows], dtype=str)},
+        {"probability": probability, "stress": stress},
+    )
+    ratios = {
+        end: np.array([row[column] for row in rows], dtype=float) / reference
+        for end, column in (("low", 3), ("high", 4))
+    }
+    for name, unit, scale in (("stress", "Pa", stress), ("force", "N", area * stress)):
+        for end, ratio in ratios.items():
+            effects[f"{name}_at_{end}"] = "source", scale * ratio, {"units": unit}
+    for name, value in families.items():
+        effects.attrs[f"stress by {name}"] = stress * value / reference
+    return effects
+
+
+def _by_family(counts: Counts, probability: float) -> dict[str, float]:
+    """Return the quantile for each family of the factor with enough specimens (step 4)."""
+    random = counts.state.experiment.random
+    laws, law = random.factor_laws
+    names = {family: name for name, family in FACTOR_FAMILIES.items()}
+    kinds = np.array([names.get(type(one), getattr(one, "type", "none")) for one in laws])[law]
+    quantiles = {}
+    for kind in np.unique(kinds):
+        stresses = np.where(kinds[counts.members] == kind, counts.values, np.nan)
+        rows = stresses[np.isfinite(stresses).any(axis=1)]
+        if np.isfinite(rows).sum() * probability >= 1.0:
+            quantiles[str(kind)] = float(np.nanquantile(rows, probability))
+    return quantiles
