@@ -9,7 +9,7 @@ import xarray as xr
 from setups import beta_strength
 
 import stiction as st
-from stiction.random.fields import _conditioned
+from stiction.random.conditioning import conditionings
 from stiction.random.mapping import from_normal
 from stiction.random.transport import make_transport
 
@@ -32,7 +32,7 @@ def all_of(coordinates):
 
 
 def conditioning(given, interface):
-    ((_, known),) = _conditioned(st.RandomInterface(strength=given), interface)
+    ((_, known),) = conditionings(st.RandomInterface(strength=given), interface)
     return known
 
 

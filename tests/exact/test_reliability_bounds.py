@@ -115,6 +115,36 @@ def test_where_most_survive_a_curve_begins_later():
     st.plot.failure_curve(curve)
 
 
+class Never:
+    """A method whose interfaces carry any load."""
+
+    type = label = "never"
+    variables = staticmethod(LOCAL.variables)
+    supports = staticmethod(lambda problem: [])
+    seconds_per_sample = staticmethod(lambda problem: 1e-6)
+
+    def prepare(self, problem):
+        return lambda sample: {
+            name: np.full(sample.samples, math.nan) for name in self.variables(problem)
+        }
+
+
+def test_a_curve_of_an_event_that_never_happens_is_unknown():
+    with pytest.warns(st.AccuracyWarning, match="the event happens in none of 2000 samples"):
+        curve = st.failure_curve(PROBLEM, STRENGTH, method=Never(), progress=False)
+    assert curve.sizes["point"] == 1
+    assert curve.survived == 1.0
+    assert np.isnan(curve.probability.values).all()
+
+
+def test_draws_of_a_list_must_have_their_dimension():
+    state = st.external.limit_state(PROBLEM, [STRENGTH, STRENGTH], LOCAL)
+    draws = state.draws(0, 0, 2)
+    refuses("draws: must have shape", lambda: state(np.hstack([draws, draws])))
+    refuses("draws: must have shape", lambda: state.profiles(np.hstack([draws, draws])))
+    refuses("draws: must be finite", lambda: state(draws * np.inf))
+
+
 def test_binomial_interval_has_its_coverage():
     """That of Clopper and Pearson."""
     for failures in (0, 7, 100):

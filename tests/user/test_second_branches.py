@@ -57,7 +57,7 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
     ]
     alike = np.corrcoef(*onsets)[0, 1]
     assert 0.1 < alike < 0.8
-    monkeypatch.setattr(likelihoods, "no_single_length", lambda *_: "no guide")
+    monkeypatch.setattr(st.LocalCriterion, "unfit_as_guide", lambda *_: "no guide")
     alone = st.infer(PROBLEM, FIELD, PEAKS, **given)
     for one, other in zip(guided.likelihood.densities, alone.likelihood.densities, strict=True):
         assert one.onsets.shape == other.onsets.shape

@@ -66,6 +66,8 @@ def test_an_uncertain_pressure_is_one_more_factor(several):
     exact = RANDOM.between["strength"].distribution.cdf(at).mean()
     assert np.log(found.probability / exact) == pytest.approx(0.0, abs=4.0 * found.cv)
     assert len(source.constants(0)) == 40
+    # Each failing profile has the pressure of its sample.
+    assert np.all(found.failing_profiles.critical_stress < demand)
 
 
 def test_a_study_has_uncertain_constants():

@@ -12,14 +12,12 @@ from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Numbers, check, checked, describe
+from stiction.base.model import Count, checked
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
-from stiction.methods.criterion.windows import windows_of
 from stiction.methods.protocol import METHODS, MethodObject, optional_member
-from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem
 from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
@@ -70,11 +68,17 @@ class LimitState:
         """Return the same limit state with a different method."""
         return replace(self, experiment=self.experiment.by(method))
 
-    @property
-    def first_stage(self) -> Self | None:
-        """The same limit state by the less expensive first stage of the method, if it has one."""
-        name = optional_member(self.experiment.method, "first_stage")
-        return self.by(METHODS[name]()) if name else None
+    @cached_property
+    def guide(self) -> Self | str:
+        """The same limit state by the first stage of the method, or the reason why not."""
+        experiment, method = self.experiment, self.experiment.method
+        name = optional_member(method, "first_stage")
+        if name is None:
+            return f"{method.type!r} has no less expensive first stage"
+        guide = METHODS[name]()
+        unfit = optional_member(guide, "unfit_as_guide")
+        reason: str | None = unfit(experiment.problem, experiment.random.varying)
+        return reason or self.by(guide)
 
     def draws(self, seed: int, first: int, samples: int) -> Array:
         """Return the draws (samples, dimension) that `stiction.monte_carlo` uses."""
@@ -95,14 +99,8 @@ class LimitState:
         The stress is infinite if the event does not happen, because such a sample
         survives any stress.
         """
-        given, experiment = check("draws", draws, Numbers), self.experiment
-        if given.ndim not in (1, 2) or given.shape[-1] != self.dimension:
-            raise InputError(
-                f"draws: must have shape (samples, {self.dimension}). Got {describe(given)}"
-            )
-        if not np.isfinite(given).all():
-            raise InputError("draws: must be finite")
-        rows = np.atleast_2d(given)
+        rows, experiment = np.atleast_2d(draws), self.experiment
+        # Parts of at least `MIN_THREAD_SECONDS`, one for each thread, and at most a batch.
         size = max(int(MIN_THREAD_SECONDS / experiment.seconds), -(-len(rows) // self.workers))
         size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
@@ -117,7 +115,7 @@ class LimitState:
             )
         stress = np.where(np.isnan(stress), np.inf, stress)
         stress = np.maximum(stress, self.bounds[0])  # rounding may be slightly below
-        return stress if given.ndim == 2 else stress[0]
+        return stress if np.ndim(draws) != 1 else stress[0]
 
     def _stress(self, draws: Array) -> Array:
         profiles, values = self.experiment.solve(draws)
@@ -201,9 +199,7 @@ def weakest_first(state: LimitState) -> LimitState:
     count = len(random.members)
     if count == 1:
         return state
-    by = state
-    if state.first_stage and not no_single_length(experiment.problem, random):
-        by = state.first_stage
+    by = state if isinstance(state.guide, str) else state.guide
     ranked = int(np.clip(RANKINGS // count, 4, MAX_RANKED))
     draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)
@@ -228,23 +224,6 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
         and not (np.any(initial) and np.ptp(problem.load_profile))
         and not (zero and (np.any(np.asarray(friction.residual_strength)) or np.any(initial)))
     )
-
-
-def no_single_length(problem: Problem, random: Any) -> str | None:
-    """Return the reason why the local criterion cannot be used, or None."""
-    weakening_rate = problem.uniform_weakening_rate
-    if not problem.friction.linear:
-        return "strength does not fall linearly with slip"
-    if weakening_rate is None or set(SCALES) & random.varying:
-        return "the weakening rate is not uniform"
-    try:
-        if problem.specimen is None:
-            windows_of(problem, weakening_rate)
-        elif not problem.blocks.windows(weakening_rate, weakening_rate).starts.size:
-            return "no part of the specimen becomes unstable by itself"
-    except InputError:
-        return "a critical patch does not fit on the interface"
-    return None
 
 
 @checked

@@ -68,7 +68,7 @@ from stiction.inference.whittle import SpectrumFamily, spectrum_of
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.load import NotNegative
-from stiction.random.equally_likely import Uncertain, uncertain
+from stiction.random.equally_likely import UncertainSource, uncertain
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 
@@ -285,7 +285,7 @@ class FieldFit(Result):
         families = self._families or families_of(True)
         return Profiles(members, mean, levels, within, families, self._prior)
 
-    def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
+    def uncertain(self, parameters: Mapping[str, Any]) -> UncertainSource:
         """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 

@@ -32,7 +32,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, Progress, checked
 from stiction.base.progress import Meter, Show
-from stiction.ensemble.limit_state import no_single_length
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.curves import Curves
 from stiction.inference.grid import grid_of
@@ -258,8 +257,9 @@ def infer(
         # 3.
         whole = box = parameters.whole
         approximate = optional_member(method, "exact_method") is not None
-        if not approximate and not no_single_length(experiment.problem, experiment.random):
-            local = simulation._replace(method=LocalCriterion(), samples=None)
+        guide, varying = LocalCriterion(), experiment.random.varying
+        if not approximate and not guide.unfit_as_guide(experiment.problem, varying):
+            local = simulation._replace(method=guide, samples=None)
             box = _first_box(likelihood_of(local, whole))
         while True:
             # 4. and 5.

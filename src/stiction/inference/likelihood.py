@@ -40,7 +40,7 @@ from stiction.base.errors import InputError, warn_user
 from stiction.base.progress import SILENT, Meter, duration
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, no_single_length
+from stiction.ensemble.limit_state import LimitState
 from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
 from stiction.inference.peaks import VARIABLES, si_of
 from stiction.inference.prior import Prior
@@ -366,7 +366,8 @@ def make_likelihood(
     count = simulation.samples or optional_member(method, "samples_at_point")
     simulation = simulation._replace(samples=count)
     local = optional_member(method, "exact_method") is not None
-    guided = not local and not no_single_length(*prior.at(prior.middle))
+    problem, random = prior.at(prior.middle)
+    guided = not local and not LocalCriterion().unfit_as_guide(problem, random.varying)
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
     total = len(coarse) * len(lengths) * count

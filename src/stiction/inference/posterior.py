@@ -17,7 +17,7 @@ from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
-from stiction.random.equally_likely import Uncertain, uncertain
+from stiction.random.equally_likely import UncertainSource, uncertain
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
@@ -146,7 +146,7 @@ class Posterior(Result):
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return [self.at(int(draw))[1] for draw in draws]
 
-    def uncertain(self, parameters: Mapping[str, Any]) -> Uncertain:
+    def uncertain(self, parameters: Mapping[str, Any]) -> UncertainSource:
         """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
         return uncertain(self, parameters)
 

@@ -106,6 +106,13 @@ class OptionalMembers:
         """
         return False, False
 
+    def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
+        """Return why this method cannot guide another method, whose `first_stage` it is, or `None`.
+
+        `varying` contains the names of the properties that differ between samples.
+        """
+        return None
+
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether to compare the onsets of samples (Pa) with the onsets by `exact_method`.
 

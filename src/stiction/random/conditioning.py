@@ -50,6 +50,7 @@ has without measurements.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -61,14 +62,14 @@ from scipy.special import ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Positive, model
+from stiction.base.model import Positive, check_memory, model
 from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.labels import in_si, unit_of
 from stiction.problem.profiles.placing import MEASURED
 from stiction.random.mapping import from_normal
-from stiction.random.synthesis import condition
+from stiction.random.synthesis import condition, layout
 from stiction.random.transport import (
     ErrorEstimate,
     LogRatio,
@@ -96,6 +97,7 @@ MAX_UPDATES = 8
 SETTLED_MEAN = 1e-3  # change of the means of step 4 that ends the updates
 MIN_SINGULAR_VALUE = 1e-8  # directions with a smaller value keep their draws
 MIN_SCALE = 1e-10  # smallest |p_k| that scales a row
+MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
 MIN_EIGENVALUE = -0.9  # smallest s^2; the eigenvalues of P^-1 are 1 + s^2
 MIN_VARIANCE = 1e-12
 MIN_DEVIATION = 1e-4  # of a measured z; the map is linear across less, and needs no updates
@@ -365,8 +367,8 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
     mapped, remaining_error = make_transport(log_ratio, mean, along / gain)
     mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ regression.right.T))
     # 7. Squared misfits of the values and of the draws.
-    zero = np.zeros_like(mean)
-    log_likelihood = _log_ratio(measured, zero, zero, mean)(np.arange(mean.size), mean)
+    flat = np.zeros_like(mean)  # with a flat Gaussian, the ratio is the likelihood
+    log_likelihood = _log_ratio(measured, flat, flat, mean)(np.arange(mean.size), mean)
     draws = regression.data[0] / (1.0 + regression.power)
     misfit = -2.0 * float(log_likelihood.sum()) + float(draws @ draws)
     return Conditioning(regression, mapped, remaining_error, misfit, len(phi))
@@ -440,3 +442,51 @@ def _from_others(
     sharp = deviation < MIN_DEVIATION
     cavity_mean = (mean / deviation**2 - shift) / remaining
     return np.where(sharp, 0.0, cavity_mean), np.where(sharp, 1.0, 1.0 / remaining)
+
+
+def lower_factor(matrix: Array) -> Array:
+    """Return the lower triangular L with L L^T = matrix, which may be singular."""
+    size = matrix.shape[0]
+    factor = np.zeros_like(matrix)
+    for j in range(size):
+        pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
+        if pivot <= MIN_PIVOT:
+            continue  # the properties before it determine property j
+        root = factor[j, j] = np.sqrt(pivot)
+        factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
+    return factor
+
+
+@lru_cache(maxsize=64)
+def conditionings(
+    random: Any, interface: Interface
+) -> list[tuple[NDArray[np.int64], Conditioning]]:
+    """Return the columns and the conditioning for each group of correlated properties.
+
+    `random` is a `stiction.random.fields.RandomInterface`.
+    """
+    fields = list(random.properties.values())
+    if all(field.conditions is None for field in fields):
+        return []
+    streams = layout(random, interface)
+    columns = [np.r_[stream.columns] for stream in streams]
+    factor, groups = lower_factor(random.matrix), []
+    for group in np.unique(random.linked, axis=0):
+        members, measured = np.flatnonzero(group), []
+        of_group = np.concatenate([columns[j] for j in members])
+        for i in members:
+            name, given = random.names[i], fields[i].conditions
+            if given is None:
+                continue
+            given.check(fields[i].marginal, interface)
+            size = given.values.size * random.dimension(interface)
+            check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
+            # z combines the property's own draws with the draws of earlier properties.
+            basis = fields[i].modes(interface).basis(given.places)
+            phi = np.zeros((len(basis), random.dimension(interface)))
+            for j in np.flatnonzero(factor[i]):
+                phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
+            measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
+        if measured:
+            groups.append((of_group, conditioned(measured)))
+    return groups

@@ -128,9 +128,7 @@ def distribution_of(key: str, value: Any) -> Any:
     if valid and spacing == "log" and low > 0.0:
         return scipy.stats.loguniform(low, high)
     raise InputError(
-        f"{key}: must be a frozen continuous scipy.stats distribution such as"
-        " scipy.stats.uniform(1e-3, 9e-3), a range (low, high) with low < high, or"
-        " {'low': ..., 'high': ..., 'spacing': 'linear' or, for a positive range, 'log'}, or a"
-        " table of a marginal such as {'type': 'lognormal', 'mean': ..., 'cv': ...}, got"
-        f" {describe(value)}"
+        f"{key}: must be a frozen scipy.stats distribution, a range (low, high) with low < high, or"
+        " a table {'low', 'high', 'spacing': 'linear' or, if low > 0, 'log'} or {'type':"
+        f" 'lognormal', 'mean', 'cv'}}, got {describe(value)}"
     )

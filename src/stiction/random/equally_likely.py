@@ -31,7 +31,6 @@ from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.model import describe
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
@@ -41,9 +40,9 @@ from stiction.random.fields import (
     RandomField,
     RandomInterface,
     as_random_interface,
-    layout,
+    check_draws,
 )
-from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream
+from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, layout
 
 MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
 """Stream of the draw that selects a member."""
@@ -71,17 +70,15 @@ class Source(Protocol):
 
 def _known(given: Any) -> Any:
     """Return random interfaces, or raise an `InputError` that names the first invalid entry."""
-    if isinstance(given, RandomInterface | RandomField | Source):
+    if isinstance(given, Source | EquallyLikely):
         return given
-    several = isinstance(given, list | tuple)
-    for number, entry in enumerate(given if several else [given]):
-        if not isinstance(entry, RandomInterface | RandomField):
-            raise InputError(
-                f"{f'[{number}] ' * several}must be a RandomInterface or a RandomField, got"
-                f" {describe(entry)}. For a measured profile, use st.onset, or fit a field to"
-                " it with st.fit_field"
-            )
-    return given
+    if not isinstance(given, list | tuple):
+        return as_random_interface(given)
+    interfaces = []
+    for number, entry in enumerate(given):
+        with prefixed(f"[{number}]", " "):
+            interfaces.append(as_random_interface(entry))
+    return interfaces
 
 
 if TYPE_CHECKING:
@@ -190,17 +187,9 @@ class EquallyLikely:
         # neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
-    def uncertain(self, parameters: Mapping[str, Any]) -> "Uncertain":
-        """Return a source with uncertain parameters, as `stiction.uncertain` does."""
-        return uncertain(self, parameters)
-
     def variant(self, draws: Array) -> NDArray[np.int64]:
         """Return, for each sample, the number of the set of constants that it uses."""
         return self.member(draws) % max(len(self.constants), 1)
-
-    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return `count` members, repeated in a cycle if necessary."""
-        return [self.members[number % len(self.members)] for number in range(count)]
 
     def larger(self, count: int, seed: int) -> "EquallyLikely":
         """Return a mixture of `count` members from the same source."""
@@ -231,6 +220,7 @@ class EquallyLikely:
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles (samples, *shape) by name."""
+        check_draws(draws, self.dimension(interface))
         profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
         for name in self.varying - {*self.names}:  # of members without such a factor it is 1
             profiles[FACTOR + name] = np.ones((len(draws), *interface.shape))
@@ -288,7 +278,7 @@ def form_of(field: RandomField) -> Any:
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     """Return a mixture that holds `count` interfaces from a source."""
-    constants = source.constants(seed) if isinstance(source, Uncertain) else ()
+    constants = source.constants(seed) if isinstance(source, UncertainSource) else ()
     members = tuple(source.interfaces(count, seed))
     return EquallyLikely(members, source=source, constants=tuple(constants))
 
@@ -296,11 +286,13 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
 def origin(random: Any) -> Any:
     """Return the fit or posterior from which random interfaces were drawn, or `None`."""
     source = getattr(random, "source", None)
-    return origin(source.given) or source.given if isinstance(source, Uncertain) else source
+    return (
+        origin(source.given) or source.given if isinstance(source, UncertainSource) else source
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Uncertain(Result):
+class UncertainSource(Result):
     """Source with distributions of parameters and of constants in the problem."""
 
     given: Any  # a random interface, several, or a source
@@ -315,10 +307,11 @@ class Uncertain(Result):
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
         """Return `count` equally likely interfaces, without constants of the problem."""
-        source = self.given if isinstance(self.given, Source) else None
-        if isinstance(self.given, EquallyLikely):
-            source = self.given.source
-        likely = drawn_from(source, count, seed) if source else as_random(self.given)
+        source = self.given.source if isinstance(self.given, EquallyLikely) else self.given
+        if isinstance(source, Source):
+            likely: Any = drawn_from(source, count, seed)
+        else:
+            likely = as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
         # Member n takes the constants n % VARIANTS. Members with the same
@@ -348,7 +341,7 @@ class Uncertain(Result):
         return hypercube(laws, VARIANTS, seed + 1) if keys else []
 
 
-def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
+def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
     """Give distributions to parameters of random properties and to constants in the problem.
 
     Parameters
@@ -363,7 +356,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
 
     Returns
     -------
-    Uncertain
+    UncertainSource
         Pass it to `design_stress`, `failure_probability` or any function that
         takes a fit. Each constant of the problem takes forty values, evenly spread
         over its distribution.
@@ -385,7 +378,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> Uncertain:
             raise InputError(f"{wrong[0]}: cannot be uncertain. Sweep over it instead")
     with prefixed("random"):
         _known(random)
-    return Uncertain(random, laws)
+    return UncertainSource(random, laws)
 
 
 def as_random(

@@ -20,7 +20,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from functools import cached_property, lru_cache, reduce
+from functools import cached_property, reduce
 from itertools import chain
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -46,23 +46,18 @@ from stiction.base.model import (
     model,
 )
 from stiction.base.units import is_in
-from stiction.base.variables import PROFILES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.random.conditioning import Conditioning, Conditions, Measured, conditioned
+from stiction.random.conditioning import MIN_PIVOT, Conditions, conditionings, lower_factor
 from stiction.random.dotted_keys import distributions_of, full_key, hypercube, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
-from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, block_of
+from stiction.random.synthesis import FACTORS, NAMES, layout
 
-NAMES = tuple(PROFILES)
 MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
-FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first property's factor
-FACTORS = (*NAMES, "pressing_force")  # what may have a factor, in the order of their streams
 FACTOR = "between."  # begins the name of a factor among profiles, if its property is not random
-MIN_PIVOT = 1e-12  # round-off of eigenvalues of a correlation matrix
 # Limits of warnings
 MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
 DOUBTFUL_UNRESOLVED = 0.5  # unresolved share above which the message doubts a unit
@@ -185,7 +180,7 @@ class RandomField:
         if self.conditions is not None:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
-            [(_, conditioning)] = _conditioned(self._alone, interface)
+            [(_, conditioning)] = conditionings(self._alone, interface)
             z = conditioning.quantile_at(phi, probability)
         return from_normal(self.marginal, z).reshape(interface.shape)
 
@@ -306,19 +301,6 @@ Correlation: TypeAlias = Converted[
 ]
 
 
-def lower_factor(matrix: Array) -> Array:
-    """Return the lower triangular L with L L^T = matrix, which may be singular."""
-    size = matrix.shape[0]
-    factor = np.zeros_like(matrix)
-    for j in range(size):
-        pivot = matrix[j, j] - float(factor[j, :j] @ factor[j, :j])
-        if pivot <= MIN_PIVOT:
-            continue  # the properties before it determine property j
-        root = factor[j, j] = np.sqrt(pivot)
-        factor[j + 1 :, j] = (matrix[j + 1 :, j] - factor[j + 1 :, :j] @ factor[j, :j]) / root
-    return factor
-
-
 @model(kw_only=True)
 class RandomInterface:
     """Random properties of an interface: the strength, and any others that vary.
@@ -402,17 +384,14 @@ class RandomInterface:
                 f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}"
             )
         correlated, between = self.correlation or {}, self.between or {}
-        tables = {
-            "correlation": [*correlated, *chain(*correlated.values())],
-            "between": between,
-        }
-        valid = {"correlation": self.names, "between": FACTORS}
-        problems += [
-            unknown_name(table, name, valid[table])
-            for table, given in tables.items()
-            for name in given
-            if name not in valid[table]
-        ]
+        tables = (
+            ("correlation", [*correlated, *chain(*correlated.values())], self.names),
+            ("between", [*between], FACTORS),
+        )
+        for table, given, valid in tables:
+            problems += [
+                unknown_name(table, name, valid) for name in given if name not in valid
+            ]
         if {"normal_pressure", "pressing_force"} <= {*between}:
             problems.append("between: give one of normal_pressure and pressing_force, got both")
         for name, marginal in between.items():
@@ -523,16 +502,10 @@ class RandomInterface:
         For a property that is not random, the name is `FACTOR` followed by the
         property.
         """
+        check_draws(draws, self.dimension(interface))
         streams = layout(self, interface)
-        dimension = streams[-1].columns.stop
-        if draws.ndim != 2 or draws.shape[1] != dimension:
-            raise InputError(
-                f"draws: must have shape (samples, {dimension}), got shape {draws.shape}"
-            )
-        if not np.isfinite(draws).all():
-            raise InputError("draws: must be finite")
         # 1.
-        for columns, conditioning in _conditioned(self, interface):
+        for columns, conditioning in conditionings(self, interface):
             draws = draws.copy()
             draws[:, columns] = conditioning.draws(draws[:, columns])
         profiles: dict[str, Array] = {}
@@ -616,65 +589,18 @@ class RandomInterface:
         """Warn if the grid is too coarse or the interface too short for a field."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
-        for _, conditioning in _conditioned(self, interface):
+        for _, conditioning in conditionings(self, interface):
             conditioning.warn()
 
 
-@lru_cache(maxsize=8192)
-def layout(random: RandomInterface, interface: Interface) -> list[Stream]:
-    """Return the stream of draws for each property and each factor between specimens."""
-    fields = list(random.properties.values())
-    streams, start, block = [], 0, block_of(len(interface.shape))
-    for name, field, row in zip(random.names, fields, random.linked, strict=True):
-        # Correlated properties draw the same modes: all modes of any of them.
-        group = [fields[j] for j in np.flatnonzero(row)]
-        ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
-        mean_mode = any(linked.mean_mode for linked in group)
-        columns = slice(start, start + 2 * ranks.size + int(mean_mode))
-        # Columns of the group's draws that belong to modes of this field.
-        places = np.searchsorted(ranks, field.modes(interface).ranks)
-        pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
-        numbers: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
-        numbers = slice(None) if numbers.size == columns.stop - start else numbers
-        streams.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, numbers))
-        start = columns.stop
-    no_modes = np.arange(0)
-    for column, name in enumerate(random.between or (), start):
-        number = FIRST_FACTOR_STREAM + FACTORS.index(name)
-        columns = slice(column, column + 1)
-        streams.append(Stream(number, SAMPLES_PER_BLOCK, no_modes, True, columns, no_modes))
-    return streams
-
-
-@lru_cache(maxsize=64)
-def _conditioned(
-    random: RandomInterface, interface: Interface
-) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Return the columns and the conditioning for each group of correlated properties."""
-    fields = list(random.properties.values())
-    if all(field.conditions is None for field in fields):
-        return []
-    streams = layout(random, interface)
-    columns = [np.r_[stream.columns] for stream in streams]
-    factor, groups = lower_factor(random.matrix), []
-    for group in np.unique(random.linked, axis=0):
-        members, measured = np.flatnonzero(group), []
-        of_group = np.concatenate([columns[j] for j in members])
-        for i in members:
-            name, given = random.names[i], fields[i].conditions
-            if given is None:
-                continue
-            given.check(fields[i].marginal, interface)
-            size = given.values.size * random.dimension(interface)
-            check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
-            basis = fields[i].modes(interface).basis(given.places)
-            phi = np.zeros((len(basis), random.dimension(interface)))
-            for j in np.flatnonzero(factor[i]):
-                phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
-            measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
-        if measured:
-            groups.append((of_group, conditioned(measured)))
-    return groups
+def check_draws(draws: Array, dimension: int) -> None:
+    """Raise an `InputError` unless draws are finite and have shape (samples, dimension)."""
+    if draws.ndim != 2 or draws.shape[1] != dimension:
+        raise InputError(
+            f"draws: must have shape (samples, {dimension}), got shape {draws.shape}"
+        )
+    if not np.isfinite(draws).all():
+        raise InputError("draws: must be finite")
 
 
 def as_random_interface(given: Any) -> RandomInterface:
@@ -683,7 +609,7 @@ def as_random_interface(given: Any) -> RandomInterface:
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):
         raise InputError(
-            f"random: must be a RandomInterface or a RandomField, got {describe(given)}."
-            " For a measured profile, use st.onset, or fit a field to it with st.fit_field"
+            f"must be a RandomInterface or a RandomField, got {describe(given)}. For a measured"
+            " profile, use st.onset, or fit a field to it with st.fit_field"
         )
     return given

@@ -30,6 +30,7 @@ Field (`synthesise`)
    batch.
 """
 
+from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,8 +38,12 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating
+from stiction.base.variables import PROFILES
 
 SAMPLES_PER_BLOCK = 256
+NAMES = tuple(PROFILES)
+FACTORS = (*NAMES, "pressing_force")  # what may have a factor, in the order of their streams
+FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first property's factor
 
 
 def block_of(dimensions: int) -> int:
@@ -78,6 +83,32 @@ class Stream(NamedTuple):
             draws[done : done + count] = rows[kept, offset : offset + count].T
             done += count
         return draws
+
+
+@lru_cache(maxsize=8192)
+def layout(random: Any, interface: Any) -> list[Stream]:
+    """Return the stream of draws for each property and each factor between specimens."""
+    fields = list(random.properties.values())
+    streams, start, block = [], 0, block_of(len(interface.shape))
+    for name, field, row in zip(random.names, fields, random.linked, strict=True):
+        # Correlated properties draw the same modes: all modes of any of them.
+        group = [fields[j] for j in np.flatnonzero(row)]
+        ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
+        mean_mode = any(linked.mean_mode for linked in group)
+        columns = slice(start, start + 2 * ranks.size + int(mean_mode))
+        # Columns of the group's draws that belong to modes of this field.
+        places = np.searchsorted(ranks, field.modes(interface).ranks)
+        pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
+        numbers: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
+        numbers = slice(None) if numbers.size == columns.stop - start else numbers
+        streams.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, numbers))
+        start = columns.stop
+    no_modes = np.arange(0)
+    for column, name in enumerate(random.between or (), start):
+        number = FIRST_FACTOR_STREAM + FACTORS.index(name)
+        columns = slice(column, column + 1)
+        streams.append(Stream(number, SAMPLES_PER_BLOCK, no_modes, True, columns, no_modes))
+    return streams
 
 
 @jit_allocating

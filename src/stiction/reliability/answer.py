@@ -34,7 +34,7 @@ from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.random.equally_likely import MAX_MEMBERS, origin
 from stiction.reliability.counting import CONFIDENCE
-from stiction.reliability.tail import TailPoint, two_levels_refused
+from stiction.reliability.tail import TailPoint, guide_of
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
@@ -362,7 +362,7 @@ def prepare(
         )
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
-    elif algorithm == "two_level" and (reason := two_levels_refused(state)):
+    elif algorithm == "two_level" and isinstance(reason := guide_of(state), str):
         problems.append(f"algorithm: 'two_level' is not possible: {reason}")
     if problems:
         raise InputError(problems)

@@ -311,8 +311,8 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{point.stress:.7g} Pa')}. The interval ends there"]
     else:
-        guide, covered = point.state.first_stage, min(each.last for each in tail.repetitions)
-        if guide and covered < COVERED:
+        guide, covered = point.state.guide, min(each.last for each in tail.repetitions)
+        if covered < COVERED and isinstance(guide, LimitState):
             doubts.append(
                 f"the {guide.experiment.method.label} misses {1.0 - covered:.0%} of the failures,"
                 " so that the estimate may be too low. Compare with algorithm='subset'"

@@ -38,7 +38,7 @@ from scipy.special import stdtrit
 
 from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.progress import SILENT, Meter
-from stiction.ensemble.limit_state import LimitState, no_single_length
+from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.counting import CONFIDENCE
 from stiction.reliability.subset import Descent, descend, generator
 from stiction.reliability.two_level import bridge
@@ -336,14 +336,11 @@ def repeat_until_precise(
     return repetitions
 
 
-def two_levels_refused(state: LimitState) -> str | None:
-    """Return why two levels are not possible, or None."""
-    experiment = state.experiment
+def guide_of(state: LimitState) -> LimitState | str:
+    """Return the limit state that may guide two levels, or the reason why they are not possible."""
     if state.may_survive:
         return "behind a machine, the first instability need not happen"
-    if state.first_stage is None:
-        return f"{experiment.method.type!r} has no less expensive first stage"
-    return no_single_length(experiment.problem, experiment.random)
+    return state.guide
 
 
 def share_picked(guide: Array, exact: Array) -> float:
@@ -369,9 +366,9 @@ def sample_tail(
     already.
     """
     # 1.
-    guide, auto, seed = None, algorithm == "auto", state.experiment.seed
-    if algorithm == "two_level" or (auto and two_levels_refused(state) is None):
-        guide = state.first_stage
+    auto, seed = algorithm == "auto", state.experiment.seed
+    possible = "unused" if algorithm == "subset" else guide_of(state)
+    guide = None if isinstance(possible, str) else possible
     if auto and guide and pilot is None:
         draws = state.draws(seed, 0, min(GUIDE_PILOT_SAMPLES, budget // 5))
         pilot = draws, state(draws)

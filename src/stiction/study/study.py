@@ -50,11 +50,11 @@ from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import (
     FIRST_MEMBERS,
     Source,
+    UncertainSource,
     as_random,
     drawn_from,
     uncertain,
 )
-from stiction.random.equally_likely import Uncertain as Likely
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.design import design_stress
@@ -96,7 +96,7 @@ _One: Any = Annotated[
 
 def _interfaces(given: Any) -> Any:
     """Return the interfaces from a fit or a posterior. Return other values unchanged."""
-    if isinstance(given, Likely):
+    if isinstance(given, UncertainSource):
         raise InputError(
             "random: has uncertain parameters. Give them as uncertain= of the study"
         )

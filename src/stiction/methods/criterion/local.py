@@ -22,6 +22,7 @@ from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.onset_bracket import rms_difference
 from stiction.methods.criterion.windows import windows_of
+from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables, position
 from stiction.problem.sample import Sample, named_profiles
@@ -132,6 +133,22 @@ class LocalCriterion:
         """
         everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
+
+    def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
+        """Return why no length of patches is the same in all samples, or `None`."""
+        rate = problem.uniform_weakening_rate
+        if not problem.friction.linear:
+            return "strength does not fall linearly with slip"
+        if rate is None or varying & set(SCALES):
+            return "the weakening rate is not uniform"
+        try:
+            if problem.specimen is None:
+                windows_of(problem, rate)
+            elif not problem.blocks.windows(rate, rate).starts.size:
+                return "no part of the specimen becomes unstable by itself"
+        except InputError:
+            return "a critical patch does not fit on the interface"
+        return None
 
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether exact onsets may differ by more than 1 % in mean or scatter.
