@@ -6,11 +6,8 @@ import openturns
 import pytest
 import scipy.stats
 import xarray as xr
-from checks import assert_mean
-from setups import beta_strength
 
 import stiction as st
-from stiction.random.mapping import hermite_coefficients
 
 XI = 2e-3
 LAMBDA = 2.0 * np.pi / XI
@@ -53,51 +50,6 @@ def test_correlation_of_a_long_interface_with_its_mean_mode_is_that_of_gstools()
     # Truncation at 10 lambda leaves out 4e-8 of the power.
     found = field.correlation(interface, of="z")[:100]
     np.testing.assert_allclose(found, expected, atol=1e-7)
-
-
-LINE = st.Interface(length=1.0, nodes=64)
-
-
-@pytest.fixture(scope="module")
-def sampled():
-    """1e5 samples on a short, coarse interface: 64 nodes, L = 16 xi_0."""
-    strength = beta_strength(1.0 / 16.0)
-    return strength, strength.sample(LINE, samples=100_000, seed=11)
-
-
-def assert_marginal(values, field):
-    """With a fixed seed: a p-value this small would occur once in a thousand seeds."""
-    assert scipy.stats.kstest(values, field.marginal.distribution.cdf).pvalue > 1e-3
-
-
-def test_marginal_at_one_node(sampled):
-    strength, profiles = sampled
-    assert_marginal(profiles[:, 17], strength)
-    distribution = scipy.stats.lognorm(0.4, scale=1e6)
-    field = st.RandomField(distribution, st.ExponentialSpectrum(correlation_length=0.05))
-    profiles = field.sample(LINE, samples=20_000, seed=2)
-    assert_marginal(profiles[:, 0], field)
-    assert_marginal(profiles[:, 40], field)
-
-
-def test_variance_and_correlation(sampled):
-    strength, profiles = sampled
-    deviation = profiles - strength.mean
-    expected = strength.standard_deviation**2 * strength.correlation(LINE)
-    # Each lag averages 64 pairs of each sample; the samples are independent.
-    for lag in (0, 1, 2, 4, 8, 16, 32):
-        products = (deviation * np.roll(deviation, -lag, axis=1)).mean(axis=1)
-        assert_mean(products, expected[lag], errors=4.0)
-
-
-def test_correlation_of_z_and_of_the_strength_differ_as_the_hermite_expansion_says():
-    strength = beta_strength(1.0 / 16.0)
-    z, tau = strength.correlation(LINE, of="z"), strength.correlation(LINE)
-    assert np.all(np.abs(tau[1:]) < np.abs(z[1:]))
-    # The first Hermite coefficient carries 0.966 of the variance of this Beta marginal.
-    power = hermite_coefficients(strength.marginal)[1:] ** 2
-    assert power[0] / power.sum() == pytest.approx(0.966, abs=5e-4)
-    assert power.sum() == pytest.approx(strength.standard_deviation**2, rel=1e-6)
 
 
 def test_mean_and_deviation_are_those_of_gstools_kriging():

@@ -8,7 +8,6 @@ that is shifted. Each test here states a rule that holds for every call of a kin
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 from typing import Any
 
 import matplotlib.colors
@@ -17,7 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from crooked import LINE, PLANE, PLANE_STRENGTH, TWO
-from setups import EXACT, LOCAL, beta_strength, ensemble, make_problem
+from setups import EXACT, LOCAL, beta_strength, make_problem
 from small_study import small_study
 from specimens import crooked, rough
 
@@ -137,16 +136,6 @@ def test_results_by_name_are_compared_along_one_sweep():
         st.plot.quantiles(shifted)
 
 
-@pytest.mark.parametrize("method", [LOCAL, EXACT, st.Rupture(loading_rate=6e8)])
-def test_equal_rows_have_equal_answers(method):
-    """A row that is given twice, between others, is solved as it is alone."""
-    rows = st.onset(LINE, np.stack([TWO[1], TWO[0], TWO[1]]), method=method)
-    alone = st.onset(LINE, TWO[1], method=method)
-    for name in ("critical_stress", "critical_load", "critical_position"):
-        assert rows[name].values[0] == rows[name].values[2] == alone[name].values[0]
-        assert rows[name].values[1] != rows[name].values[0]
-
-
 def test_a_shift_of_everything_shifts_the_position_also_after_arrests():
     """Two dips between strong parts: the first instability is arrested at its residual strength."""
     problem = make_problem(weakening_rate=0.5e12, residual_strength=0.8e6)
@@ -164,28 +153,6 @@ def test_a_shift_of_everything_shifts_the_position_also_after_arrests():
     assert results.critical_stress[1] == pytest.approx(
         float(results.critical_stress[0]), rel=1e-9
     )
-
-
-def test_seeds_count_and_are_repeatable():
-    """For every function with a seed: equal seeds give equal numbers, another seed others."""
-    peaks = 0.7e6 + 1e4 * np.arange(7.0)
-    inferred = partial(
-        st.infer, PROBLEM, FIELD, peaks, prior={"marginal.low": (0.6e6, 0.72e6)},
-        method=LOCAL, samples=100, progress=False,
-    )  # fmt: skip
-    failure = partial(
-        st.failure_probability, PROBLEM, FIELD, stress=0.75e6, method=LOCAL, max_evaluations=300
-    )
-    functions = {
-        "sample": lambda seed: FIELD.sample(PROBLEM.interface, seed=seed),
-        "monte_carlo": lambda seed: ensemble(PROBLEM, FIELD, 4, seed=seed).critical_stress,
-        "infer": lambda seed: inferred(seed=seed).likelihood.densities[0].onsets,
-        "failure_probability": lambda seed: failure(seed=seed).probability,
-    }
-    for name, function in functions.items():
-        first, again, second = (np.asarray(function(seed)) for seed in (1, 1, 2))
-        assert np.array_equal(first, again), name
-        assert not np.array_equal(first, second), name
 
 
 def test_a_path_is_in_pascals_and_metres_whatever_the_scale():

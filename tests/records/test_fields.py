@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import scipy.stats
 import xarray as xr
-from crooked import LINE, PLANE, in_mm, uneven
+from crooked import LINE, in_mm
 from recording import Calls, compared
-from setups import EXACT, LOCAL, make_problem
+from setups import EXACT
 
 import stiction as st
 
@@ -47,15 +47,6 @@ def each_marginal_with_a_spectrum():
             "written": repr(field),
         }
     return found
-
-
-@calls("a sum over modes written out, tests/oracle/test_fields.py")
-def a_custom_spectrum():
-    def hump(k):
-        return k**2 * np.exp(-((k / 900.0) ** 2))
-
-    field = st.RandomField(MARGINALS["gamma"], st.CustomSpectrum(hump, 2500.0))
-    return field.sample(INTERFACE, samples=2, seed=9)
 
 
 def three_properties(**more):
@@ -120,25 +111,6 @@ def a_field_that_is_known_in_places():
     return found | {"both": both.profiles(INTERFACE, samples=2, seed=6)}
 
 
-@calls("dense kriging and Metropolis sampling, tests/exact/test_conditional.py", close=1e-5)
-def a_bounded_field_that_is_known_with_large_errors():
-    known = st.RandomField(MARGINALS["weibull"], SPECTRA["cut"]).given(
-        scan() * 0.6, noise=1.4e5
-    )
-    return known.sample(INTERFACE, samples=3, seed=7)
-
-
-@calls("dense kriging, tests/exact/test_conditional.py")
-def a_plane_that_is_known_on_a_patch():
-    field = st.RandomField(
-        MARGINALS["beta"], st.PowerLawSpectrum(3.3e-3, truncation=2.5), anisotropy=1.4
-    )
-    x, y = PLANE.interface.coordinates.values()
-    values = 1.05e6 + 1.3e5 * uneven(PLANE.interface, seed=31)
-    patch = xr.DataArray(values, {"x": x, "y": y}, ("x", "y"), attrs={"units": "Pa"})[3:7, 8:12]
-    return field.given(patch, noise=5e4).sample(PLANE.interface, samples=2, seed=8)
-
-
 @calls("draws of each member by itself, tests/properties/test_reliability.py")
 def equally_likely_interfaces_of_uncertain_parameters():
     members = three_properties().uncertain(
@@ -194,28 +166,6 @@ def ensembles_in_which_samples_are_steep_or_refused():
         problem = st.Problem(solid, st.Interface(0.064, 64), law, load)
         found[str(initial)] = st.monte_carlo(problem, random, method=EXACT, samples=20)
     return found
-
-
-@calls("strength over pressure is the coefficient that was drawn")
-def an_ensemble_of_coefficients_under_a_random_pressure():
-    coefficient = st.RandomField(
-        st.Lognormal(mean=0.5, cv=0.15), SPECTRA["cut"], of="friction_coefficient"
-    )
-    pressure = st.RandomField(st.Gamma(mean=2.1e6, cv=0.1), SPECTRA["gauss"])
-    random = st.RandomInterface(strength=coefficient, normal_pressure=pressure)
-    problem = make_problem(96, 0.047, weakening_rate=2.3e11, residual_ratio=0.3)
-    kept = {"samples": 3, "seed": 1, "keep": ["strength", "normal_pressure"]}
-    return st.monte_carlo(problem, random, method=LOCAL, **kept)
-
-
-@calls("order statistics and scipy, tests/oracle/test_statistics_estimates.py")
-def quantiles_and_densities():
-    values = np.random.default_rng(3).gamma(3.0, 1e5, size=(2, 301))[1]
-    return {
-        "quantiles": st.statistics.quantiles(values, [0.03, 0.41, 0.9]),
-        "density": st.statistics.density(values, bounds=(0.0, None)),
-        "free": st.statistics.density(values),
-    }
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

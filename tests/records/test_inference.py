@@ -57,31 +57,6 @@ def a_fit_to_records_of_unlike_length():
     }
 
 
-@calls(RECOVERED, close=2e-2)
-def a_fit_with_scatter_between_specimens():
-    factors = (0.83, 1.06, 1.19, 0.95, 1.27)
-    records = [record(120, 0.024, 20 + i) * factor for i, factor in enumerate(factors)]
-    for each in records:
-        each.attrs["units"] = "Pa"
-    options = {"between": True, "bootstrap": 20, "seed": 5, "confidence": 0.8}
-    found = st.fit_field(records, marginal="lognormal", **options)
-    return {"fit": found, "drawn": [repr(one) for one in found.interfaces(2, seed=7)]}
-
-
-@calls(RECOVERED, close=2e-2)
-def a_fit_to_a_record_with_an_outlier():
-    outlier = RECORDS[0].copy()
-    outlier[31] = 4.1e6
-    families = st.fit_field(
-        outlier, marginal=["gamma", "lognormal"], bootstrap=20, seed=2
-    ).families
-    # The outlier leaves the distance of the log-normal distribution to round-off.
-    return {
-        "gamma": families["gamma"].distance,
-        "lognormal": [families["lognormal"].score, families["lognormal"].weight],
-    }
-
-
 def labelled(values, spacing=2e-4):
     x = spacing * np.arange(len(values))
     return xr.DataArray(values, {"x": x}, ("x",), attrs={"units": "Pa"})
@@ -142,16 +117,6 @@ def a_fit_to_a_map_of_known_anisotropy():
 
 
 @calls(RECOVERED, close=1e-5)
-def the_scale_of_a_distribution_of_scipy():
-    marginal = scipy.stats.weibull_min(1.9, loc=6.1e5, scale=4.4e5)
-    field = dataclasses.replace(BOUNDED, marginal=marginal)
-    peaks = xr.DataArray(PEAKS * 1e-3, attrs={"units": "kPa"})
-    prior = {"marginal.scale": (2e5, 8e5)}
-    found = inferred(peaks, field=field, prior=prior, seed=0)
-    return {"str": str(found), "at": repr(found.at(7)[1])}
-
-
-@calls(RECOVERED, close=1e-5)
 def two_parameters_from_six_peaks():
     prior = {"correlation_length": (3e-4, 2e-3), "marginal.low": (4.9e5, 7.2e5)}
     found = inferred(load_cell_error=6e3, prior=prior)
@@ -173,15 +138,6 @@ def two_parameters_from_six_peaks():
             str(group) for group in (tree.groups() if callable(tree.groups) else tree.groups)
         ),
     }
-
-
-@calls(RECOVERED, close=1e-5)
-def parameters_from_peaks_in_newtons_and_two_lengths():
-    problem = dataclasses.replace(PROBLEM, interface=st.Interface(0.031, 96, width=0.011))
-    forces = {0.031: PEAKS[:4] * 0.031 * 0.011, 0.062: PEAKS[2:] * 0.98 * 0.062 * 0.011}
-    prior = {"problem.friction.weakening_rate": (2.5e11, 7.5e11)}
-    found = inferred(forces, problem, unit="N", prior=prior, seed=0)
-    return {"str": str(found), "at": repr(found.at(7)[0].friction)}
 
 
 @calls("stresses on the one area of a node of the prior, where both are the same", close=1e-5)

@@ -35,11 +35,6 @@ def law(kind, **more):
     return dataclasses.replace(LINE, friction=kind(**about | more))
 
 
-@calls(ORACLE)
-def local_criterion_of_two_strengths():
-    return st.onset(LINE, TWO, method=LOCAL)
-
-
 @calls("closed form of the mean stress; " + ORACLE)
 def local_criterion_with_forces_in_mode_three():
     problem = dataclasses.replace(of_width(LINE, 0.0123), mode="III")
@@ -95,13 +90,6 @@ def arrests_of_a_law_that_falls_late():
     return st.onset(problem, strength, method=st.Equilibrium(events=3))
 
 
-@calls("the same by the whole law in many pieces, tests/oracle/test_friction_laws.py")
-def an_exponential_law_in_pieces():
-    exponential = law(st.ExponentialWeakening).friction
-    problem = dataclasses.replace(LINE, friction=st.PiecewiseWeakening.from_law(exponential, 5))
-    return st.onset(problem, TWO[0], method=EXACT)
-
-
 @calls(EVENTS)
 def several_profiles_by_name():
     profiles = {
@@ -118,46 +106,10 @@ def several_profiles_by_name():
     return st.onset(bare, profiles, method=EXACT)
 
 
-@calls(EVENTS)
-def fracture_energy_along_x_and_residual_ratio():
-    energy = 1.1 + 0.2 * uneven(INTERFACE, seed=18)
-    friction = st.LinearWeakening(fracture_energy=energy, residual_ratio=0.23)
-    problem = dataclasses.replace(LINE, friction=friction)
-    return st.onset(problem, {"strength": TWO}, method=EXACT)
-
-
 @calls("states checked as equilibria, tests/properties/test_equilibrium.py")
 def a_path_through_an_arrested_event():
     loads = [1.1e5, 2.9e5, 3.6e5, 4.1e5, 4.6e5, 5.6e5, 9e5]
     return st.equilibrium_path(of_width(LINE, 0.0123), barred(INTERFACE), loads)
-
-
-@calls("weighted mean over each patch; " + ORACLE)
-def nucleation_stress():
-    return {
-        "two": st.theory.nucleation_stress(LINE, TWO),
-        "one": st.theory.nucleation_stress(LINE, {"strength": TWO[1]}),
-    }
-
-
-@calls("textbook weights of cracks, tests/oracle/test_crooked.py")
-def energy_release_rate_and_griffith_length():
-    lengths = [0.0013, 0.0071, 0.019, 0.031]
-    return {
-        "rate": st.theory.energy_release_rate(LINE, 4.1e5, lengths, centre=0.0362),
-        "start": st.theory.griffith_length(LINE, 1.7e5, 8e-3, centre=0.031),
-        "arrest": st.theory.griffith_length(
-            LINE, [1.5e5, 2.2e5], 8e-3, centre=0.033, arrest=True
-        ),
-    }
-
-
-@calls("covariance of the nodes by their weights, tests/exact/test_criterion.py")
-def nucleation_statistics():
-    spectrum = st.ExponentialSpectrum(2.3e-3, power_kept=0.97)
-    field = st.RandomField(st.Weibull(mean=1.05e6, cv=0.17, low=4e5), spectrum)
-    problem = make_problem(160, 0.043, weakening_rate=3.1e11)
-    return st.theory.nucleation_statistics(problem, field)
 
 
 @calls(READ + ": excess * exp(-distance/decay), 1 + amplitude cos")
@@ -173,26 +125,11 @@ def loads_with_an_edge_and_a_gradient():
     return found
 
 
-@calls(READ + ": pi/4 a_k and Bessel sums; h_n = 2 lambda_0 G*/W")
-def moduli_and_lengths_of_solids():
-    found = {}
-    names = [f"{one}_wave_speed" for one in ("shear", "dilatational", "rayleigh")]
-    for plane, nu, mode in (
-        ("strain", 0.17, "II"),
-        ("stress", 0.41, "II"),
-        ("stress", 0.29, "III"),
-    ):
-        solid = st.Solid(youngs_modulus=3.1e9, poisson_ratio=nu, density=1190.0, plane=plane)
-        problem = make_problem(64, 0.05, solid=solid, mode=mode, weakening_rate=2.1e11)
-        found[plane, mode] = {
-            name: getattr(solid, name)
-            for name in ("shear_modulus", *names)
-            if hasattr(solid, name)
-        } | {"modulus": problem.effective_modulus, "length": problem.nucleation_length}
+@calls(READ + ": h_n = 2 lambda_0 G*/W, and nodes in that of the steepest slope")
+def nodes_in_the_nucleation_length_of_a_law_that_falls_late():
     late = st.PiecewiseWeakening(weakening_rate=5e9, slip=(0.5, 1.0), strength=(0.99, 0.0))
     problem = make_problem(512, 0.05, friction=late)
-    nodes = problem.nodes_in_nucleation_length(5e9)
-    return found | {"that of the steepest slope": [problem.nucleation_length, *nodes]}
+    return [problem.nucleation_length, *problem.nodes_in_nucleation_length(5e9)]
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

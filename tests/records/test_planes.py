@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from crooked import PLANE, PLANE_STRENGTH, across_the_seam, uneven
 from recording import Calls, compared, inside
-from setups import LOCAL, beta_strength, make_problem, without
+from setups import beta_strength, make_problem, without
 
 import stiction as st
 
@@ -31,11 +31,6 @@ def barred():
     return np.where(
         seam, 5e5 + 1e5 * uneven(INTERFACE, seed=6), np.where(wall, 3.5e6, strength)
     )
-
-
-@calls(ORACLE)
-def local_criterion_of_two_strengths():
-    return st.onset(PLANE, TWO, method=LOCAL)
 
 
 @calls(ORACLE, close=1e-4)
@@ -80,18 +75,6 @@ def strength_that_hardly_weakens():
 @calls("states checked as equilibria, tests/oracle/test_plane_equilibrium.py", close=1e-4)
 def a_path():
     return st.equilibrium_path(PLANE, TWO[0], [2e5, 4.3e5, 5.1e5, 2e6])
-
-
-@calls("correlation on a line through the plane, tests/exact/test_fields.py")
-def anisotropic_fields():
-    field = beta_strength(3.1e-3, mean_mode=True, anisotropy=1.7)
-    lag = np.linspace(0.0, 0.011, 5)
-    return {
-        "sample": field.sample(INTERFACE, samples=3, seed=11),
-        "efolding": field.efolding_length(),
-        "quantile": field.quantile(INTERFACE, 0.03),
-        "correlation": field.spectrum.untruncated_correlation(lag),
-    }
 
 
 @calls("each sample as by onset", close=1e-5)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 from crooked import (
     LINE,
     LINE_GAP,
@@ -17,7 +16,7 @@ from crooked import (
     as_measured,
 )
 from recording import Calls, compared, inside, refusal
-from setups import EXACT, LOCAL, without
+from setups import EXACT, LOCAL
 
 import stiction as st
 from stiction.base.units import parse
@@ -37,23 +36,12 @@ def table(text, **options):
 
 @calls(BACK)
 def other_places_and_units():
-    shifted = "x (um);strength (kPa)\n" + "\n".join(
-        f"{2e3 * i + 700:.0f};{1e3 * v}" for i, v in enumerate(EIGHT)
-    )
     dense = [900.0 + 7.0 * i * i for i in range(16)]
     gap = "\n".join(f"{i} {'-' if 5 <= i <= 7 else v}" for i, v in enumerate(dense))
     between = {"x_unit": "mm", "unit": "kPa", "interpolate": True, "gaps": "skip"}
     return {
-        "interpolated": table(shifted, interface=SMALL, interpolate=True),
         "beside a gap": table(gap, interface=SMALL, **between),
         "stated": table("\n".join(f"{v}" for v in EIGHT), unit="MPa", interface=SMALL),
-        "as read": table(shifted),
-        "bare": table(
-            "\n".join(f"{2 * i} {1e3 * v}" for i, v in enumerate(EIGHT)),
-            x_unit="mm",
-            unit="kPa",
-            interface=SMALL,
-        ),
     }
 
 
@@ -69,15 +57,6 @@ def friction_coefficients_and_pressures():
         "coefficient": table(text, interface=SMALL, quantity="friction_coefficient"),
         "pressure": table(pressure, interface=SMALL, quantity="normal_pressure"),
     }
-
-
-@calls(BACK)
-def heights_of_a_matrix_without_a_unit():
-    heights = 1e-3 * np.cos(np.arange(96.0)).reshape(12, 8)
-    heights[5, 3] = np.nan
-    with inside():
-        np.save("h.npy", heights)
-        return st.read_profile("h.npy", quantity="height")
 
 
 @calls(BACK)
@@ -144,13 +123,6 @@ def onsets_of_coefficients_and_beside_gaps():
     method, save = st.Rupture(loading_rate=6e8, stop="onset"), st.Save([])
     run = st.simulate_rupture(LINE, filled, method=method, save=save)
     return found | {"rupture": run.in_gap}
-
-
-@calls("the same profile as an array, to the bit")
-def onsets_of_labelled_arrays():
-    measured = as_measured(LINE.interface, LINE_STRENGTH)
-    both = xr.Dataset({"strength": measured, "residual_strength": 0.21 * measured})
-    return st.onset(without(LINE, "friction.residual_strength"), both, method=EXACT)
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

@@ -42,15 +42,6 @@ def test_public_modules_show_their_functions():
     assert sorted(re.findall(r" as (\w+)", stub)) == st.statistics.__all__ == dir(st.statistics)
 
 
-def test_the_drawing_is_what_is_held():
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
-    held = [re.findall(r"(?<!\()\b\w+", layer) for layer in contracts["contracts"][0]["layers"]]
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    drawing = re.search(r"## Layers\n.*?```\n(.*?)```", page, flags=re.DOTALL)[1]
-    drawn = [line.split("  ")[0].split() for line in drawing.splitlines()]
-    assert [sorted(layer) for layer in drawn] == [sorted(layer) for layer in held]
-
-
 def test_an_edited_message_compiles_no_kernel_anew():
     """Files with kernels refuse nothing and import none that do, whose states they depend on."""
     texts = {path: path.read_text(encoding="utf-8") for path in SOURCES.rglob("*.py")}

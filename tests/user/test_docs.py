@@ -21,11 +21,6 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?")
 README = (ROOT / "README.md").read_text("utf-8")
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 DATA = ROOT / "examples" / "data"
-COMMANDS = (
-    "python3 -m venv .venv && .venv/bin/python -m pip install . && .venv/bin/python reproduction",
-    'python3 -m venv .venv && .venv/bin/python -m pip install -e ".[test]"'
-    " && .venv/bin/python -m pytest",
-)
 
 
 def blocks(page, language):
@@ -35,13 +30,6 @@ def blocks(page, language):
         rf"^( *)```{language}\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE
     )
     return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
-
-
-def test_the_two_commands_stand_there_each_on_its_own_line():
-    for command in COMMANDS:
-        assert README.splitlines().count(command) == 1
-    # Continuous integration takes both from the README, so that they are run as printed.
-    assert (ROOT / ".ci" / "run").read_text().count("README.md") >= 2
 
 
 # -- python of pages, some of its words replaced so that it takes less, and what it must find ------
