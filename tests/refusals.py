@@ -33,14 +33,3 @@ def warning_texts(call: Callable[[], Any]) -> list[str]:
             if warning.category.__module__.startswith("stiction")
         }
     )
-
-
-def refusals(table: dict[str, Any], call: Callable[..., Any] | None = None) -> Any:
-    """Return a test of each row: words, and a call that is refused or the options of `call`."""
-
-    @pytest.mark.parametrize("words", table)
-    def test(words: str) -> None:
-        given = table[words]
-        refuses(words, given if call is None else lambda: call(**given))
-
-    return test

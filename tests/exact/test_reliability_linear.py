@@ -12,6 +12,7 @@ from crooked import LINE
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 from setups import beta_strength
+from stand_ins import StandIn
 
 import stiction as st
 from stiction.random import equally_likely
@@ -244,22 +245,8 @@ def test_runs_over_two_levels_that_find_no_failure_count_as_well():
     assert_mean(found, norm.cdf(-2.0) * norm.cdf(-3.0), errors=4.0)
 
 
-@dataclass(frozen=True)
-class AtOnePlace:
-    """A method whose onset is the strength at one node: its distribution is the marginal."""
-
-    type: str = "at_one_place"
-    label = "strength at node 37"
-    variables = staticmethod(st.LocalCriterion().variables)
-
-    def supports(self, problem):
-        return []
-
-    def seconds_per_sample(self, problem):
-        return 1e-5
-
-    def prepare(self, problem):
-        return lambda rows: dict.fromkeys(self.variables(problem), rows.strength[:, 37])
+AT_ONE_PLACE = StandIn(lambda rows, stress: rows.strength[:, 37], seconds=1e-5)
+"""Its onset is the strength at one node: its distribution is the marginal."""
 
 
 def test_unknown_mean_and_variance_give_students_tail():
@@ -272,7 +259,7 @@ def test_unknown_mean_and_variance_give_students_tail():
     likely = [
         st.RandomInterface(strength=st.RandomField(norm(*pair), spectrum)) for pair in pairs
     ]
-    options = {"method": AtOnePlace(), "target_cv": 0.2, "seed": 5, "workers": 1}
+    options = {"method": AT_ONE_PLACE, "target_cv": 0.2, "seed": 5, "workers": 1}
     for score, algorithm in ((1.3, "plain"), (3.5, "subset")):
         stress, scale = mean - score * deviation, (1.0 + 1.0 / count) ** 0.5
         found = st.failure_probability(LINE, likely, stress, algorithm=algorithm, **options)
@@ -308,7 +295,7 @@ class UnknownMean:
 
 def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     monkeypatch.setattr(equally_likely, "FIRST_MEMBERS", 100)
-    source, options = UnknownMean(24e3), {"method": AtOnePlace(), "seed": 3, "progress": False}
+    source, options = UnknownMean(24e3), {"method": AT_ONE_PLACE, "seed": 3, "progress": False}
     scale = math.hypot(24e3, 30e3)
     stress = 1.1e6 - 2.9 * scale
     true = norm.cdf(-2.9)
@@ -361,7 +348,7 @@ class Again(UnknownMean):
 
 def test_a_longer_list_without_others_is_not_computed(monkeypatch):
     monkeypatch.setattr(equally_likely, "FIRST_MEMBERS", 100)
-    options = {"method": AtOnePlace(), "target_cv": 0.3, "progress": False}
+    options = {"method": AT_ONE_PLACE, "target_cv": 0.3, "progress": False}
     found = st.failure_probability(LINE, Again(40e3), 0.96e6, **options)
     assert found.members.size == 100
     assert "more repetitions" in found.warnings[-1]

@@ -9,8 +9,6 @@ from setups import QUARTER, make_problem
 
 import stiction as st
 from stiction.methods.dynamics.save import open_rupture
-from stiction.plot.ruptures import _line_film, _plane_film
-from stiction.plot.style import paper_style
 
 LINE = make_problem(64, 0.04, solid=QUARTER, weakening_rate=3e11, residual_strength=2e5)
 METHOD = st.Rupture(loading_rate=1e8)
@@ -90,16 +88,6 @@ def test_stations_show_the_fields_at_their_nodes(case):
     axes = problem.interface.coordinates.values()
     expected = [at[i] for at, i in zip(axes, np.atleast_1d(nodes[1]), strict=True)]
     assert far == pytest.approx(expected)
-
-
-def test_the_title_of_a_film_lies_within_it(case):
-    problem, *_, run = case
-    study = run.attrs["study"].replace('"length": [0.04, 0.03]', '"length": [0.04, 0.027]')
-    with paper_style():
-        film = _plane_film if problem.interface.is_plane else _line_film
-        figure, moving = film(run.assign_attrs(study=study))
-        figure.draw_without_rendering()
-        assert moving[-1][0].get_window_extent().y1 < figure.bbox.y1
 
 
 def test_stations_change_nothing_and_need_no_frames(case):

@@ -10,6 +10,7 @@ from crooked import LINE, of_width
 from recording import Calls, compared
 from setups import EXACT, LOCAL, beta_strength, make_problem, turns, without
 from specimens import crooked
+from stand_ins import BoundedStandIn
 
 import stiction as st
 from stiction.random.stresses import share_below_residual
@@ -102,34 +103,17 @@ def frequent_failures_and_a_median_interface_that_fails():
     }
 
 
-@dataclasses.dataclass(frozen=True)
-class Piled:
-    """The local criterion under another name, low critical stresses piled up as by rounding."""
-
-    first_stage: str | None
-    type = "equilibrium"
-    label = "stand-in"
-    variables = staticmethod(LOCAL.variables)
-    supports = staticmethod(lambda problem: [])
-    seconds_per_sample = staticmethod(lambda problem: 1e-3)
-    bounded_by_strength = staticmethod(LOCAL.bounded_by_strength)
-
-    def prepare(self, problem):
-        solve = LOCAL.prepare(problem)
-
-        def piled(rows):
-            values = solve(rows)
-            stress = values["critical_stress"]
-            return values | {"critical_stress": np.where(stress < 6.75e5, 6.6e5, stress)}
-
-        return piled
-
-
 @calls("the bound itself, below which nothing lies", close=1e-5)
 def onsets_that_pile_up_on_the_bound():
+    """By the local criterion under another name, low onsets piled up as by rounding."""
+
+    def piled(rows, stress):
+        return np.where(stress < 6.75e5, 6.6e5, stress)
+
     found = {}
     for stage in ("local_criterion", None):
-        given = SYSTEM | {"method": Piled(stage), "target_cv": 0.3}
+        method = BoundedStandIn(piled, "equilibrium", stage, seconds=1e-3)
+        given = SYSTEM | {"method": method, "target_cv": 0.3}
         found[stage or "none"] = designed(probability=1e-5, **given)
         found[f"few {stage}"] = designed(probability=1e-12, max_evaluations=100, **given)
     return found

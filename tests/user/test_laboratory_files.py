@@ -121,6 +121,8 @@ def test_a_table_on_another_sheet(tmp_path):
     refuses("sheet: 'data' ... 'DATA'", lambda: st.read_profile(path, sheet="data"))
     for sheet in (1, "DATA"):
         assert is_read(st.read_profile(path, sheet=sheet))
+    (tmp_path / "folder.csv").mkdir()
+    refuses("is not a regular file", lambda: st.read_profile(tmp_path / "folder.csv"))
 
 
 def test_one_of_several_records(tmp_path):
@@ -177,20 +179,6 @@ def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     refuses("line", lambda: read(tmp_path, blank, x=0, value=1))
     lines[30_000] = "30.000;"
     assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [30_000]
-
-
-def test_files_that_cannot_be_read(tmp_path):
-    for text, words in {
-        "": "no numbers",
-        b"\x00\x01\x02": "is not a text file",
-        "x;strength\n" + ";".join(["1"] * 200_001): "200001 columns",
-        'x;strength\n0;"1\n1;2': "quotation mark",
-        "x (mm);strength (MPa)\n0;1\n1\n": "line 3 has 1 columns, line 2 has 2",
-        "x (mm);strength (MPa)\nm;MPa\n0;1\n": "another unit",
-    }.items():
-        refuses(words, lambda text=text: read(tmp_path, text))
-    (tmp_path / "folder.csv").mkdir()
-    refuses("is not a regular file", lambda: st.read_profile(tmp_path / "folder.csv"))
 
 
 def test_binary_files_of_instruments(tmp_path, monkeypatch):

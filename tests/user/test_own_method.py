@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import scipy.stats
-from refusals import refusals, refuses
+from refusals import refuses
 from setups import beta_strength, make_problem
 
 import stiction as st
@@ -142,20 +142,26 @@ def field_of(distribution):
     return st.RandomField(FromScipy(distribution), st.PowerLawSpectrum(correlation_length=2e-3))
 
 
-test_a_class_whose_members_return_the_wrong_thing_is_refused = refusals(
-    {
-        "supports must return a list of reasons, got 'it does": lambda: st.onset(
-            st.paper.problem(nodes=256), np.full(256, 1e6), method=Unlisted({})
+def test_a_class_whose_members_return_the_wrong_thing_is_refused():
+    problem = st.paper.problem(nodes=256)
+    uniform, spectrum = scipy.stats.uniform(1e6, 1e6), Negative(correlation_length=2e-3)
+    for words, call in (
+        (
+            "supports must return a list of reasons, got 'it does",
+            lambda: st.onset(problem, np.full(256, 1e6), method=Unlisted({})),
         ),
-        "ShortLoad.values must have the shape (256,) ... got (3,)": lambda: ShortLoad().on(
-            st.paper.problem(nodes=256).interface
+        (
+            "ShortLoad.values must have the shape (256,) ... got (3,)",
+            lambda: ShortLoad().on(problem.interface),
         ),
-        "from_scipy: its distribution must be frozen": lambda: field_of(scipy.stats.norm),
-        "must have a finite mean ... got nan": lambda: field_of(
-            scipy.stats.triang(2.0, 1e6, 1e6)
+        ("from_scipy: its distribution must be frozen", lambda: field_of(scipy.stats.norm)),
+        (
+            "must have a finite mean ... got nan",
+            lambda: field_of(scipy.stats.triang(2.0, 1e6, 1e6)),
         ),
-        "positive and finite ... -1 in a mode": lambda: st.RandomField(
-            scipy.stats.uniform(1e6, 1e6), Negative(correlation_length=2e-3)
-        ).sample(st.paper.problem(nodes=256).interface, seed=0),
-    }
-)
+        (
+            "positive and finite ... -1 in a mode",
+            lambda: st.RandomField(uniform, spectrum).sample(problem.interface),
+        ),
+    ):
+        refuses(words, call)

@@ -73,43 +73,13 @@ def test_importing_is_quick_because_nothing_heavy_is_loaded():
     assert python("-c", f"import sys, stiction; print(*{heavy} & set(sys.modules))") == "\n"
 
 
-CALLS = [
-    ("solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, {}=1170.0)", "density", "densty"),
-    ("interface = st.Interface(length={}, nodes=1024)", "0.1", '"0.1"'),
-    ("law = st.LinearWeakening({}=5e11)", "weakening_rate", "weakening_rat"),
-    ("steep = st.LinearWeakening(weakening_rate={})", "np.full(1024, 5e11)", '"fast"'),
-    ("beta = st.Beta(alpha=1.5, beta=3.0, {}low=0.66e6)", "high=1.66e6, ", ""),
-    ("problem = st.Problem({}, law)", "solid, interface", "interface, solid"),
-    ("st.Problem(solid, interface, {})", "law", '"linear"'),
-    ("st.Problem(solid, interface, law, {})", "st.Load()", "1e6"),
-    ("st.Load(profile={})", "st.GradientLoad(amplitude=0.1)", "st.GradientLoad"),
-    ("st.Load(initial_stress={})", "[1e5] * 1024", '"1e5"'),
-    ("method = st.{}()", "Equilibrium", "Equilibrum"),
-    ("field = st.RandomField({})", "beta, st.PowerLawSpectrum(1e-3)", "beta, 1e-3"),
-    ("st.RandomField({})", "beta, st.PowerLawSpectrum(1e-3)", "st.PowerLawSpectrum(1e-3), beta"),
-    ("st.RandomField({}, st.PowerLawSpectrum(1e-3))", "beta", "st.Beta"),
-    ("st.RandomField(beta, {})", "st.PowerLawSpectrum(1e-3)", "st.PowerLawSpectrum"),
-    (
-        "st.RandomInterface(strength=field, correlation={})",
-        '{("strength", "initial_stress"): 0.1}', '{"strength": 0.1}',
-    ),
-    ("st.monte_carlo(problem, {}, method=method, samples=9)", "[field, field]", "3"),
-    ("st.monte_carlo(problem, field, method=method, samples={})", "9", '"10"'),
-    ("st.monte_carlo(problem, field, method={}, samples=9)", "method", '"equilibrium"'),
-    ("st.monte_carlo(problem, field, method={}, samples=9)", "method", "st.Equilibrium"),
-    ("st.monte_carlo(problem, field, method=method, samples=9, keep={})", '"strength"', "1"),
-    ("st.Save({})", '["slip"], stations={"a": 0.05}', "3"),
-    ("run = st.Rupture(loading_rate={})", "2e7", '"fast"'),
-    ("st.plot.field(interface, [0.0]).figure.{}", "set_size_inches(3, 2)", "set_size(3, 2)"),
-]  # fmt: skip
-"""Lines, what belongs in them, and a mistake in its place."""
-
-
 def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
+    """Lines of tests/records/typed.json, what belongs in them, and a mistake in its place."""
     pytest.importorskip("basedpyright")
     head = "import numpy as np\nimport stiction as st\n"
+    calls = json.loads((ROOT / "tests" / "records" / "typed.json").read_text())
     for name, which in (("right.py", 1), ("wrong.py", 2)):
-        lines = [call[0].format(call[which]) for call in CALLS]
+        lines = [call[0].format(call[which]) for call in calls]
         (tmp_path / name).write_text(head + "\n".join(lines))
     config = tmp_path / "pyrightconfig.json"
     config.write_text('{"include": ["right.py"], "typeCheckingMode": "strict"}')
@@ -118,4 +88,4 @@ def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
     right = json.loads(python(*options, "-p", config))["generalDiagnostics"]
     assert [one["message"] for one in right] == []
     found = json.loads(python(*options, tmp_path / "wrong.py", code=1))["generalDiagnostics"]
-    assert {one["range"]["start"]["line"] - 2 for one in found} >= {*range(len(CALLS))}
+    assert {one["range"]["start"]["line"] - 2 for one in found} >= {*range(len(calls))}

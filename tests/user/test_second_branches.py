@@ -1,12 +1,11 @@
 """Second branches of inference: a guide of no use, threads in an estimate, peaks with a unit."""
 
-import dataclasses
 from types import SimpleNamespace
-from typing import ClassVar
 
 import numpy as np
 import pytest
 from setups import LOCAL, make_problem
+from stand_ins import StandIn
 
 import stiction as st
 from stiction.base.progress import duration
@@ -18,42 +17,23 @@ FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), st.PowerLawSpectrum(4e-3), me
 PEAKS = np.array([0.78e6, 0.83e6, 0.8e6, 0.86e6])
 
 
-@dataclasses.dataclass(frozen=True)
-class Mixed:
-    """A share of the local criterion's onset, and the strength at one node for the rest."""
-
-    share: float
-    type: ClassVar[str] = "mixed"
-    label: ClassVar[str] = "stand-in"
-    variables = staticmethod(LOCAL.variables)
-    supports = staticmethod(lambda problem: [])
-    seconds_per_sample = staticmethod(lambda problem: 1e-4)
-
-    def prepare(self, problem):
-        solve = LOCAL.prepare(problem)
-
-        def mixed(rows):
-            values = solve(rows)
-            own = self.share * values["critical_stress"] + (1.0 - self.share) * (
-                0.8 * rows.strength[:, 5]
-            )
-            return values | {"critical_stress": own}
-
-        return mixed
-
-
 @pytest.mark.parametrize("share", [0.2, 0.45])
 def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
     """Correlations of 0.1 to 0.8: the onsets are those of a simulation at every node."""
+
+    def mixed(rows, stress):
+        """A share of the local onset, and the strength at one node for the rest."""
+        return share * stress + (1.0 - share) * 0.8 * rows.strength[:, 5]
+
     given = {
-        "prior": {"correlation_length": (2e-3, 6e-3)}, "method": Mixed(share), "samples": 100,
+        "prior": {"correlation_length": (2e-3, 6e-3)}, "method": StandIn(mixed), "samples": 100,
         "progress": False,
     }  # fmt: skip
     guided = st.infer(PROBLEM, FIELD, PEAKS, **given)
     options = {"samples": 300, "progress": False, "pilot": False}
     onsets = [
         st.monte_carlo(PROBLEM, FIELD, method=method, **options).critical_stress.values
-        for method in (Mixed(share), LOCAL)
+        for method in (StandIn(mixed), LOCAL)
     ]
     alike = np.corrcoef(*onsets)[0, 1]
     assert 0.1 < alike < 0.8
