@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as strategies
 
 import stiction as st
-from stiction.problem.profiles import tables
+from stiction.problem.profiles import files
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "microns": 1e-6, "Millimeter": 1e-3}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "Megapascal": 1e6, "bar": 1e5}
@@ -150,7 +150,7 @@ def test_usual_dialects_are_read(tmp_path, heading, separator, mark, monkeypatch
         variants += [{"gap": ""}, {"index": True}, {"trailing": 2}, {"blank": True}]
     for variant in variants:
         assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant
-    monkeypatch.setattr(tables, "LARGE", 0)
-    monkeypatch.setattr(tables, "HEAD", 120)
+    monkeypatch.setattr(files, "LARGE", 0)
+    monkeypatch.setattr(files, "HEAD", 120)
     for variant in variants:
         assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant

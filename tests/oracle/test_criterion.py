@@ -1,10 +1,12 @@
 """The local criterion against its definition, against theory and against exact onsets."""
 
+import dataclasses
 import re
 import warnings
 
 import numpy as np
 import pytest
+import xarray as xr
 from setups import (
     LENGTH,
     RATE,
@@ -61,6 +63,17 @@ def test_a_barrier_leaves_the_weak_stretch_beside_it_alone(contrast):
         tau_n = st.theory.nucleation_stress(problem, barred)
         assert weak.min() <= tau_n.min() * (1.0 + ROUND_OFF)
         assert tau_n.max() <= barred.max() * (1.0 + ROUND_OFF)
+
+
+def test_a_nucleation_stress_of_coefficients_and_of_a_sample(problem, make_strength):
+    tau_p = make_strength(0.5).sample(problem.interface, samples=2, seed=3)
+    tau_n = st.theory.nucleation_stress(problem, tau_p)
+    again = st.theory.nucleation_stress(problem, problem.sample(tau_p))
+    np.testing.assert_array_equal(again, tau_n)
+    pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
+    coefficient = xr.DataArray(0.5e-6 * tau_p[1], dims="x", attrs={"units": "1"})
+    of_coefficient = st.theory.nucleation_stress(pressed, coefficient)
+    np.testing.assert_allclose(of_coefficient, tau_n[1], rtol=1e-12)
 
 
 def lognormal(xi, cv=0.3):

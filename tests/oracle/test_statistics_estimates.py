@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from stiction.statistics.densities import density
-from stiction.statistics.estimates import mean, quantiles, standard_deviation
+from stiction.statistics.estimates import density, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
 

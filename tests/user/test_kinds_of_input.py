@@ -142,3 +142,27 @@ def test_numbers_with_units(library):
     assert (field.marginal.mean, field.spectrum.correlation_length) == pytest.approx(
         (1e6, 2e-3)
     )
+    refuses("length ... cannot be converted to m", lambda: st.Interface(unit(1.0, "s"), 8))
+    refuses("shear_modulus ... to Pa", lambda: st.Solid(
+        shear_modulus=unit(1.0, "m"), poisson_ratio=0.3, density=1.0
+    ))  # fmt: skip
+
+
+def test_a_mean_pressure_of_each_sample_is_distributed_between_glued_blocks():
+    """As an array, as one with labels, and with a unit."""
+    problem = st.Problem(
+        solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+        interface=st.Interface(length=0.1, nodes=64),
+        friction=st.LinearWeakening(weakening_rate=0.2e12),
+        specimen=st.Blocks(height=0.05, pressing="glued"),
+    )
+    strength, means = np.full((2, 64), 1e6), np.array([2e6, 3e6])
+    kinds = (
+        means[:, None],
+        xr.DataArray(means, dims="sample"),
+        xr.DataArray(means * 1e-6, dims="sample", attrs={"units": "MPa"}),
+    )
+    for pressure in kinds:
+        sample = problem.sample({"strength": strength, "normal_pressure": pressure})
+        expected = means[:, None] * problem.blocks.pressure
+        np.testing.assert_allclose(sample.normal_pressure, expected, rtol=1e-14)

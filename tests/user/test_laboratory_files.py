@@ -11,7 +11,7 @@ from PIL import Image
 from refusals import refuses
 
 import stiction as st
-from stiction.problem.profiles import tables
+from stiction.problem.profiles import files
 
 X = np.array([0.0, 1.0, 2.0, 3.5])  # mm
 STRENGTH = np.array([1.0, 1.25, 0.975, 1.03])  # MPa
@@ -162,7 +162,7 @@ def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     rng = np.random.default_rng(0)
     x, values = np.arange(40_000) * 1e-3, np.round(1.0 + rng.random(40_000), 6)
     lines = [f"{a:.3f};{b:.6f}" for a, b in zip(x, values, strict=True)]
-    assert len("\n".join(lines)) > tables.LARGE
+    assert len("\n".join(lines)) > files.LARGE
     head = "x (mm);strength (MPa)"
     for text in ("\n".join([head, *lines]), "\n".join([head, *lines]).replace(".", ",")):
         np.testing.assert_array_equal(read(tmp_path, text), values * 1e6)

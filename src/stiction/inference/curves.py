@@ -38,9 +38,10 @@ from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import Number, Positive, checked, describe, real_array
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, in_words, is_in
+from stiction.problem.profiles.files import EXCEL, TEXT, read_table
 from stiction.problem.profiles.labels import column_of, with_stated_unit
 from stiction.problem.profiles.reading import Missing
-from stiction.problem.profiles.tables import EXCEL, TEXT, Options, read_table, table_of_frame
+from stiction.problem.profiles.tables import Options, table_of_frame
 
 FORCE = ("force", "load", "kraft", "standardkraft", "friction", "stress", "coefficient", "mu")
 TRAVEL = (

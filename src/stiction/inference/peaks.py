@@ -14,9 +14,10 @@ from stiction.base.model import FilePath, Number, Numbers, check, checked, descr
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, is_in, magnitude
 from stiction.inference.curves import Curves
+from stiction.problem.profiles.files import read_table
 from stiction.problem.profiles.labels import column_of, with_stated_unit, without_missing
 from stiction.problem.profiles.reading import Missing
-from stiction.problem.profiles.tables import Options, read_table, table_of_frame
+from stiction.problem.profiles.tables import Options, table_of_frame
 
 MIN_PEAKS = 3
 """Fewest different peaks in all: of two numbers, one may be a mistake."""

@@ -27,7 +27,7 @@ from stiction.plot.axes import (
 )
 from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET, color, series
 from stiction.reliability.answer import Answer, bounded
-from stiction.statistics.densities import density
+from stiction.statistics.estimates import density
 from stiction.statistics.estimates import quantiles as estimate_quantiles
 
 MAX_CURVES = 6

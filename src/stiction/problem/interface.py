@@ -205,9 +205,8 @@ class Interface:
     def _one_geometry(self) -> Interface:
         if isinstance(self.length, tuple) != isinstance(self.nodes, tuple):
             raise InputError(
-                "length and nodes: give one number of each for a line, or two of each for a"
-                " plane, got"
-                f" length = {self.length}, nodes = {self.nodes}"
+                "length and nodes: give one number of each for a line, or two of each for a plane,"
+                f" got length = {self.length}, nodes = {self.nodes}"
             )
         if self.width is not None and self.is_plane:
             raise InputError("width: a plane has its area. Leave the width out")
@@ -221,8 +220,7 @@ class Interface:
             )
         if min(self.spacings) < SHORTEST:
             raise InputError(
-                f"length: the nodes must be at least {SHORTEST:g} m apart, got"
-                f" {min(self.spacings):g} m. Check its unit"
+                f"length: nodes are {min(self.spacings):g} m apart. Check its unit"
             )
         if problem := self._wrong_extent():
             raise InputError(f"extent: {problem}")
@@ -247,8 +245,7 @@ class Interface:
                 )
             if not fits:
                 return (
-                    f"must rise and lie on the interface, from 0 to {length:g} m along {dim}, got"
-                    f" {low:g} to {high:g} m"
+                    f"must rise from 0 to {length:g} m along {dim}, got {low:g} to {high:g} m"
                 )
         inside = self._inside
         if np.count_nonzero(inside) < 2:

@@ -48,16 +48,14 @@ class LoadShape(ABC):
         try:
             np.broadcast_to(values, interface.shape)
         except ValueError:
-            raise InputError(
-                f"load.profile: {name}.values must have the shape {interface.shape} of the nodes,"
-                f" got {values.shape}"
-            ) from None
+            text = f"must have the shape {interface.shape} of the nodes, got {values.shape}"
+            raise InputError(f"load.profile: {name}.values {text}") from None
         values = values / values.mean()
         if not np.all(values > 0.0):
-            raise InputError(
-                f"load.profile: {name} must be positive everywhere. Its smallest"
-                f" value over its mean is {values.min():g}"
+            text = (
+                f"must be positive everywhere. Its least value is {values.min():g} of its mean"
             )
+            raise InputError(f"load.profile: {name} {text}")
         return np.ascontiguousarray(np.broadcast_to(values, interface.shape))
 
 

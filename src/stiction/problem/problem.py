@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection, Mapping
-from functools import cached_property, reduce
+from functools import cached_property
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -28,15 +28,14 @@ from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.placing import Gaps, turned
-from stiction.problem.profiles.reading import at_nodes
-from stiction.problem.sample import (
+from stiction.problem.profiles.reading import (
     FRICTION,
-    Sample,
+    at_nodes,
     check_values,
     named_profiles,
-    no_coefficients,
-    rows_of,
+    placed_profiles,
 )
+from stiction.problem.sample import Sample, contradictions_of
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
 
@@ -47,8 +46,6 @@ MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
 """Nodes in a nucleation length below which a unit is doubted. Hundred times more are needed."""
-MAX_STRENGTH_RATIO = 1e8
-"""Strength of a node over the median beyond which others are lost in round-off."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
 coefficient of 0.1 has 1e-8."""
@@ -69,6 +66,7 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """Advice for a force if the area is unknown."""
+GIVE_PRESSURE = "Give load.normal_pressure (Pa) or load.pressing_force (N)"
 
 
 REPLACED = {
@@ -167,10 +165,7 @@ class Problem:
         if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
             problems.append("load.profile: comes from the drive of a specimen. Leave it out")
         if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
-            problems.append(
-                "load.normal_pressure: with pressing = 'glued' blocks make its profile. Give the"
-                " mean"
-            )
+            problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
                 f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
@@ -180,8 +175,7 @@ class Problem:
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
             problems.append(
                 f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
-                f" length in mode II, is {high:.3g} times. Check the units, or take a"
-                " shorter piece of flat blocks"
+                f" length in mode II, is {high:.3g} times. Check the units, or shorten flat blocks"
             )
         return problems
 
@@ -199,9 +193,8 @@ class Problem:
         blocks = 0.5 * depth * self.blocks.drive_stiffness  # of both, in series
         if machine > 0.0:
             text = (
-                f"specimen.drive.stiffness: {machine:.3g} N/m is {machine / blocks:.1g} of the"
-                f" stiffness of the blocks, {blocks:.3g} N/m, and hardly differs from dead load,"
-                " 0. Check its unit (N/m)"
+                f"specimen.drive.stiffness: {machine:.3g} N/m hardly differs from dead load, 0,"
+                f" beside the stiffness of the blocks, {blocks:.3g} N/m. Check its unit (N/m)"
             )
             doubt_units(
                 [Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf), (0.0, math.inf))]
@@ -223,8 +216,7 @@ class Problem:
                     placed[name] = value
                 if isinstance(value, np.ndarray) and value.shape not in ((), shape):
                     problems.append(
-                        f"{part}.{name}: must have one entry for each of the"
-                        f" {' x '.join(map(str, shape))} nodes, got"
+                        f"{part}.{name}: must have the shape {shape} of the nodes, got"
                         f" {describe(value)}{turned(value.shape, shape)}"
                     )
             if placed and not problems:  # frozen for others; validation is not over yet
@@ -237,8 +229,7 @@ class Problem:
         if self.specimen is None and patch >= length:
             warn_user(
                 f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-                f" ({length:.3g} m). If this is not intended, check the units of length, shear"
-                " modulus and weakening rate",
+                f" ({length:.3g} m). Check the units of length, shear modulus and weakening rate",
                 UnitWarning,
             )
         elif (
@@ -247,10 +238,9 @@ class Problem:
             and self.specimen is None
         ):
             warn_accuracy(
-                f"the interface is {length / patch:.2g} nucleation lengths long and continues"
-                " periodically: under a uniform antiplane load, free ends would lower its onset by"
-                f" about {min(3.0, 5.0 * patch / length):.1g} % on average and by up to 17 % in"
-                " single cases"
+                f"the interface is {length / patch:.2g} nucleation lengths long and periodic. Free"
+                f" ends would lower its onset by about {min(3.0, 5.0 * patch / length):.1g} % on"
+                " average and by up to 17 % in single cases, under a uniform antiplane load"
             )
 
     def doubt(self, sample: Sample) -> None:
@@ -287,9 +277,8 @@ class Problem:
             compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
         doubts = [
             Doubt(
-                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check"
-                " the units of both, which are in Pa. Friction coefficients are fractions, not"
-                " percentages, and need of='friction_coefficient'",
+                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check the"
+                " units of both (Pa). Friction coefficients need of='friction_coefficient'",
                 mean / of,
                 *limits,
             )
@@ -300,8 +289,7 @@ class Problem:
             slip = drop / float(np.median(friction.weakening_rate))
             text = (
                 f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, the"
-                " size of a few atoms. Check the units of strength or normal pressure (Pa) and"
-                " weakening_rate (Pa/m)"
+                " size of a few atoms. Check the units of strength, pressure and weakening_rate"
             )
             doubts.append(Doubt(text, slip, *SLIP))
         if initial is None:
@@ -476,17 +464,15 @@ class Problem:
         length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
         if min(resolution) < HARDLY_RESOLVED:
             raise InputError(
-                f"solid.shear_modulus, interface.length, friction: the nucleation length is"
+                "solid.shear_modulus, interface.length, friction: the nucleation length is"
                 f" {length:.3g} m, and the nodes are {self.interface.spacing:.3g} m apart. Check"
-                f" the units of the modulus, {self.solid.shear_modulus:g} Pa, of the lengths, of"
-                f" the weakening rate, {steepest:.3g} Pa/m at its steepest, and of strengths"
+                f" the units of the modulus, {self.solid.shear_modulus:g} Pa, of lengths, strengths"
+                f" and the weakening rate, {steepest:.3g} Pa/m"
             )
+        least = MIN_NODES_IN_NUCLEATION
         raise InputError(
-            f"interface.nodes: the nucleation length {length:.3g} m spans"
-            f" {min(*resolution, MIN_NODES_IN_NUCLEATION - 0.01):.3g} nodes. At least"
-            f" {MIN_NODES_IN_NUCLEATION} are needed, that is"
-            f" interface.nodes >= {self._finer(resolution, MIN_NODES_IN_NUCLEATION)}, got"
-            f" {' x '.join(map(str, self.interface.shape))}"
+            f"interface.nodes: must be {self._finer(resolution, least)} or more. The nucleation"
+            f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} of {least} nodes"
         )
 
     def _check_extent(self, resolution: tuple[float, ...]) -> None:
@@ -501,9 +487,7 @@ class Problem:
                 spacing = interface.spacings[axis]
                 raise InputError(
                     f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
-                    f" the nucleation length, {resolution[axis] * spacing:.3g} m, so that it cannot"
-                    " become unstable. Widen it, or check the units of lengths, shear modulus and"
-                    " weakening rate"
+                    f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen it"
                 )
 
     def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
@@ -564,60 +548,28 @@ class Problem:
         self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
     ) -> tuple[Sample, Any]:
         """Return a sample made from users' data, and a mask of the measured nodes, or True."""
-        friction, interface = self.friction, self.interface
-        problems: list[str] = []
-        ready = isinstance(profiles, Sample)
-        if ready:
-            given = self._given_sample(profiles)
+        if isinstance(profiles, Sample):
+            sample, measured = self.own_sample(self._given_sample(profiles), accept), True
         else:
             given = named_profiles(profiles)
-            problems += self.given_twice(given, "profiles")
-        of = "strength" if "strength" in given else "friction_coefficient"
-        if of not in given:
-            raise InputError("strength: missing among the profiles")
-        measured = [np.ones((1, *interface.shape), dtype=bool)]
-        scales = [name for name in SCALES if name in given]
-        if len(scales) > 1:
-            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
-
-        def read(name: str, default: Any, samples: int | None) -> Any:
-            try:
-                value, known = at_nodes(name, given.get(name, default), interface, gaps)
-                if not np.all(known):
-                    measured.append(known.reshape(-1, *interface.shape))
-                with prefixed(name):
-                    return rows_of(name, value, interface, samples)
-            except InputError as error:
-                problems.extend(error.problems)
-                return np.ones((samples or 1, *interface.shape))
-
-        strength = read(of, None, None)
-        samples = len(strength)
-        pressure = np.broadcast_to(np.nan, (samples, *interface.shape))
-        if self.given_pressure is not None or "normal_pressure" in given:
-            pressure = read("normal_pressure", self.normal_pressure, samples)
-            shape = np.shape(given.get("normal_pressure", pressure))
-            if shape in ((), (samples, 1)):  # of each sample, which its blocks distribute
-                pressure = pressure * self.pressing
-        if of != "strength":
-            problems += no_coefficients(strength, pressure)
-            strength = strength * pressure
-        residual = read("residual_strength", friction.residual(strength), samples)
-        initial = read("initial_stress", self.load.initial_stress, samples)
-        scale, value = friction.scale or (SCALES[0], 1.0)
-        scale = scales[0] if scales else scale
-        value = read(scale, value, samples)
-        if problems:
-            raise InputError(problems)
-        sample = self._made(strength, residual, initial, scale, value, pressure, accept)
-        constant = sample.strength <= sample.residual_strength
-        if constant.any() and not ready:
-            warn_accuracy(
-                f"strength is not above residual_strength at {100.0 * constant.mean():.2g}"
-                " % of the nodes. These do not weaken: their strength is constant"
+            rows, measured, mistakes = placed_profiles(
+                given, self.interface, gaps, self.pressing
             )
-        self._check_resolution(sample.steepest_weakening_rate)
-        return sample, reduce(np.logical_and, measured)
+            problems = self.given_twice(given, "profiles") + mistakes
+            if problems:
+                raise InputError(problems)
+            if "friction_coefficient" in rows:
+                pressure = rows.get("normal_pressure", self.normal_pressure)
+                rows["strength"] = rows.pop("friction_coefficient") * pressure
+            sample = self._made(rows, accept)
+            if (constant := sample.strength <= sample.residual_strength).any():
+                percent = f"{100.0 * constant.mean():.2g} %"
+                warn_accuracy(
+                    f"strength is not above residual_strength at {percent} of the nodes. These do"
+                    " not weaken: their strength is constant"
+                )
+        self._check_resolution(sample.steepest_rate)
+        return sample, measured
 
     def constants(self, strength: Any) -> dict[str, Any]:
         """Return, by name, values for profiles that are not given, or None without a value."""
@@ -644,46 +596,52 @@ class Problem:
                 problems += error.problems
         if problems:
             raise InputError(problems)
-        strength = profiles["strength"]
-        scale = self.friction.scale[0] if self.friction.scale else SCALES[0]
-        scale = next((name for name in SCALES if name in profiles), scale)
-        known = {"normal_pressure": np.nan, scale: 1.0} | {
-            name: value
-            for name, value in (self.constants(strength) | dict(profiles)).items()
-            if value is not None
-        }
+        return self._made(profiles, accept)
+
+    def _made(self, profiles: Mapping[str, Array], accept: Collection[str]) -> Sample:
+        """Return a sample from arrays with valid values, if they fit together.
+
+        Profiles that are not given come from the problem.
+        """
+        interface, strength = self.interface, profiles["strength"]
+        constants = self.constants(strength)
+        scale = next(name for name in (*profiles, *constants) if name in SCALES)
+        known = constants | dict(profiles)
+        if known["normal_pressure"] is None:
+            known["normal_pressure"] = np.nan
         residual, initial, value, pressure = (
             np.broadcast_to(known[name], strength.shape)
             for name in ("residual_strength", "initial_stress", scale, "normal_pressure")
         )
-        return self._made(strength, residual, initial, scale, value, pressure, accept)
-
-    def _made(
-        self, strength: Array, residual: Array, initial: Array, scale: str, value: Array,
-        pressure: Array, accept: Collection[str],
-    ) -> Sample:  # fmt: skip
-        """Return a sample made from rows with valid values, if the rows fit together."""
-        if self.interface.is_held:
-            strength = np.where(self.interface.breakable, strength, np.inf)
-        if problems := self._impossible(strength, residual, initial, accept):
+        barriers = ~interface.breakable
+        if interface.is_held:
+            strength = np.where(barriers, np.inf, strength)
+        overstress = "overstress" in accept
+        if problems := contradictions_of(interface, strength, residual, initial, overstress):
             raise InputError(problems)
-        W = self._rates_of(strength, residual, scale, value)
+        rates = self.friction.rate(strength - residual, scale, value)
+        if interface.is_held and scale != "weakening_rate":
+            # Barriers never weaken. Any finite rate will do, and here it is the fastest.
+            fastest = np.where(barriers, 0.0, rates).max(interface.axes, keepdims=True)
+            rates = np.where(barriers, fastest, rates)
         constant = strength <= residual
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no
             # consequence.
             residual = np.minimum(residual, strength)
-            along = self.interface.axes
-            slowest = np.min(W, axis=along, where=~constant, initial=np.inf, keepdims=True)
-            W = np.where(constant, slowest, W)
+            slowest = np.min(
+                rates, axis=interface.axes, where=~constant, initial=np.inf, keepdims=True
+            )
+            rates = np.where(constant, slowest, rates)
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
                 " of the nodes. Reverse slip is not modelled, so these nodes are held"
             )
-        shape = self.interface.shape
-        load_profile = np.array(np.broadcast_to(self.load_profile, shape), dtype=float)
-        return Sample(strength, residual, W, initial, load_profile, pressure, self)
+        load_profile = np.array(
+            np.broadcast_to(self.load_profile, interface.shape), dtype=float
+        )
+        return Sample(strength, residual, rates, initial, load_profile, pressure, self)
 
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return messages about values that profiles or random properties would replace.
@@ -692,8 +650,7 @@ class Problem:
         messages, `owner` stands before the names.
         """
         twice = [
-            f"problem.{key}: has no effect beside {owner}.{name}, which replaces it. Leave either"
-            " out"
+            f"problem.{key}: has no effect beside {owner}.{name}. Leave either out"
             for name in names
             for key in REPLACED.get(name, ())
             if (value := attrgetter(key)(self)) is not None and np.any(value)
@@ -703,12 +660,12 @@ class Problem:
                 f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
                 " on where it varies from sample to sample. Got none"
             )
-        glued = self.specimen is not None and self.specimen.pressing == "glued"
-        if glued and self.given_pressure is None and "normal_pressure" not in names:
-            twice.append(
-                "problem.specimen.pressing: 'glued' has no effect without a normal pressure. Give"
-                " load.normal_pressure (Pa) or load.pressing_force (N), or leave it out"
-            )
+        pressed = self.given_pressure is not None or "normal_pressure" in names
+        if "friction_coefficient" in names and not pressed:
+            twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
+        if self.specimen is not None and self.specimen.pressing == "glued" and not pressed:
+            text = "'glued' has no effect without a normal pressure"
+            twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")
         return twice
 
     def _given_sample(self, sample: Sample) -> dict[str, Array]:
@@ -718,74 +675,12 @@ class Problem:
             raise InputError(f"profiles: the sample has {shapes}")
         alike = np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)
         if not alike or sample.problem not in (None, self):
-            raise InputError(
-                "profiles: the sample was made by another problem. Make it with"
-                " problem.sample(strength)"
-            )
+            raise InputError("profiles: the sample was made by another problem. Make it anew")
         given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
         given["strength"] = np.where(np.isinf(sample.strength), 1.0, sample.strength)
         if np.isnan(sample.normal_pressure).all():
             del given["normal_pressure"]
         return given
-
-    def _impossible(
-        self, strength: Array, residual: Array, initial: Array, accept: Collection[str]
-    ) -> list[str]:
-        """Return why profiles with valid values do not fit together."""
-        along, problems = self.interface.axes, []
-        over = (strength <= initial).reshape(len(strength), -1)
-        if "overstress" not in accept and over.any():
-            number = int(over.any(axis=1).argmax())
-            node = int(over[number].argmax())
-            most, least = initial[number].flat[node], strength[number].flat[node]
-            further = int(over.any(axis=1).sum()) - 1
-            problems.append(
-                f"strength: must be above initial_stress everywhere. It is not at"
-                f" {over[number].sum()} of {over.shape[1]} nodes of sample {number}, the first at"
-                f" {self.interface.describe_node(node)}: {least:g} against {most:g} Pa"
-                f"{f', and in {further} more samples' * (further > 0)}; st.Rupture() accepts this"
-            )
-        if (
-            np.max(strength, where=np.isfinite(strength), initial=0.0)
-            > MAX_STRENGTH_RATIO * strength.min()
-        ):
-            middle = np.median(strength, axis=along, keepdims=True)
-            huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
-            if middle.min() <= 0.0:
-                problems.append(
-                    f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
-                    f" {middle.min():g} Pa: check its sign"
-                )
-            elif huge.any():
-                number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
-                problems.append(
-                    f"strength: {strength[number].flat[node]:g} Pa at"
-                    f" {self.interface.describe_node(node)} of sample {number} is more than"
-                    f" {MAX_STRENGTH_RATIO:g} times the median, {middle[number].item():g} Pa,"
-                    " which is lost beside it in round-off. Where nothing breaks, a smaller"
-                    " strength does as well"
-                )
-        nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
-        if nowhere.any():
-            number = int(np.argmax(nowhere))
-            known = strength[number][np.isfinite(strength[number])]
-            problems.append(
-                "strength: must be finite and above residual_strength at one node or more. In"
-                f" sample {number} strength is {known.min():g} to {known.max():g} Pa and"
-                " residual_strength"
-                f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
-            )
-        return problems
-
-    def _rates_of(self, strength: Array, residual: Array, scale: str, value: Array) -> Array:
-        """Return weakening rates, Pa/m, from the given scale of slip."""
-        W = self.friction.weakening_rate_of(strength - residual, scale, value)
-        barriers = np.isinf(strength)
-        if barriers.any() and scale != "weakening_rate":  # any rate will do: nothing weakens
-            along = self.interface.axes
-            fastest = np.where(barriers, 0.0, W).max(axis=along, keepdims=True)
-            W = np.where(barriers, fastest, W)
-        return W
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

@@ -1,26 +1,18 @@
-"""The profiles of samples, and their construction from given arrays."""
+"""The profiles of samples, and the conditions that they meet together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, unknown_name
-from stiction.base.model import as_numbers
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import PROFILES, QUANTITIES
-from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import is_coefficient
-from stiction.problem.profiles.placing import turned
 
-LARGEST = 1e100
-"""Of a profile, in SI units; sums and products of larger numbers overflow."""
-FRICTION = (1e-3, 10.0), (1e-4, 100.0)
-"""Mean strength over normal pressure, from superlubricity to adhesive gels."""
+MAX_STRENGTH_RATIO = 1e8
+"""Strength of a node over the median beyond which others are lost in round-off."""
 BARRIER = 10.0
 """A node is a barrier where tau_p - tau_r is above so many times its lower quartile, by rank, of
 nodes that weaken."""
@@ -135,88 +127,50 @@ class Sample(Result, _Profiles):
         return self.mean(self.initial_stress) + load * self.mean(self.load_profile)
 
 
-def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
-    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
+def contradictions_of(
+    interface: Interface, strength: Array, residual: Array, initial: Array, overstress: bool
+) -> list[str]:
+    """Return why profiles (samples, *shape), Pa, with valid values do not fit together.
 
-    A single profile (*shape) counts as one sample. If `samples` is given, a number, a
-    profile, or one number per sample with shape (samples, 1) is broadcast to
-    (samples, *shape).
+    With `overstress`, the initial stress may exceed the strength.
     """
-    shape, array = interface.shape, as_numbers(value)
-    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
-    if samples is None:
-        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
-    else:
-        valid += f", ({samples}, 1) or a number"
-        column = (samples, *(1 for _ in shape))
-        array = array.reshape(column) if array.shape == (samples, 1) else array
-        fits = array.shape in ((), shape, column, (samples, *shape))
-    if not fits:
-        hint = turned(array.shape[-2:], shape)
-        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    check_values(name, array, interface)
-    if samples is None:
-        return array.reshape(-1, *shape)
-    return np.broadcast_to(array, (samples, *shape))
-
-
-def check_values(name: str, array: Array, interface: Interface) -> None:
-    """Raise an `InputError` if a value is impossible for the profile with this name.
-
-    `array` is a number, a profile or rows of profiles.
-    """
-    least, greatest = array.min(), array.max()
-    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
-        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
-        given = f"{array[entry]:g} (at most {LARGEST:g})"
-        if name == "strength" and array[entry] == np.inf:
-            given += ". Give interface.extent, beyond which nothing breaks, instead"
-        raise InputError(f"must be finite. Entry {entry} is {given}")
-    given = f"{least:g} {QUANTITIES[name].units}"
-    if name in SCALES and least <= 0.0:
-        raise InputError(f"must be positive, got {given}")
-    if name == "residual_strength" and least < 0.0:
-        raise InputError(f"must not be negative, got {given}")
-    if name == "normal_pressure":
-        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
-        if means.min() <= 0.0:
-            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
-            raise InputError(f"must be positive on average, but {worst}")
-
-
-def no_coefficients(values: Array, pressure: Array) -> list[str]:
-    """Return why values cannot be friction coefficients here."""
-    if np.isnan(pressure).all():
-        return [
-            "friction_coefficient: needs a normal pressure (load.normal_pressure, Pa, or"
-            " load.pressing_force, N)"
-        ]
-    mean = float(np.mean(values))
-    large = (
-        f"friction_coefficient: its mean is {mean:.3g}; if that is a strength, state its unit,"
-    )
-    return [f"{large} as .assign_attrs(units='Pa') does"] * (mean >= FRICTION[1][1])
-
-
-def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name, from a mapping, a dataset or the strength alone.
-
-    The strength may consist of friction coefficients. Their name or their unit shows
-    this.
-    """
-    if hasattr(given, "marginal") or hasattr(given, "members"):
-        raise InputError(
-            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
-            " or call st.monte_carlo"
+    along, problems = interface.axes, []
+    over = (strength <= initial).reshape(len(strength), -1)
+    if not overstress and over.any():
+        number = int(over.any(axis=1).argmax())
+        node = int(over[number].argmax())
+        most, least = initial[number].flat[node], strength[number].flat[node]
+        further = int(over.any(axis=1).sum()) - 1
+        problems.append(
+            f"strength: must be above initial_stress. It is not at {over[number].sum()} nodes of"
+            f" sample {number}, such as {interface.describe_node(node)}: {least:g} and {most:g} Pa"
+            f"{f', and in {further} more samples' * (further > 0)}. st.Rupture() accepts this"
         )
-    if not isinstance(given, Mapping):  # a Dataset is one too
-        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
-    known = (*PROFILES, "friction_coefficient")
-    unknown = [
-        unknown_name("profiles", str(name), known) for name in given if name not in known
-    ]
-    if "strength" in given and "friction_coefficient" in given:
-        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
-    if unknown and not hasattr(given, "data_vars"):
-        raise InputError(unknown)
-    return {name: given[name] for name in given if name in known}
+    if (
+        np.max(strength, where=np.isfinite(strength), initial=0.0)
+        > MAX_STRENGTH_RATIO * strength.min()
+    ):
+        middle = np.median(strength, axis=along, keepdims=True)
+        huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
+        if middle.min() <= 0.0:
+            problems.append(
+                f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
+                f" {middle.min():g} Pa: check its sign"
+            )
+        elif huge.any():
+            number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
+            problems.append(
+                f"strength: {strength[number].flat[node]:g} Pa at {interface.describe_node(node)}"
+                f" of sample {number} is more than {MAX_STRENGTH_RATIO:g} times the median,"
+                f" {middle[number].item():g} Pa. Where nothing breaks, give a smaller strength"
+            )
+    nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
+    if nowhere.any():
+        number = int(np.argmax(nowhere))
+        known = strength[number][np.isfinite(strength[number])]
+        problems.append(
+            "strength: must be above residual_strength at one node or more. In sample"
+            f" {number} strength is {known.min():g} to {known.max():g} Pa, and residual_strength is"
+            f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
+        )
+    return problems

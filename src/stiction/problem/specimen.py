@@ -140,8 +140,7 @@ class Blocks:
                 )
         if self.thickness is None and (drive.mass or 0.0 < drive.stiffness < math.inf):
             problems.append(
-                "thickness: is needed with drive.stiffness in N/m, but for 0 and inf, and with"
-                " drive.mass in kg"
+                "thickness: is needed with drive.mass, and unless drive.stiffness is 0 or inf"
             )
         if problems:
             raise InputError(problems)

@@ -1,7 +1,7 @@
 """Statistics of samples: densities, quantiles, agreement with tests.
 
-`densities` smooths a sample within its bounds. `estimates` computes means, standard
-deviations and quantiles with errors. `moments` computes the exact moments of the
+`estimates` computes means, standard deviations, quantiles and densities with errors.
+`moments` computes the exact moments of the
 nucleation stress, which are public in `stiction.theory`. `agreement` is imported
 from `stiction.inference`. Each function is imported on first use.
 """
@@ -12,7 +12,7 @@ from typing import Any
 
 _HOMES = {
     "agreement": "stiction.inference.agreement",
-    "density": "stiction.statistics.densities",
+    "density": "stiction.statistics.estimates",
     "quantiles": "stiction.statistics.estimates",
 }
 

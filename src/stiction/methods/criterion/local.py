@@ -24,8 +24,9 @@ from stiction.methods.criterion.onset_bracket import rms_difference
 from stiction.methods.criterion.windows import windows_of
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
+from stiction.problem.profiles.reading import named_profiles
 from stiction.problem.results import onset_variables, position
-from stiction.problem.sample import Sample, named_profiles
+from stiction.problem.sample import Sample
 
 MAX_RMS_DIFFERENCE = 0.01
 """Relative difference from the exact onset (rms) above which samples are solved by both methods."""
@@ -327,11 +328,9 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
     result = np.clip(result, low, high)
-    return (
-        result[0]
-        if np.ndim(named_profiles(tau_p)["strength"]) == len(interface.shape)
-        else result
-    )
+    named = tau_p._asdict() if isinstance(tau_p, Sample) else named_profiles(tau_p)
+    given: Any = named.get("strength", named.get("friction_coefficient"))
+    return result[0] if np.ndim(given) == len(interface.shape) else result
 
 
 def check_law(problem: Problem) -> None:

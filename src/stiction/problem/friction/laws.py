@@ -300,8 +300,7 @@ class PiecewiseWeakening(FrictionLaw):
         if np.any(np.diff(strength) >= 0.0) or strength[-1] != 0.0:
             raise InputError(
                 "strength: must fall at every corner, from below 1 to exactly 0, got"
-                f" {self.strength}. Give a plateau a small fall, such as 0.5, 0.4999, and begin"
-                " at the top of a hump, with tau_p there"
+                f" {self.strength}. Give a plateau a small fall, and begin at the top of a hump"
             )
         return self
 
@@ -412,8 +411,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
         ]
     if not all(hasattr(parameters, name) for name in ("_fields", "f", "initial_slope")):
         return [
-            f"{name}: its parameters must be a NamedTuple with a field initial_slope, -f'(0), and"
-            " a method f(self, u)"
+            f"{name}: its parameters must be a NamedTuple with initial_slope and f(self, u)"
         ]
     if not 0.0 < law.reach < np.inf:
         return [

@@ -6,11 +6,20 @@ Each reader takes these steps:
 2. Compare the size that the file states with a limit, before anything is unpacked.
 3. Let a library read the content. Any failure of the library becomes a line for the user.
 4. Return an array with its names and units.
+
+A table is a text file or a sheet of a workbook. Its lines are split into cells here, and
+`tables.py` reads the numbers in them. For a text above `LARGE` bytes, both read the first
+lines. pandas then reads the other lines if all of them are alike. Otherwise the whole text
+is read line by line.
 """
 
 from __future__ import annotations
 
+import csv
 import io
+import re
+import zipfile
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,10 +31,41 @@ from stiction.base.errors import InputError
 from stiction.base.files import check_unpacked, content_of, refuse_damage
 from stiction.base.netcdf import read_netcdf
 from stiction.base.units import parse
-from stiction.problem.profiles.tables import EXCEL, MAX_CELLS, TEXT, Options, read_table
+from stiction.problem.profiles.tables import (
+    NUMBER,
+    Grid,
+    Options,
+    Row,
+    Table,
+    dataset_of,
+    numbers_of,
+    split_at_blanks,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
+
+TEXT, EXCEL = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz"), ".xlsx"
+LARGE = 2**19
+"""Size of a text, bytes, above which pandas reads all lines but the first."""
+HEAD = 2**16
+"""Bytes at the start of a large text that show its dialect."""
+MAX_UNEVEN_CELLS = 2**19
+"""Cells of a text that pandas cannot read. Each cell takes hundreds of bytes and microseconds."""
+END = 20
+"""Lines at the end of a text that show the separator."""
+MAX_COLUMNS = 2_000
+"""Columns of a table. A file with more columns holds its values in a single line."""
+MAX_LETTERS = 1_000
+"""Letters of a cell or of a comment, because Python converts long numbers slowly."""
+MAX_CELLS, CELLS_OF_SMALL, CELLS_A_BYTE = 2**23, 2**18, 4
+"""Cells of a sheet: in any case, in a small file, and per byte of a larger file. Empty cells take
+memory too."""
+UNPACKED_BYTES, UNPACKED_TIMES = 2**23, 20
+"""Unpacked size of a workbook: bytes of a small one, and multiples of the size of a larger one."""
+ABOUT_BYTES = 2**20
+"""Unpacked size of the parts beside sheets, texts and images, such as styles."""
+SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 NETCDF, IMAGES = (".nc", ".nc4"), (".png", ".tif", ".tiff")
 INSTRUMENTS = (
@@ -51,6 +91,207 @@ def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
             f"must end in {endings}, got {path.name!r}. Export text from the instrument"
         )
     return readers[ending](content_of(path))
+
+
+def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
+    """Read a table of numbers from a text file or a sheet of a workbook.
+
+    Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#``
+    are comments. The last line above the numbers holds the names of the columns, or
+    their units below a line of names. If there is no such line, the last comment may
+    hold the names.
+
+    Columns become variables along 'row', with NaN in empty cells. A column without a
+    name has its number, from 0, as its name. The attributes are `lines` (the line
+    number of each row), `blocks` (the record number of each row), `comments`, and
+    `headed` (whether columns have names). If a column contains no number, its
+    attribute `text` describes the content.
+    """
+    content = content_of(path)
+    if path.suffix.lower() == EXCEL:
+        grid = _sheet(content, options)
+        return dataset_of(grid, numbers_of(grid, options), options)
+    return dataset_of(*_table_of_text(content, options), options)
+
+
+# -- cells of a text -----------------------------------------------------------------------------
+
+
+def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Table]:
+    """Return the cells and the numbers in a text."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        content = _text(content).encode()
+    if len(content) > LARGE:
+        if (large := _large(content, options)) is not None:
+            return large
+        marks = max(map(content.count, (b",", b";", b"\t"))) + content.count(b"\n")
+        cells = max(marks, len(content.split()))
+        if cells > MAX_UNEVEN_CELLS:
+            raise InputError(
+                f"has about {cells} cells in lines of different kinds, at most {MAX_UNEVEN_CELLS}"
+                " can be read. Remove remarks, and give each line the same number of cells"
+            )
+    grid = _lines(_text(content), options)
+    return grid, numbers_of(grid, options)
+
+
+def _text(data: bytes) -> str:
+    """Decode UTF-8, UTF-16 with a byte order mark, or otherwise the western encoding of Windows."""
+    try:
+        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+        text = data.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    if "\0" in text:
+        raise InputError("is not a text file (UTF-8, or UTF-16 with a byte order mark)")
+    return text
+
+
+def _lines(text: str, options: Options) -> Grid:
+    """Return the cells of each line of a text, and the comments above them."""
+    lines: list[tuple[int, str]] = []
+    comments: list[str] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if number <= options.skip:
+            continue
+        if line.lstrip().startswith("#"):
+            if not lines:
+                comments.append(line.strip().lstrip("#").strip()[:MAX_LETTERS])
+        elif line.strip():
+            lines.append((number, line))
+    if lines and lines[0][1].strip().startswith("sep="):  # Excel writes and reads such a line
+        lines = lines[1:]
+    separator = _separator([line for _, line in lines])
+    for number, line in lines:
+        if len(line) > MAX_LETTERS:
+            _check_line(number, line, separator)
+    if separator == " ":
+        rows = [Row(number, split_at_blanks(line, options.words)) for number, line in lines]
+        return Grid(rows, comments, separator)
+    split = csv.reader([line for _, line in lines], delimiter=separator)
+    try:
+        pairs = [*zip(lines, split, strict=True)]
+    except (ValueError, csv.Error):
+        raise InputError("has a quotation mark that does not end in its line") from None
+    rows = [Row(number, [cell.strip() for cell in cells]) for (number, _), cells in pairs]
+    return Grid(rows, comments, separator)
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """Return the separator that most of the last lines with numbers contain."""
+    ends = [line for line in lines[-2 * END :] if re.search(r"\d", line)][-END:]
+    for mark in (";", "\t"):
+        if ends and 2 * sum(mark in line for line in ends) >= len(ends):
+            return mark
+    last = ends[-1] if ends else ""
+    # Blanks separate numbers with decimal commas, '0,1 1000,5', but commas '0.1,
+    # 1000.5'.
+    between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
+    return " " if "," not in last or between else ","
+
+
+def _check_line(number: int, line: str, separator: str) -> None:
+    """Refuse a line with too many columns or with a long cell."""
+    cells = line.rstrip(separator).split(None if separator == " " else separator)
+    if len(cells) > MAX_COLUMNS:
+        raise InputError(
+            f"line {number} has {len(cells)} columns, at most {MAX_COLUMNS} can be read. Write"
+            " each value of a profile into a line of its own"
+        )
+    if (letters := max(map(len, cells), default=0)) > MAX_LETTERS:
+        raise InputError(
+            f"line {number} has a cell of {letters} characters. At most {MAX_LETTERS} can be read"
+        )
+
+
+def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
+    """Return a large table if all its lines are alike, and None for any other text."""
+    import pandas as pd
+
+    end = content.find(b"\n", HEAD) + 1
+    if end == 0:
+        return None
+    with suppress(InputError, UnicodeDecodeError, ValueError):
+        grid = _lines(_text(content[:end]), options)
+        table = numbers_of(grid, options)
+        body, width = content[end:].rstrip(), len(table.columns)
+        lines, cells = body.count(b"\n") + 1, len(grid.rows[-1].cells)
+        blank = grid.separator == " "
+        even = blank or body.count(grid.separator.encode()) == lines * (cells - 1)
+        whole_numbers = b"." not in body and (grid.separator == "," or b"," not in body)
+        if b"#" in body or not (even and (table.mark or whole_numbers)):
+            return None
+        numeric = [column for column in range(width) if column not in table.texts]
+        words = [w for word in options.words for w in (word, word.upper(), word.title())]
+        # From pandas 3 on, numbers are always read to the last digit.
+        exact: Any = {"float_precision": "round_trip"} if pd.__version__ < "3" else {}
+        frame = pd.read_csv(
+            io.BytesIO(body), sep=r"\s+" if blank else grid.separator, header=None,
+            names=range(cells), index_col=False, decimal=table.mark or ".",
+            keep_default_na=False, na_values=words, skip_blank_lines=False, encoding="utf-8",
+            **exact,
+        )  # fmt: skip
+        frame = frame[numeric]  # with `usecols` pandas would drop further cells in silence
+        whole = all(kind.kind in "fiu" for kind in frame.dtypes) and len(frame) == lines
+        if whole and not (blank and frame.isna().to_numpy().any()):
+            columns = frame.reindex(columns=range(width)).to_numpy(np.float64).T
+            return grid, table._replace(
+                columns=np.hstack([table.columns, columns]),
+                lines=np.r_[table.lines, table.lines[-1] + 1 + np.arange(lines)],
+            )
+    return None
+
+
+# -- cells of a workbook -------------------------------------------------------------------------
+
+
+def _sheet(content: bytes, options: Options) -> Grid:
+    """Return the cells in a sheet of a workbook as strings."""
+    try:
+        import openpyxl
+    except ImportError:
+        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
+    with refuse_damage("a workbook"):
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            sizes = {part.filename: part.file_size for part in archive.infolist()}
+        check_unpacked(sum(sizes.values()), content, UNPACKED_BYTES, UNPACKED_TIMES)
+        about = [size for name, size in sizes.items() if not name.startswith(SHEETS + PICTURES)]
+        check_unpacked(sum(about), b"", ABOUT_BYTES, 0)
+        book = openpyxl.load_workbook(
+            io.BytesIO(content), read_only=True, data_only=True, keep_links=False
+        )
+        sheets = {sheet.title: sheet for sheet in book.worksheets}
+        listed = ", ".join(map(repr, sheets))
+        chosen = dict(enumerate(sheets.values())) | sheets
+        if options.sheet not in chosen:
+            raise InputError(f"sheet: {options.sheet!r} is not one of {listed}")
+        rows = _cells_of(chosen[options.sheet], len(content))
+    if len(sheets) > 1 and not any(any(map(NUMBER.match, row.cells)) for row in rows):
+        raise InputError(
+            f"sheet {chosen[options.sheet].title!r} holds no numbers. Choose another sheet with"
+            f" sheet=: {listed}"
+        )
+    return Grid(rows[options.skip :], [], "")
+
+
+def _cells_of(sheet: Any, size: int) -> list[Row]:
+    """Return the cells of a sheet as strings. `size` is the size of the file in bytes."""
+    most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
+    sheet.reset_dimensions()  # the stated size of a sheet need not be true
+    rows, width = [], 0
+    for number, values in enumerate(sheet.iter_rows(values_only=True, max_row=2**20), 1):
+        cells = ["" if value is None else str(value).strip() for value in values]
+        width = max(width, len(cells))
+        if width * number > most or width > MAX_COLUMNS:
+            raise InputError(
+                f"has {number} or more rows and {width} or more columns. A file of its size may"
+                f" have {most} cells, and {MAX_COLUMNS} columns"
+            )
+        rows.append(Row(number, cells))
+    return [Row(row.number, row.cells + [""] * (width - len(row.cells))) for row in rows]
+
+
+# -- arrays, images and surfaces -----------------------------------------------------------------
 
 
 def _read_npy(content: bytes) -> Array:
@@ -94,8 +335,7 @@ def _read_instrument(content: bytes) -> xr.DataArray:
         from SurfaceTopography import read_topography
     except ImportError:
         raise InputError(
-            "needs SurfaceTopography (pip install 'stiction[instruments]'), or export text from the"
-            " instrument"
+            "needs SurfaceTopography (pip install 'stiction[instruments]'), or export text"
         ) from None
     with refuse_damage("a file that SurfaceTopography can read, or is damaged"):
         surface = read_topography(io.BytesIO(content))

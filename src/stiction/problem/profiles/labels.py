@@ -100,8 +100,7 @@ def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
         if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
             raise InputError(
                 f"is given in {given}, but the source states {stated}. Leave the unit out, or"
-                " correct"
-                " the source"
+                " correct the source"
             )
     return values * factor
 
@@ -180,8 +179,7 @@ def _positions(index: Any, what: str) -> dict[str, Array]:
     if index.dtype.kind != "f" or not np.all(np.isfinite(index)):
         raise InputError(
             f"has labels that are not positions in m: the {what} holds {index.dtype} such as"
-            f" {index[0]!r}. Give positions as floats, or take values in their order by"
-            " .to_numpy()"
+            f" {index[0]!r}. Give positions as floats, or only values by .to_numpy()"
         )
     return {"x": index.to_numpy()}
 
@@ -482,8 +480,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
         raise InputError(
             f"which dimensions run along the interface is not clear from ({', '.join(names)}). Call"
-            " the dimension 'x', on a plane 'x' (the direction of load and slip) and 'y', and the"
-            f" dimension of samples 'sample'{OF_A_PLANE * (len(dims) == 1)}"
+            f" them 'x', 'y' (across slip) and 'sample'{OF_A_PLANE * (len(dims) == 1)}"
         )
     array = array.drop_vars([name for name in array.coords if name not in (MEASURED, *dims)])
     return array.transpose(*samples, *along)
@@ -506,8 +503,7 @@ def check_positive(values: Array, quantity: str, lines: Any = (), raw: Any = Non
         raise InputError(
             f"{quantity} must be positive, is {number} in {_place(entry, lines, given.size)}"
             f" ({wrong.size} such values). If it means that a value is missing, pass"
-            f" missing={number} to"
-            " st.read_profile, or make it NaN"
+            f" missing={number} to st.read_profile, or make it NaN"
         )
 
 
@@ -522,8 +518,7 @@ def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
             where = _place(int(np.argmax(flat == end)), lines, flat.size)
             warn_user(
                 f"{quantity}: {end:.9g} stands in {where} ({known.size - rest.size} such values),"
-                " far from all others, and often means that a value is missing. Pass"
-                f" missing={end:.9g} to st.read_profile, or missing=() if it is a value",
+                f" far from all others. Pass missing={end:.9g}, or missing=() if it is a value",
                 AccuracyWarning,
             )
 

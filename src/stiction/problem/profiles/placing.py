@@ -71,10 +71,7 @@ def place(
         if shape != interface.shape:
             hint = turned(shape, interface.shape)
             if not interface.is_plane:
-                hint = (
-                    ". Give a value for each node, or name the column of x (x=...), with"
-                    " interpolate=True if points do not lie on the nodes"
-                )
+                hint = ". Give a value for each node, or positions (x=...)"
             raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
         return close_gaps(values, measured, interface, gaps)
     if values.size == 0:
@@ -92,9 +89,9 @@ def place(
         flat, at = steps[0], places["x"]
         if finer == 1 and not 0 <= flat.min() <= flat.max() < interface.size:
             raise InputError(
-                f"x extends from {at.min():g} to {at.max():g} m, beyond the nodes of a specimen"
-                f" of {interface.measure:g} m. Crop the record, shift it (offset=-0.01 or"
-                " offset='centre'), or pass interpolate=True"
+                f"x extends from {at.min():g} to {at.max():g} m, beyond a specimen of"
+                f" {interface.measure:g} m. Crop the record, pass offset='centre' or"
+                " interpolate=True"
             )
     else:
         flat = np.ravel_multi_index(steps, shape, mode="wrap")
@@ -141,8 +138,7 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
         period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
-            f"{dim} extends from {x.min():g} to {x.max():g} m, but the interface is {length:g} m"
-            " long."
+            f"{dim} extends from {x.min():g} to {x.max():g} m on an interface of {length:g} m."
             f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
         )
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
@@ -162,9 +158,8 @@ def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> floa
     offset = float(first + deviation.mean())
     if abs(offset) > TOLERANCE:
         warn_accuracy(
-            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}. The"
-            f" values are used at the nodes. Add {offset * spacing:+.4g} m to positions in the"
-            " result"
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}, where"
+            f" values are used. Add {offset * spacing:+.4g} m to positions in the result"
         )
     return offset
 
@@ -240,9 +235,8 @@ def close_gaps(
     )
     if gaps == "refuse":
         raise InputError(
-            f"{text}. Give them, make interface.length the length of the record, or pass"
-            " gaps='fill' to st.onset or st.read_profile, which interpolates."
-            " RandomField.given(profile) draws equally likely values there instead"
+            f"{text}. Make interface.length the length of the record, or pass gaps='fill', which"
+            " interpolates. RandomField.given(profile) draws equally likely values there instead"
         )
     if gaps == "fill":
         if holes.all(axis=interface.axes).any():
@@ -307,9 +301,8 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
             for dim, at in zip(interface.dims, places[int(np.argmax(in_gap))], strict=True)
         )
         warn_accuracy(
-            f"the critical patch at {first} reaches into a gap of the profile"
-            f" ({in_gap.sum()} of {in_gap.size} samples): the strength there was"
-            " interpolated, not measured"
+            f"the critical patch at {first} reaches into a gap, where strength was interpolated"
+            f" ({in_gap.sum()} of {in_gap.size} samples)"
         )
     about = {"units": "1", "long_name": "whether the critical patch reaches into a gap"}
     dims = position.dims[: len(position.dims) - (len(interface.dims) > 1)]

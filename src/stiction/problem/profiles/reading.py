@@ -1,7 +1,8 @@
-"""Read measured profiles in SI, and put them on the nodes of an interface.
+"""Read users' profiles in SI, and put them on the nodes of an interface.
 
 A profile enters in three ways: through `read_profile`, as an argument of a call or
-an object (`at_nodes`), or by its name in a study file (`profile_in_file`).
+an object (`at_nodes`), or by its name in a study file (`profile_in_file`). The
+profiles of samples enter together (`placed_profiles`).
 `read_profile`, which study files also use, takes these steps. `at_nodes` takes
 steps 1 and 4:
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -33,20 +35,34 @@ from stiction.base.model import (
     checked,
     real_array,
 )
-from stiction.base.variables import QUANTITIES
+from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.labels import (
     Column,
     check_positive,
+    is_coefficient,
     is_labelled,
     labelled,
     simplified,
 )
-from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE, Gaps, close_gaps, place
+from stiction.problem.profiles.placing import (
+    MEASURED,
+    OF_A_PLANE,
+    Gaps,
+    close_gaps,
+    place,
+    turned,
+)
 from stiction.problem.profiles.tables import Options
 
 if TYPE_CHECKING:
     import xarray as xr
+
+FRICTION = (1e-3, 10.0), (1e-4, 100.0)
+"""Usual and possible mean strengths over normal pressure, from superlubricity to adhesive gels."""
+LARGEST = 1e100
+"""Of a profile, in SI units; sums and products of larger numbers overflow."""
 
 Spacing = Positive | tuple[Positive, Positive]
 Offset = Real | tuple[Real, Real]
@@ -223,10 +239,8 @@ def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
     """Return strengths, Pa, from heights, m. Missing heights give NaN (step 2)."""
     values = as_numbers(strength(heights.copy()))
     if values.shape != heights.shape:
-        raise InputError(
-            f"strength: must return a strength for each height, got shape {values.shape} for"
-            f" {heights.shape}"
-        )
+        shapes = f"got shape {values.shape} for {heights.shape}"
+        raise InputError(f"strength: must return a strength for each height, {shapes}")
     values = np.where(np.isnan(heights), np.nan, values)
     check_positive(values, "strength")
     return values
@@ -258,8 +272,7 @@ def _in_order(array: Any) -> Any:
             twin = index[index.duplicated()]
             raise InputError(
                 f"x repeats: there are two values at {twin[0]} m ({twin.size} such places). Keep"
-                " either, or their mean. If empty lines separate records, pass record=0 for the"
-                f" first{OF_A_PLANE}"
+                f" either. If empty lines separate records, pass record=0 for the first{OF_A_PLANE}"
             )
     array = array.unstack()
     return array.sortby([dim for dim in array.dims if dim in array.coords])
@@ -325,3 +338,119 @@ def quantity_of(key: str) -> str:
     """Return the quantity that the parameter with this name or dotted key holds."""
     field = key.rsplit(".", 1)[-1]
     return "load_profile" if field == "profile" else field
+
+
+# -- profiles of samples -------------------------------------------------------------------------
+
+
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name, from a mapping, a dataset or the strength alone.
+
+    The strength may consist of friction coefficients. Their name or their unit shows
+    this.
+    """
+    if hasattr(given, "marginal") or hasattr(given, "members"):
+        raise InputError(
+            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
+            " or call st.monte_carlo"
+        )
+    if not isinstance(given, Mapping):  # a Dataset is one too
+        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
+    known = (*PROFILES, "friction_coefficient")
+    unknown = [
+        unknown_name("profiles", str(name), known) for name in given if name not in known
+    ]
+    if "strength" in given and "friction_coefficient" in given:
+        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
+    if unknown and not hasattr(given, "data_vars"):
+        raise InputError(unknown)
+    return {name: given[name] for name in given if name in known}
+
+
+def placed_profiles(
+    given: Mapping[str, Any], interface: Interface, gaps: Gaps, pressing: Any
+) -> tuple[dict[str, Array], Any, list[str]]:
+    """Return users' profiles by name as (samples, *shape), a mask, and the mistakes in them.
+
+    The mask marks the nodes at which all profiles were measured. A profile with a mistake is
+    missing in the result. A pressure without values along the interface is a mean, which is
+    multiplied by `pressing`.
+    """
+    first = "strength" if "strength" in given else "friction_coefficient"
+    if first not in given:
+        raise InputError("strength: missing among the profiles")
+    rows: dict[str, Array] = {}
+    masks = [np.ones((1, *interface.shape), dtype=bool)]
+    scales = [name for name in SCALES if name in given]
+    problems = [f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}"] * (
+        len(scales) > 1
+    )
+    samples = None
+    for name in (first, *(name for name in given if name != first)):
+        try:
+            value, known = at_nodes(name, given[name], interface, gaps)
+            with prefixed(name):
+                rows[name] = rows_of(name, value, interface, samples)
+            if name == "normal_pressure" and np.shape(value) in ((), (samples, 1)):
+                rows[name] = rows[name] * pressing
+            if not np.all(known):
+                masks.append(known.reshape(-1, *interface.shape))
+        except InputError as error:
+            problems += error.problems
+        if name == first:
+            samples = len(rows[first]) if first in rows else 1
+    return rows, reduce(np.logical_and, masks), problems
+
+
+def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
+    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
+
+    A single profile (*shape) counts as one sample. If `samples` is given, a number, a
+    profile, or one number per sample with shape (samples, 1) is broadcast to
+    (samples, *shape).
+    """
+    shape, array = interface.shape, as_numbers(value)
+    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
+    if samples is None:
+        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
+    else:
+        valid += f", ({samples}, 1) or a number"
+        column = (samples, *(1 for _ in shape))
+        array = array.reshape(column) if array.shape == (samples, 1) else array
+        fits = array.shape in ((), shape, column, (samples, *shape))
+    if not fits:
+        hint = turned(array.shape[-2:], shape)
+        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
+    check_values(name, array, interface)
+    if samples is None:
+        return array.reshape(-1, *shape)
+    return np.broadcast_to(array, (samples, *shape))
+
+
+def check_values(name: str, array: Array, interface: Interface) -> None:
+    """Raise an `InputError` if a value is impossible for the profile with this name.
+
+    `array` is a number, a profile or rows of profiles.
+    """
+    least, greatest = array.min(), array.max()
+    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
+        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        if name == "strength" and array[entry] == np.inf:
+            given += ". Give interface.extent, beyond which nothing breaks, instead"
+        raise InputError(f"must be finite. Entry {entry} is {given}")
+    given = f"{least:g} {QUANTITIES[name].units}"
+    if name in SCALES and least <= 0.0:
+        raise InputError(f"must be positive, got {given}")
+    if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
+        raise InputError(
+            f"its mean is {array.mean():.3g}; if that is a strength, state its unit, as"
+            " .assign_attrs(units='Pa') does"
+        )
+    if name == "residual_strength" and least < 0.0:
+        raise InputError(f"must not be negative, got {given}")
+    if name == "normal_pressure":
+        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
+        if means.min() <= 0.0:
+            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
+            raise InputError(f"must be positive on average, but {worst}")

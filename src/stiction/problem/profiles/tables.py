@@ -1,66 +1,35 @@
-"""Read tables of numbers that instruments, spreadsheets and colleagues write.
+"""Numbers and headings in the cells of tables that instruments and colleagues write.
 
-A table is a text file or a sheet of a workbook. Its format is unknown: the
-separator, the decimal mark, the end of the headings and the place of the units. A
-wrong guess could change a value by a factor of a thousand, so the reader refuses a
-table that can be read in two ways. The steps are:
+The format of a table is unknown: the decimal mark, the end of the headings and the
+place of the units. A wrong guess could change a value by a factor of a thousand, so
+a table that can be read in two ways is refused. The cells come from `files.py`. The
+steps are:
 
-1. Split lines into cells. The last lines that contain numbers show the separator.
-2. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
+1. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
    lines separate records.
-3. Find the decimal mark, which is the same in the whole file. If points or commas may
+2. Find the decimal mark, which is the same in the whole file. If points or commas may
    also mark thousands, refuse the file unless the caller states `decimal`.
-4. Turn cells into numbers. Empty cells and words for a missing value become NaN.
-5. Split headings into names and units.
-
-For a text above `LARGE` bytes, these steps read the first lines. pandas then reads
-the other lines if all of them are alike. Otherwise the steps read the whole file.
+3. Turn cells into numbers. Empty cells and words for a missing value become NaN.
+4. Split headings into names and units.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
-import zipfile
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.files import check_unpacked, content_of, refuse_damage
 from stiction.base.model import describe
 from stiction.base.units import parse
 
 if TYPE_CHECKING:
     import xarray as xr
-
-TEXT, EXCEL = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz"), ".xlsx"
-LARGE = 2**19
-"""Size of a text, bytes, above which pandas reads all lines but the first."""
-HEAD = 2**16
-"""Bytes at the start of a large text that show its dialect."""
-MAX_UNEVEN_CELLS = 2**19
-"""Cells of a text that pandas cannot read. Each cell takes hundreds of bytes and microseconds."""
-END = 20
-"""Lines at the end of a text that show the separator."""
-MAX_COLUMNS = 2_000
-"""Columns of a table. A file with more columns holds its values in a single line."""
-MAX_LETTERS = 1_000
-"""Letters of a cell or of a comment, because Python converts long numbers slowly."""
-MAX_CELLS, CELLS_OF_SMALL, CELLS_A_BYTE = 2**23, 2**18, 4
-"""Cells of a sheet: in any case, in a small file, and per byte of a larger file. Empty cells take
-memory too."""
-UNPACKED_BYTES, UNPACKED_TIMES = 2**23, 20
-"""Unpacked size of a workbook: bytes of a small one, and multiples of the size of a larger one."""
-ABOUT_BYTES = 2**20
-"""Unpacked size of the parts beside sheets, texts and images, such as styles."""
-SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 _EMPTY = {
     "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
@@ -69,8 +38,8 @@ _EMPTY = {
 """Words for a missing value, in lower case. A row of stars is another."""
 # Patterns never return to letters that they have passed: time grows linearly with
 # the file.
-_WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
-_NUMBER = re.compile(
+WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
+NUMBER = re.compile(
     r"[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
     r"|\d{1,3}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))$"
 )
@@ -131,26 +100,8 @@ class Table(NamedTuple):
     mark: str | None  # the decimal mark, if one was seen
 
 
-def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
-    """Read a table of numbers from a text file or a sheet of a workbook.
-
-    Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#``
-    are comments. The last line above the numbers holds the names of the columns, or
-    their units below a line of names. If there is no such line, the last comment may
-    hold the names.
-
-    Columns become variables along 'row', with NaN in empty cells. A column without a
-    name has its number, from 0, as its name. The attributes are `lines` (the line
-    number of each row), `blocks` (the record number of each row), `comments`, and
-    `headed` (whether columns have names). If a column contains no number, its
-    attribute `text` describes the content.
-    """
-    content = content_of(path)
-    if path.suffix.lower() == EXCEL:
-        grid = _sheet(content, options)
-        table = _parsed(grid, options)
-    else:
-        grid, table = _table_of_text(content, options)
+def dataset_of(grid: Grid, table: Table, options: Options) -> xr.Dataset:
+    """Return the columns of a table as variables along 'row'. See `files.read_table`."""
     columns, lines = table.columns, table.lines
     blocks = np.cumsum(np.diff(lines, prepend=lines[0]) > 1)
     if options.record is not None:
@@ -208,197 +159,19 @@ def _labelled(
     return xr.Dataset(variables, attrs=attributes)
 
 
-# -- step 1: cells of a text ---------------------------------------------------------------------
-
-
-def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Table]:
-    """Return the cells and the numbers in a text."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        content = _text(content).encode()
-    if len(content) > LARGE:
-        if (large := _large(content, options)) is not None:
-            return large
-        marks = max(map(content.count, (b",", b";", b"\t"))) + content.count(b"\n")
-        cells = max(marks, len(content.split()))
-        if cells > MAX_UNEVEN_CELLS:
-            raise InputError(
-                f"has about {cells} cells in lines of different kinds, at most {MAX_UNEVEN_CELLS}"
-                " can be read. Remove comments, blank lines and remarks between and below the"
-                " numbers, and give each line the same number of cells"
-            )
-    grid = _lines(_text(content), options)
-    return grid, _parsed(grid, options)
-
-
-def _text(data: bytes) -> str:
-    """Decode UTF-8, UTF-16 with a byte order mark, or otherwise the western encoding of Windows."""
-    try:
-        wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-        text = data.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("cp1252", errors="replace")
-    if "\0" in text:
-        raise InputError("is not a text file (UTF-8, or UTF-16 with a byte order mark)")
-    return text
-
-
-def _lines(text: str, options: Options) -> Grid:
-    """Return the cells of each line of a text, and the comments above them (step 1)."""
-    lines: list[tuple[int, str]] = []
-    comments: list[str] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        if number <= options.skip:
-            continue
-        if line.lstrip().startswith("#"):
-            if not lines:
-                comments.append(line.strip().lstrip("#").strip()[:MAX_LETTERS])
-        elif line.strip():
-            lines.append((number, line))
-    if lines and lines[0][1].strip().startswith("sep="):  # Excel writes and reads such a line
-        lines = lines[1:]
-    separator = _separator([line for _, line in lines])
-    for number, line in lines:
-        if len(line) > MAX_LETTERS:
-            _check_line(number, line, separator)
-    if separator == " ":
-        rows = [Row(number, _split(line, options.words)) for number, line in lines]
-        return Grid(rows, comments, separator)
-    split = csv.reader([line for _, line in lines], delimiter=separator)
-    try:
-        pairs = [*zip(lines, split, strict=True)]
-    except (ValueError, csv.Error):
-        raise InputError("has a quotation mark that does not end in its line") from None
-    rows = [Row(number, [cell.strip() for cell in cells]) for (number, _), cells in pairs]
-    return Grid(rows, comments, separator)
-
-
-def _separator(lines: Sequence[str]) -> str:
-    """Return the separator that most of the last lines with numbers contain."""
-    ends = [line for line in lines[-2 * END :] if re.search(r"\d", line)][-END:]
-    for mark in (";", "\t"):
-        if ends and 2 * sum(mark in line for line in ends) >= len(ends):
-            return mark
-    last = ends[-1] if ends else ""
-    # Blanks separate numbers with decimal commas, '0,1 1000,5', but commas '0.1,
-    # 1000.5'.
-    between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
-    return " " if "," not in last or between else ","
-
-
-def _check_line(number: int, line: str, separator: str) -> None:
-    """Refuse a line with too many columns or with a long cell."""
-    cells = line.rstrip(separator).split(None if separator == " " else separator)
-    if len(cells) > MAX_COLUMNS:
-        raise InputError(
-            f"line {number} has {len(cells)} columns, at most {MAX_COLUMNS} can be read. Write"
-            " each value of a profile into a line of its own"
-        )
-    if (letters := max(map(len, cells), default=0)) > MAX_LETTERS:
-        raise InputError(
-            f"line {number} has a cell of {letters} characters. At most {MAX_LETTERS} can be read"
-        )
-
-
-def _split(line: str, words: set[str]) -> list[str]:
+def split_at_blanks(line: str, words: set[str]) -> list[str]:
     """Split a line at blanks, but not between a name and its unit in brackets."""
     cells = line.split()
-    if all(_NUMBER.match(cell) or cell.casefold() in words for cell in cells):
+    if all(NUMBER.match(cell) or cell.casefold() in words for cell in cells):
         return cells
-    return [cell.strip() for cell in _WORDS.findall(line)]
+    return [cell.strip() for cell in WORDS.findall(line)]
 
 
-def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
-    """Return a large table if all its lines are alike, and None for any other text."""
-    import pandas as pd
-
-    end = content.find(b"\n", HEAD) + 1
-    if end == 0:
-        return None
-    with suppress(InputError, UnicodeDecodeError, ValueError):
-        grid = _lines(_text(content[:end]), options)
-        table = _parsed(grid, options)
-        body, width = content[end:].rstrip(), len(table.columns)
-        lines, cells = body.count(b"\n") + 1, len(grid.rows[-1].cells)
-        blank = grid.separator == " "
-        even = blank or body.count(grid.separator.encode()) == lines * (cells - 1)
-        whole_numbers = b"." not in body and (grid.separator == "," or b"," not in body)
-        if b"#" in body or not (even and (table.mark or whole_numbers)):
-            return None
-        numeric = [column for column in range(width) if column not in table.texts]
-        words = [w for word in options.words for w in (word, word.upper(), word.title())]
-        # From pandas 3 on, numbers are always read to the last digit.
-        exact: Any = {"float_precision": "round_trip"} if pd.__version__ < "3" else {}
-        frame = pd.read_csv(
-            io.BytesIO(body), sep=r"\s+" if blank else grid.separator, header=None,
-            names=range(cells), index_col=False, decimal=table.mark or ".",
-            keep_default_na=False, na_values=words, skip_blank_lines=False, encoding="utf-8",
-            **exact,
-        )  # fmt: skip
-        frame = frame[numeric]  # with `usecols` pandas would drop further cells in silence
-        whole = all(kind.kind in "fiu" for kind in frame.dtypes) and len(frame) == lines
-        if whole and not (blank and frame.isna().to_numpy().any()):
-            columns = frame.reindex(columns=range(width)).to_numpy(np.float64).T
-            return grid, table._replace(
-                columns=np.hstack([table.columns, columns]),
-                lines=np.r_[table.lines, table.lines[-1] + 1 + np.arange(lines)],
-            )
-    return None
+# -- steps 1 to 3: numbers -----------------------------------------------------------------------
 
 
-# -- step 1: cells of a workbook -----------------------------------------------------------------
-
-
-def _sheet(content: bytes, options: Options) -> Grid:
-    """Return the cells in a sheet of a workbook as strings."""
-    try:
-        import openpyxl
-    except ImportError:
-        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
-    with refuse_damage("a workbook"):
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            sizes = {part.filename: part.file_size for part in archive.infolist()}
-        check_unpacked(sum(sizes.values()), content, UNPACKED_BYTES, UNPACKED_TIMES)
-        about = [size for name, size in sizes.items() if not name.startswith(SHEETS + PICTURES)]
-        check_unpacked(sum(about), b"", ABOUT_BYTES, 0)
-        book = openpyxl.load_workbook(
-            io.BytesIO(content), read_only=True, data_only=True, keep_links=False
-        )
-        sheets = {sheet.title: sheet for sheet in book.worksheets}
-        listed = ", ".join(map(repr, sheets))
-        chosen = dict(enumerate(sheets.values())) | sheets
-        if options.sheet not in chosen:
-            raise InputError(f"sheet: {options.sheet!r} is not one of {listed}")
-        rows = _cells_of(chosen[options.sheet], len(content))
-    if len(sheets) > 1 and not any(any(map(_NUMBER.match, row.cells)) for row in rows):
-        raise InputError(
-            f"sheet {chosen[options.sheet].title!r} holds no numbers. Choose another sheet with"
-            f" sheet=: {listed}"
-        )
-    return Grid(rows[options.skip :], [], "")
-
-
-def _cells_of(sheet: Any, size: int) -> list[Row]:
-    """Return the cells of a sheet as strings. `size` is the size of the file in bytes."""
-    most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
-    sheet.reset_dimensions()  # the stated size of a sheet need not be true
-    rows, width = [], 0
-    for number, values in enumerate(sheet.iter_rows(values_only=True, max_row=2**20), 1):
-        cells = ["" if value is None else str(value).strip() for value in values]
-        width = max(width, len(cells))
-        if width * number > most or width > MAX_COLUMNS:
-            raise InputError(
-                f"has {number} or more rows and {width} or more columns. A file of its size may"
-                f" have {most} cells, and {MAX_COLUMNS} columns"
-            )
-        rows.append(Row(number, cells))
-    return [Row(row.number, row.cells + [""] * (width - len(row.cells))) for row in rows]
-
-
-# -- steps 2 to 4: numbers -----------------------------------------------------------------------
-
-
-def _parsed(grid: Grid, options: Options) -> Table:
-    """Return the numbers of a table (steps 2 to 4)."""
+def numbers_of(grid: Grid, options: Options) -> Table:
+    """Return the numbers of a table (steps 1 to 3)."""
     words, separator = options.words, grid.separator
     rows = [row for row in grid.rows if any(row.cells)]
     start, numeric = _start(rows, words)
@@ -416,7 +189,8 @@ def _parsed(grid: Grid, options: Options) -> Table:
             )
     if not header and grid.comments and not _SIZE.match(grid.comments[-1]):
         comment = grid.comments[-1]
-        cells = comment.split(separator) if separator.strip() else _split(comment, words)
+        at_blanks = split_at_blanks(comment, words)
+        cells = comment.split(separator) if separator.strip() else at_blanks
         cells = [comment] if width == 1 else [cell.strip() for cell in cells]
         header = [Row(0, cells)] if len(cells) == width else []
     header = [_without_empty_end(row, width) for row in header]
@@ -439,18 +213,16 @@ def _parsed(grid: Grid, options: Options) -> Table:
 
 
 def _not_a_number(line: int, cell: str) -> str:
-    return (
-        f"line {line}: {describe(cell)} is not a number; if it stands for no value, pass"
-        f" missing={cell!r}"
-    )
+    advice = f"If it stands for no value, pass missing={cell!r}"
+    return f"line {line}: {describe(cell)} is not a number. {advice}"
 
 
 def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
-    """Return the index of the first row with numbers, and the columns with numbers (step 2)."""
+    """Return the index of the first row with numbers, and the columns with numbers (step 1)."""
 
     def is_value(cell: str, or_empty: bool = False) -> bool:
         value = _number(cell, words, None)
-        return bool(_NUMBER.match(cell)) or (value is not None and (or_empty or value == value))
+        return bool(NUMBER.match(cell)) or (value is not None and (or_empty or value == value))
 
     last = next((row for row in reversed(rows) if any(map(is_value, row.cells))), None)
     if last is None:
@@ -496,29 +268,26 @@ def _decimal_mark(
     separator: str,
     stated: str | None,
 ) -> str | None:
-    """Return the decimal mark of a file, or None if its numbers have no mark (step 3).
+    """Return the decimal mark of a file, or None if its numbers have no mark (step 2).
 
     The number 1.020 means 1.02 in some countries and 1020 in others. Such a file is
     refused unless the caller or a different cell decides.
     """
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
     decimal: set[str] = set()  # marks that stand where a mark of thousands cannot stand
-    for column in numeric:
-        for row, cell in enumerate(columns[column]):
-            for mark in ".,":
-                if mark in cell and mark not in decimal and _NUMBER.match(cell):
-                    if is_decimal := not _THOUSANDS[mark].match(cell):
-                        decimal.add(mark)
-                    if is_decimal or mark not in example:
-                        example[mark] = f"line {rows[row].number} has {cell!r}"
-        if len(decimal) == 2:
-            break
+    cells = [(row.number, row.cells[column]) for row in rows for column in numeric]
+    for mark in ".,":
+        for number, cell in cells:
+            if mark in cell and NUMBER.match(cell):
+                example.setdefault(mark, f"line {number} has {cell!r}")
+                if not _THOUSANDS[mark].match(cell):
+                    decimal.add(mark)
+                    example[mark] = f"line {number} has {cell!r}"
+                    break
     if stated is not None:
         if (thousands := _OTHER[stated]) in decimal:
-            raise InputError(
-                f"{example[thousands]}, in which {thousands!r} does not mark thousands. Pass"
-                f" decimal={thousands!r}"
-            )
+            text = f"{thousands!r} does not mark thousands. Pass decimal={thousands!r}"
+            raise InputError(f"{example[thousands]}, in which {text}")
         return stated
     if len(example) == 2:
         raise InputError(
@@ -534,14 +303,14 @@ def _decimal_mark(
     for mark in {*example} - decimal:
         if mark == "," or separator in (";", "\t") or whole:
             raise InputError(
-                f"{example[mark]}, which may be a number with three decimals or a number that is a"
-                f" thousand times as large. Pass decimal={mark!r} or decimal={_OTHER[mark]!r}"
+                f"{example[mark]}, which may have three decimals or be a thousand times as large."
+                f" Pass decimal={mark!r} or decimal={_OTHER[mark]!r}"
             )
     return next(iter(example), None)
 
 
 def _numbers(cells: Sequence[str], words: set[str], mark: str | None) -> list[float | None]:
-    """Return the numbers in a column (step 4)."""
+    """Return the numbers in a column (step 3)."""
     if mark != "," and not any("_" in cell for cell in cells):
         with suppress(ValueError):
             return list(map(float, cells))
@@ -552,8 +321,6 @@ def _number(cell: str, words: set[str], mark: str | None) -> float | None:
     """Return the number in a cell, NaN for a missing value, None for any other text."""
     if cell.casefold() in words or not cell.strip("*"):
         return math.nan
-    if not cell[-1:].isdigit() and cell[-1:] not in ".,fFyY":  # inf, infinity
-        return None
     cell = _GROUPS.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), cell)
     cell = cell.replace("\N{MINUS SIGN}", "-")
     if mark is not None:
@@ -568,11 +335,11 @@ def _number(cell: str, words: set[str], mark: str | None) -> float | None:
         return None
 
 
-# -- step 5: headings ----------------------------------------------------------------------------
+# -- step 4: headings ----------------------------------------------------------------------------
 
 
 def _headings(header: list[Row], width: int) -> list[tuple[str, dict[str, str]]]:
-    """Return the name, the heading and the unit of each column (step 5)."""
+    """Return the name, the heading and the unit of each column (step 4)."""
     header = [row for row in header if not {*row.cells} <= {"", "-"}]
     if not header:
         return [(str(number), {"heading": ""}) for number in range(width)]
@@ -601,9 +368,8 @@ def _are_units(cells: Iterable[str]) -> bool:
     """Return whether a row states units: each of its cells is a unit or empty."""
     bare = [cell.strip("()[]{} ") for cell in cells]
     known = [cell for cell in bare if parse(cell)]
-    return len(known) == len([cell for cell in bare if cell]) and any(
-        cell not in ("1", "-", "%") for cell in known
-    )
+    clear = any(cell not in ("1", "-", "%") for cell in known)
+    return clear and len(known) == len([cell for cell in bare if cell])
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
