@@ -238,9 +238,9 @@ class Problem:
             and self.specimen is None
         ):
             warn_accuracy(
-                f"the interface is {length / patch:.2g} nucleation lengths long and periodic. Free"
-                f" ends would lower its onset by about {min(3.0, 5.0 * patch / length):.1g} % on"
-                " average and by up to 17 % in single cases, under a uniform antiplane load"
+                f"the interface is {length / patch:.2g} nucleation lengths long and continues"
+                " periodically. Under an antiplane load, free ends would lower its onset by about"
+                f" {min(3.0, 5.0 * patch / length):.1g} % on average and up to 17 % in single cases"
             )
 
     def doubt(self, sample: Sample) -> None:
@@ -568,7 +568,7 @@ class Problem:
                     f"strength is not above residual_strength at {percent} of the nodes. These do"
                     " not weaken: their strength is constant"
                 )
-        self._check_resolution(sample.steepest_rate)
+        self._check_resolution(sample.steepest_weakening_rate)
         return sample, measured
 
     def constants(self, strength: Any) -> dict[str, Any]:
@@ -619,20 +619,20 @@ class Problem:
         overstress = "overstress" in accept
         if problems := contradictions_of(interface, strength, residual, initial, overstress):
             raise InputError(problems)
-        rates = self.friction.rate(strength - residual, scale, value)
+        W = self.friction.weakening_rate_of(strength - residual, scale, value)
         if interface.is_held and scale != "weakening_rate":
             # Barriers never weaken. Any finite rate will do, and here it is the fastest.
-            fastest = np.where(barriers, 0.0, rates).max(interface.axes, keepdims=True)
-            rates = np.where(barriers, fastest, rates)
+            fastest = np.where(barriers, 0.0, W).max(interface.axes, keepdims=True)
+            W = np.where(barriers, fastest, W)
         constant = strength <= residual
         if constant.any():
             # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no
             # consequence.
             residual = np.minimum(residual, strength)
             slowest = np.min(
-                rates, axis=interface.axes, where=~constant, initial=np.inf, keepdims=True
+                W, axis=interface.axes, where=~constant, initial=np.inf, keepdims=True
             )
-            rates = np.where(constant, slowest, rates)
+            W = np.where(constant, slowest, W)
         if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
             warn_accuracy(
                 f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
@@ -641,7 +641,7 @@ class Problem:
         load_profile = np.array(
             np.broadcast_to(self.load_profile, interface.shape), dtype=float
         )
-        return Sample(strength, residual, rates, initial, load_profile, pressure, self)
+        return Sample(strength, residual, W, initial, load_profile, pressure, self)
 
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return messages about values that profiles or random properties would replace.

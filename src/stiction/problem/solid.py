@@ -79,8 +79,8 @@ class Solid:
         speed = self.shear_wave_speed
         dense, (slowest, fastest) = self.density > SOFT_DENSITY, POSSIBLE_SPEED
         text = (
-            f"solid: the shear wave speed is {speed:.4g} m/s, which no solid"
-            f"{' of such a density' * dense} has. Check the units of shear_modulus ="
+            f"solid: the shear wave speed is {speed:.4g} m/s, which no solid has"
+            f"{' at such a density' * dense}. Check the units of shear_modulus ="
             f" {self.shear_modulus:g} Pa and density = {self.density:g} kg/m3"
         )
         usual = (SLOWEST_STIFF if dense else slowest), fastest
