@@ -517,8 +517,8 @@ def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
         if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
             where = _place(int(np.argmax(flat == end)), lines, flat.size)
             warn_user(
-                f"{quantity}: {end:.9g} stands in {where} ({known.size - rest.size} such values). It"
-                f" often means that a value is missing. Pass missing={end:.9g} if so, or missing=()",
+                f"{quantity}: {end:.9g} stands in {where} ({known.size - rest.size} such values),"
+                f" and often means that a value is missing. Pass missing={end:.9g}, or missing=() if not",
                 AccuracyWarning,
             )
 
