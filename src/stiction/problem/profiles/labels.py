@@ -518,7 +518,7 @@ def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
             where = _place(int(np.argmax(flat == end)), lines, flat.size)
             warn_user(
                 f"{quantity}: {end:.9g} stands in {where} ({known.size - rest.size} such values),"
-                f" and often means that a value is missing. Pass missing={end:.9g}, or missing=() if not",
+                f" and often means that a value is missing. Pass missing={end:.9g}, or missing=()",
                 AccuracyWarning,
             )
 
