@@ -255,8 +255,7 @@ def _result(future: Future[Table], span: Span) -> Table:
         if "pickle" in str(error):  # a PicklingError, AttributeError or TypeError
             raise InputError(
                 f"executor: its processes cannot be sent a part of the study: {error}. Define"
-                " functions with def at the top of a module, not as a lambda or inside a"
-                " function, or leave out the executor, for threads"
+                " functions with def at the top of a module, or leave out the executor"
             ) from error
         last = span.first + span.samples - 1
         raise WorkerError(

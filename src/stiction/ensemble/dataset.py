@@ -119,6 +119,11 @@ class Gathered:
                 self._arrays[name][where] = values
 
     @property
+    def onsets(self) -> NDArray[Any]:
+        """Critical stress, Pa, with shape (points, samples). NaN without a value."""
+        return self._arrays.get("critical_stress", np.full(self.done.shape, np.nan))
+
+    @property
     def failed(self) -> list[Failure]:
         """Missing samples that failed, in the order of points and samples."""
         return [self._failures[at] for at in sorted(self._failures) if not self.done[at]]

@@ -89,10 +89,14 @@ class Experiment:
         return dataclasses.replace(self, method=method)
 
     def with_seed(self, seed: int) -> Experiment:
-        """Return the same experiment with a different seed. Checks are not repeated."""
-        copied = copy.copy(self)
-        object.__setattr__(copied, "seed", seed)
-        return copied
+        """Return the same experiment with a different seed."""
+        return self._unchecked(seed=seed)
+
+    def _unchecked(self, **changes: Any) -> Experiment:
+        """Return the same experiment with changes, for which checks are not repeated."""
+        changed = copy.copy(self)
+        vars(changed).update(changes)
+        return changed
 
     @property
     def given(self) -> Any:
@@ -126,9 +130,8 @@ class Experiment:
     @property
     def pressure(self) -> float:
         """Mean normal pressure, Pa, or NaN without a pressure."""
-        members = self.random.members
         if "normal_pressure" in self.random.names:
-            return float(np.mean([one.properties["normal_pressure"].mean for one in members]))
+            return self._mean("normal_pressure")
         given = self.problem.given_pressure
         if given is None:
             return float("nan")
@@ -137,9 +140,12 @@ class Experiment:
     @property
     def mean_strength(self) -> float:
         """Mean strength, Pa."""
+        return self._mean("strength")
+
+    def _mean(self, name: str) -> float:
         members = self.random.members
         return float(
-            np.mean([mean_in_stress(self.problem, one, "strength") for one in members])
+            np.mean([mean_in_stress(self.problem, member, name) for member in members])
         )
 
     def check_fields(self) -> None:
@@ -150,8 +156,7 @@ class Experiment:
                 if not field.modes(self.problem.interface).ranks.size:
                     warn_user(
                         f"{name}: its correlation length is so long that each sample is uniform."
-                        " Check its unit, and give scatter between specimens as between= of"
-                        " st.RandomInterface",
+                        " Check its unit. Scatter between specimens is between= of RandomInterface",
                         UnitWarning,
                     )
             check_residual(self.problem, member)
@@ -195,9 +200,8 @@ class Experiment:
         parts, order = [], []
         for number in np.unique(variant).tolist():
             rows = np.flatnonzero(variant == number)
-            experiment = copy.copy(self)
             problem = with_values(self.problem, constants[number], "problem")
-            object.__setattr__(experiment, "problem", problem)
+            experiment = self._unchecked(problem=problem)
             profiles = experiment.profiles(draws[rows])
             parts.append((profiles, experiment.onset(profiles)))
             order.append(rows)

@@ -145,7 +145,7 @@ def gather(
     comparison = store.pilot if store else None
     if comparison is None and pilot:
         show = progress is True
-        comparison = compare(points, ensemble.first, ensemble.samples, show, workers)
+        comparison = compare(points, rows.onsets, ensemble.first, show, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
         if text := pilot_doubt(points[0], comparison, where):
             warn_accuracy(text)

@@ -5,7 +5,8 @@ criterion, differ from the exact onsets of the same samples?
 
 Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
 
-1. Select the first samples, and the weakest among the first `MAX_RANKED_SAMPLES`.
+1. Select the first samples that have an onset, and the weakest among the first
+   `MAX_RANKED_SAMPLES` of them.
 2. Test quickly, with the method, whether their onsets may differ from the exact
    onsets. If not, stop.
 3. Solve these samples exactly. The difference divided by the mean exact onset has a
@@ -17,6 +18,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings
@@ -28,45 +30,46 @@ from stiction.methods.protocol import optional_member
 
 SAMPLES_ON_LINE, SAMPLES_ON_PLANE = 32, 8
 """Number of first samples, and of weakest samples."""
-MAX_RANKED_SAMPLES, RANKING_SECONDS = 1000, 1.0
-"""First samples among which the weakest are found, and seconds on one core for them."""
-BATCH_SAMPLES = 64
-"""Samples that the inexpensive method solves at once."""
+MAX_RANKED_SAMPLES = 1000
+"""First samples among which the weakest are found."""
 MAX_PILOT_POINTS = 8
 """Most points of a sweep that have a pilot."""
 
 
 def compare(
     points: Sequence[Experiment],
+    onsets: Array | None = None,
     first: int = 0,
-    most: int = SAMPLES_ON_LINE,
     show: bool = False,
     workers: int | None = None,
 ) -> dict[str, Any]:
     """Return the bias and scatter of an approximate method for the first and weakest samples.
 
-    The result is empty if there is no exact counterpart, or if no point leaves a
-    doubt.
+    `onsets` (points, samples) has the critical stresses from sample `first` on, or NaN. By
+    default a few samples are solved. The result is empty if there is no exact
+    counterpart, or if no point leaves a doubt.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
     cores = workers or usable_cores()
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
-        for number in chosen.tolist():
-            for name, relative in _differences(points[number], first, most, cores).items():
+        for point in chosen.tolist():
+            known = None if onsets is None else onsets[point]
+            differences = _differences(points[point], known, first, cores)
+            for name, relative in differences.items():
                 if relative.size > 1:
                     parts.setdefault(name, []).append(relative)
             meter.advance()
     attributes: dict[str, Any] = {}
-    for name, differences in parts.items():
-        attributes[f"{name}_samples"] = differences[0].size
-        attributes[f"{name}_bias"] = float(max((part.mean() for part in differences), key=abs))
-        attributes[f"{name}_scatter"] = float(max(part.std(ddof=1) for part in differences))
+    for name, differing in parts.items():
+        attributes[f"{name}_samples"] = differing[0].size
+        attributes[f"{name}_bias"] = float(max((part.mean() for part in differing), key=abs))
+        attributes[f"{name}_scatter"] = float(max(part.std(ddof=1) for part in differing))
     return attributes
 
 
 def _differences(
-    experiment: Experiment, first: int, most: int, workers: int
+    experiment: Experiment, stress: Array | None, first: int, workers: int
 ) -> dict[str, Array]:
     """Return differences from the exact onset over its mean, for the first and weakest samples.
 
@@ -76,45 +79,47 @@ def _differences(
     exact = exact_counterpart(problem, method)
     if exact is None:
         return {}
-    size = SAMPLES_ON_PLANE if problem.interface.is_plane else SAMPLES_ON_LINE
     with collect_warnings():  # the ensemble itself warns
+        if stress is None:
+            stress = onsets_of(experiment, first + np.arange(SAMPLES_ON_LINE), workers)
         # 1.
-        ranked = min(MAX_RANKED_SAMPLES, int(RANKING_SECONDS / experiment.seconds))
-        draws = experiment.draws(first, min(max(size, ranked), most))
-        stress = _onsets(experiment, draws, BATCH_SAMPLES, workers)
-        chosen = {"pilot": np.arange(min(size, most))}
-        if most > size:
-            chosen["pilot_weakest"] = np.argsort(stress)[:size]
-        chosen = {name: rows[np.isfinite(stress[rows])] for name, rows in chosen.items()}
-        # 2.
-        may_differ = optional_member(method, "may_differ")
-        groups = [rows for rows in chosen.values() if rows.size]
-        samples = [experiment.sample(experiment.profiles(draws[rows])) for rows in groups]
-        pairs = zip(samples, groups, strict=True)
-        if not any(may_differ(problem, sample, stress[rows]) for sample, rows in pairs):
+        solved = np.flatnonzero(np.isfinite(stress))[:MAX_RANKED_SAMPLES]
+        size = SAMPLES_ON_PLANE if problem.interface.is_plane else SAMPLES_ON_LINE
+        chosen = {"pilot": solved[:size]}
+        if solved.size > size:
+            chosen["pilot_weakest"] = solved[np.argsort(stress[solved])[:size]]
+        if not solved.size:
+            return {}
+        # 2. The test is for the constants of the problem.
+        may_differ = bool(getattr(experiment.random, "constants", ()))
+        for rows in () if may_differ else chosen.values():
+            draws = np.concatenate([experiment.draws(first + row, 1) for row in rows.tolist()])
+            sample = experiment.sample(experiment.profiles(draws))
+            if optional_member(method, "may_differ")(problem, sample, stress[rows]):
+                may_differ = True
+                break
+        if not may_differ:
             return {}
         # 3.
         some = np.unique(np.concatenate(list(chosen.values())))
         true = np.full(stress.size, np.nan)
-        true[some] = _onsets(experiment.by(exact), draws[some], 1, workers)
+        true[some] = onsets_of(experiment.by(exact), first + some, workers)
     return {
         name: relative_differences(stress[rows], true[rows]) for name, rows in chosen.items()
     }
 
 
-def _onsets(experiment: Experiment, draws: Array, batch: int, workers: int) -> Array:
-    """Return the stress at onset for each row of draws, or NaN if it cannot be solved."""
+def onsets_of(experiment: Experiment, numbers: NDArray[np.int64], workers: int) -> Array:
+    """Return the stress at the onset of samples, or NaN if it cannot be solved."""
 
-    def solve(rows: Array) -> Array:
+    def solve(number: int) -> float:
         try:
-            stress: Array = experiment.onset(experiment.profiles(rows))["critical_stress"]
+            _, values = experiment.solve(experiment.draws(number, 1))
         except (InputError, RuntimeError, ArithmeticError):
-            alone = len(rows) == 1
-            return np.full(1, np.nan) if alone else _onsets(experiment, rows, 1, 1)
-        return stress
+            return np.nan
+        return float(values["critical_stress"][0])
 
-    parts = np.split(draws, range(batch, len(draws), batch))
-    return np.concatenate(in_threads(solve, parts, workers))
+    return np.array(in_threads(solve, numbers.tolist(), workers))
 
 
 def pilot_doubt(

@@ -332,17 +332,15 @@ class Conditioning(NamedTuple):
         """Warn about measured values that do not suit the field."""
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
-                f"given: the measured values are unlikely for this field (chi-square"
-                f" {self.misfit:.4g} for {self.points} values): check its marginal, its correlation"
-                " length and the noise"
+                "given: the measured values are unlikely for this field (chi-square"
+                f" {self.misfit:.4g} for {self.points}). Check marginal, correlation length and noise"
             )
         if max(self.remaining_error) > MAX_POSTERIOR_ERROR:
             mean, deviation = self.remaining_error
             warn_accuracy(
-                f"given: the field is approximate where it was measured: its mean is off by up to"
-                f" about {mean:.2g} of its standard deviation, and its standard deviation by up to"
-                f" about {100.0 * deviation:.2g} %. Average values at neighbouring places, and give"
-                " their smaller noise"
+                "given: the field is approximate where it was measured: its mean is off by up to"
+                f" {mean:.2g} and its deviation by {100.0 * deviation:.2g} % of its standard deviation."
+                " Average values at neighbouring places, and give their smaller noise"
             )
 
 

@@ -108,6 +108,15 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
     return distributions
 
 
+def uncertain_laws(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
+    """Return frozen distributions by full key without `begin`, or raise an `InputError`."""
+    with prefixed("uncertain"):
+        laws = distributions_of(given, begin)
+        if not laws:
+            raise InputError("must map keys to distributions, got an empty mapping")
+    return {full_key(key).removeprefix(begin): law for key, law in laws.items()}
+
+
 def distribution_of(key: str, value: Any) -> Any:
     """Return a frozen distribution, given a distribution, two ends or a table {low, high, spacing}.
 
@@ -128,7 +137,6 @@ def distribution_of(key: str, value: Any) -> Any:
     if valid and spacing == "log" and low > 0.0:
         return scipy.stats.loguniform(low, high)
     raise InputError(
-        f"{key}: must be a frozen scipy.stats distribution, a range (low, high) with low < high, or"
-        " a table {'low', 'high', 'spacing': 'linear' or, if low > 0, 'log'} or {'type':"
-        f" 'lognormal', 'mean', 'cv'}}, got {describe(value)}"
+        f"{key}: must be a range (low, high), a frozen scipy.stats distribution, or a table {{low,"
+        f" high, spacing = 'linear' or 'log'}} or {{type, mean, cv, ...}}, got {describe(value)}"
     )

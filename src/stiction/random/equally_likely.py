@@ -34,7 +34,7 @@ from stiction.base.errors import InputError, prefixed
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
-from stiction.random.dotted_keys import distributions_of, full_key, hypercube, with_values
+from stiction.random.dotted_keys import hypercube, uncertain_laws, with_values
 from stiction.random.fields import (
     FACTOR,
     RandomField,
@@ -117,9 +117,8 @@ class EquallyLikely:
         for number, kind in enumerate(kinds):
             if kind != kinds[0]:
                 raise InputError(
-                    "random: equally likely interfaces need the same random properties, all as"
-                    f" stresses or all as coefficients. [0] has {_named(kinds[0])}, and [{number}]"
-                    f" has {_named(kind)}"
+                    "random: equally likely interfaces need the same properties, all as stresses or"
+                    f" coefficients: [0] has {_named(kinds[0])}, and [{number}] {_named(kind)}"
                 )
 
     @property
@@ -370,12 +369,9 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
     >>> len(source.constants(seed=0))
     40
     """
-    with prefixed("uncertain"):
-        laws = {full_key(k): law for k, law in distributions_of(parameters).items()}
-        if not laws:
-            raise InputError("must map keys to distributions, got an empty mapping")
-        if wrong := [k for k in laws if k.startswith("problem.interface.")]:
-            raise InputError(f"{wrong[0]}: cannot be uncertain. Sweep over it instead")
+    laws = uncertain_laws(parameters)
+    if wrong := [key for key in laws if key.startswith("problem.interface.")]:
+        raise InputError(f"uncertain: {wrong[0]}: cannot be uncertain. Sweep over it instead")
     with prefixed("random"):
         _known(random)
     return UncertainSource(random, laws)

@@ -49,7 +49,7 @@ from stiction.base.units import is_in
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
 from stiction.random.conditioning import MIN_PIVOT, Conditions, conditionings, lower_factor
-from stiction.random.dotted_keys import distributions_of, full_key, hypercube, with_values
+from stiction.random.dotted_keys import hypercube, uncertain_laws, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.modes import Modes, make_modes
@@ -60,7 +60,6 @@ MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
 FACTOR = "between."  # begins the name of a factor among profiles, if its property is not random
 # Limits of warnings
 MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
-DOUBTFUL_UNRESOLVED = 0.5  # unresolved share above which the message doubts a unit
 MAX_MEAN_SHARE = 0.075  # share of the variance that the mean mode would hold
 MAX_CORRELATION_ERROR = 0.01
 
@@ -213,15 +212,10 @@ class RandomField:
         if lost > MAX_UNRESOLVED:
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
-            doubt = "check the unit of the correlation length (m): " * (
-                lost > DOUBTFUL_UNRESOLVED
-            )
             warn_accuracy(
-                f"{doubt}the grid of {nodes} nodes is coarser than the spectrum: values at the"
-                f" nodes are exact, but {100.0 * lost:.2g} % of the variance lies at wavelengths"
-                f" that the grid does not resolve. With interface.nodes >= {enough} it is less than"
-                f" {100.0 * MAX_UNRESOLVED:g} %, or end the spectrum there with"
-                f" power_kept={1.0 - lost:.3g}"
+                f"the grid of {nodes} nodes is coarser than the spectrum: {100.0 * lost:.2g} % of"
+                " the variance lies at wavelengths that it does not resolve. Check the unit of the"
+                f" length (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
             return
@@ -229,9 +223,8 @@ class RandomField:
         share = float(with_mean.sigma[0] ** 2)
         if share > MAX_MEAN_SHARE:
             warn_accuracy(
-                "the field has no mean mode, which would hold"
-                f" {100.0 * share:.2g} % of the variance on so short an interface. All samples have"
-                " nearly the same mean. RandomField(mean_mode=True) lets the mean vary"
+                f"the field has no mean mode, which would hold {100.0 * share:.2g} % of the"
+                " variance on so short an interface. RandomField(mean_mode=True) lets the mean vary"
             )
 
     @checked
@@ -572,17 +565,12 @@ class RandomInterface:
         >>> len(likely), likely[0].strength.marginal == strength.marginal
         (30, True)
         """
-        with prefixed("uncertain"):
-            laws = distributions_of(parameters, "random.")
-            if not laws:
-                raise InputError("must map keys to distributions, got an empty mapping")
-        laws = {full_key(key).removeprefix("random."): law for key, law in laws.items()}
+        laws = uncertain_laws(parameters, "random.")
         interfaces = []
-        for pairs in hypercube(laws, count, seed):
-            with prefixed(
-                "uncertain: at " + ", ".join(f"{k} = {v:.4g}" for k, v in pairs.items())
-            ):
-                interfaces.append(with_values(self, pairs))
+        for values in hypercube(laws, count, seed):
+            where = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
+            with prefixed(f"uncertain: at {where}"):
+                interfaces.append(with_values(self, values))
         return interfaces
 
     def warn_if_inaccurate(self, interface: Interface) -> None:

@@ -128,10 +128,9 @@ def make_modes(
     largest = cutoff / units * (1.0 + CUTOFF_RTOL)
     if largest.max() < 1.0 and not mean_mode:
         raise InputError(
-            f"spectrum: no mode is left on an interface of {max(interface.lengths):g} m: the first"
-            f" is at {units.min():.3g} rad/m, but the spectrum is truncated at {cutoff:.3g} rad/m."
-            " Check the unit of the correlation length (m), shorten it, lengthen the interface or"
-            " raise the truncation"
+            f"spectrum: is truncated at {cutoff:.3g} rad/m, below the first mode of an interface of"
+            f" {max(interface.lengths):g} m at {units.min():.3g} rad/m. Check the unit of the"
+            " correlation length (m), shorten it or raise the truncation"
         )
     # 1. and 2. Wave vectors.
     numbers = _numbers(interface, largest)

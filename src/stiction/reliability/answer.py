@@ -380,9 +380,8 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
     if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
         return None
     return (
-        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} would take"
-        f" about {seconds / 3600.0:.1g} h on one core. Allow them with max_evaluations, or count:"
-        " algorithm='plain' of failure_probability, or st.monte_carlo"
+        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} take about"
+        f" {seconds / 3600.0:.1g} h. Allow them with max_evaluations, or count: algorithm='plain'"
     )
 
 
