@@ -333,13 +333,13 @@ class Conditioning(NamedTuple):
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 "given: the measured values are unlikely for this field (chi-square"
-                f" {self.misfit:.4g} for {self.points}). Check marginal, correlation length and noise"
+                f" {self.misfit:.4g} for {self.points}). Check marginal, length and noise"
             )
         if max(self.remaining_error) > MAX_POSTERIOR_ERROR:
             mean, deviation = self.remaining_error
             warn_accuracy(
-                "given: the field is approximate where it was measured: its mean is off by up to"
-                f" {mean:.2g} and its deviation by {100.0 * deviation:.2g} % of its standard deviation."
+                f"given: the field is approximate where it was measured: its mean is off by up to about"
+                f" {mean:.2g} of its standard deviation, which is off by {100.0 * deviation:.2g} %."
                 " Average values at neighbouring places, and give their smaller noise"
             )
 
