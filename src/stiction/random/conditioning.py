@@ -338,9 +338,9 @@ class Conditioning(NamedTuple):
         if max(self.remaining_error) > MAX_POSTERIOR_ERROR:
             mean, deviation = self.remaining_error
             warn_accuracy(
-                f"given: the field is approximate where it was measured: its mean is off by up to about"
-                f" {mean:.2g} of its standard deviation, which is off by {100.0 * deviation:.2g} %."
-                " Average values at neighbouring places, and give their smaller noise"
+                "given: the field is approximate where it was measured: its mean is off by up to"
+                f" about {mean:.2g} of its standard deviation, which is off by"
+                f" {100.0 * deviation:.2g} %. Average neighbouring values, and give their noise"
             )
 
 
