@@ -66,6 +66,12 @@ def glued_pressing_of_friction_coefficients():
     return st.monte_carlo(problem, field, method=st.Equilibrium(events=2), samples=3, seed=2)
 
 
+@calls("energies and waves, tests/exact/test_block_waves.py", close=1e-5)
+def events_with_inertia():
+    drive = st.Pusher(height=0.02, width=0.01, stiffness=2e7)
+    return solved(crooked(nodes=64, drive=drive), 3, st.Rupture(events=4))
+
+
 @calls("states checked as equilibria, tests/exact/test_specimens.py")
 def a_path_with_travel_and_force():
     drive = st.Pusher(height=0.007, width=0.004, stiffness=6e7)
