@@ -12,7 +12,7 @@ from specimens import crooked, rough
 import stiction as st
 from stiction.methods.dynamics.mesh import condensed, layer_matrix, make_mesh
 from stiction.methods.dynamics.specimens import RuptureProgram, begin
-from stiction.methods.dynamics.waves import FRICTION, SPEED, TRAVEL, at_rest, wave_steps
+from stiction.methods.dynamics.waves import block_at_rest, wave_steps
 from stiction.methods.equilibrium.sample import LINEAR, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding as path_of
 from stiction.methods.equilibrium.solver import make_program
@@ -93,7 +93,7 @@ def test_shear_waves_of_mode_iii_swing_at_the_frequency_of_their_mode():
     mesh = lossless(problem)
     x, height = problem.interface.x, 0.031
     k, across = 2.0 * np.pi / 0.083, 0.5 * np.pi / height
-    waves = at_rest(mesh, np.zeros(96))
+    waves = block_at_rest(mesh, np.zeros(96))
     shape = np.cos(k * x) * np.sin(across * mesh.heights)[:, None]
     waves.u[:] = 1e-6 * shape
     period = 2.0 * np.pi / (problem.solid.shear_wave_speed * np.hypot(k, across))
@@ -115,7 +115,7 @@ def test_pulses_cross_the_block_at_the_speeds_of_the_solid(along):
     solid, y, nodes = problem.solid, mesh.heights, problem.interface.size
     speed = solid.dilatational_wave_speed if along else solid.shear_wave_speed
     width, path = (0.009, 0.03) if along else (0.006, 0.018)
-    waves = at_rest(mesh, np.zeros(nodes))
+    waves = block_at_rest(mesh, np.zeros(nodes))
 
     def pulse(y):
         return 1e-7 * np.exp(-(((y - 0.035) / width) ** 2))
@@ -149,11 +149,11 @@ def test_waves_along_the_interface_run_at_rayleighs_speed():
     s = np.sqrt(k**2 - (omega / solid.shear_wave_speed) ** 2)
     along = k * np.exp(-q * y) - 2.0 * k * q * s / (k**2 + s**2) * np.exp(-s * y)
     up = q * np.exp(-q * y) - 2.0 * k**2 * q / (k**2 + s**2) * np.exp(-s * y)
-    waves, size, half = at_rest(mesh, np.full(256, 1.0)), 1e-10, 0.5 * omega * mesh.step
+    waves, size, half = block_at_rest(mesh, np.full(256, 1.0)), 1e-10, 0.5 * omega * mesh.step
     waves.u[:], waves.v[:] = size * along * np.sin(k * x), size * up * np.cos(k * x)
     waves.u_rate[:] = 0.05 - size * omega * along * np.cos(k * x + half)
     waves.v_rate[:] = size * omega * up * np.sin(k * x + half)
-    waves.u_rate[-1] = waves.now[SPEED] = 0.05
+    waves.u_rate[-1] = waves.now["speed"] = 0.05
     phases, middle = [], slice(80, 176)  # three wavelengths
     given = np.full(256, sample.residual[0]), np.full(256, np.inf)
     for _ in range(int(0.022 / solid.dilatational_wave_speed / mesh.step)):
@@ -195,13 +195,15 @@ def test_energy_is_kept(drive, mode, attenuation):
             continue
         # Where the rates are known.
         moved = np.hstack([waves.u, waves.v]).astype(float) - 0.5 * mesh.step * before
-        travel = waves.now[TRAVEL] - 0.5 * mesh.step * waves.now[SPEED]
+        travel = waves.now["travel"] - 0.5 * mesh.step * waves.now["speed"]
         half = waves.slip - begun - 0.5 * mesh.step * waves.slip_rate
         stored = 0.5 * moved.ravel() @ (matrix @ moved.ravel()) + 0.5 * spring * travel**2
         stored += 0.25 * dx * half @ (mesh.correction @ half)
-        kinetic = 0.5 * (mass * before**2).sum() + 0.5 * mesh.drive_mass * waves.now[SPEED] ** 2
+        kinetic = (
+            0.5 * (mass * before**2).sum() + 0.5 * mesh.drive_mass * waves.now["speed"] ** 2
+        )
         work = 0.5 * dx * event.start @ half
-        worst = max(worst, abs(work - waves.now[FRICTION] - stored - kinetic - lost))
+        worst = max(worst, abs(work - waves.now["friction"] - stored - kinetic - lost))
         largest = max(largest, work)
         if not more:
             break
@@ -256,7 +258,7 @@ def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
     speed = solid.shear_wave_speed if mode == "III" else solid.dilatational_wave_speed
     end = 0.95 * (0.1 - 0.02) / speed  # from the patch to an end, and back to the front
     sample, mesh = of(block, strength), make_mesh(block)._replace(attenuation=0.0)
-    waves, steps = at_rest(mesh, np.zeros(nodes)), int(end / mesh.step)
+    waves, steps = block_at_rest(mesh, np.zeros(nodes)), int(end / mesh.step)
     wave_steps(sample, np.full(nodes, tau), 0.5 * sample.critical, mesh, waves, steps, True)
     _, state = stepped(half, strength, tau, end, 2 * steps)
     ours, theirs = waves.arrival, state.arrival

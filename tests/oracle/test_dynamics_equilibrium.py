@@ -122,7 +122,7 @@ def direct_convolution(run, start, steps):
             stress = np.fft.irfft(
                 np.r_[0.0, dynamic * (lag + weights[0] * mean_hat) - static * slip_hat], n
             )
-            limit = np.maximum(nodes.peak - nodes.weakening * fresh, nodes.residual)
+            limit = np.maximum(nodes.peak - nodes.weakening_rate * fresh, nodes.residual)
             return fresh, np.maximum(
                 stress + load * nodes.profile + nodes.initial - limit, 0.0
             ) / z

@@ -36,7 +36,7 @@ def warn_if_coarse(problem: Problem, rows: Sample) -> None:
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn about nodes that weaken too steeply for the grid, or whose stress would reverse slip."""
-    W, interface, now = (run.setting.nodes.weakening, run.medium.interface, state.now)
+    W, interface, now = run.setting.nodes.weakening_rate, run.medium.interface, state.now
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
     steep = np.flatnonzero((state.slip > 0.0) & (steepest < W))
@@ -60,7 +60,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
     If loading is too fast for the grid, raise an `InputError` or issue a warning.
     """
     time, step = run.first_slip(), run.medium.step
-    if not time < run.setting.thresholds.end_time:
+    if time is None or time >= run.setting.thresholds.end_time:
         return None
     if np.spacing(time) > 0.01 * step:
         raise InputError(
@@ -99,13 +99,13 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 
 def warn_of_fast_loading(run: Run, results: Sequence[Any]) -> None:
     """Warn if the load rises so fast that arrested events differ from events at a slow load."""
-    arrested = sum(int(np.nan_to_num(result["arrested_events"])) for result in results)
+    first_slip = run.first_slip()
+    if first_slip is None or not any(result["arrested_events"] > 0 for result in results):
+        return
     lengths = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     crossing = lengths[0] / run.medium.problem.solid.shear_wave_speed
-    if not arrested:
-        return
     loads = [float(result["applied_load"]) for result in results]
-    loading_rate, scale = run.slope(run.first_slip()), run.scale_at(np.nanmax(loads))
+    loading_rate, scale = run.slope(first_slip), run.scale_at(np.nanmax(loads))
     rise = loading_rate * crossing / scale
     slow_rate = FAST_RISE / rise * loading_rate
     if rise > FAST_RISE:

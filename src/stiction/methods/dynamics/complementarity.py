@@ -40,8 +40,12 @@ from typing import Any
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
 from stiction.elasticity.operator import Transform, convolve
-from stiction.methods.dynamics.state import ImplicitTables, Setting
-from stiction.problem.friction.kernels import line_at, strength_at
+from stiction.methods.dynamics.state import (
+    ImplicitTables,
+    Setting,
+    node_line,
+    node_strength,
+)
 
 _MAX_CG, _MAX_NEWTON = 400, 60  # iterations
 _MIN_CURVATURE = 1e-10  # of p (M - W) p as a share of p M p
@@ -111,19 +115,16 @@ def solve_increment(
     is accurate to `accuracy` (Pa). The strength may differ by `line_accuracy` (Pa) from the
     straight line that replaces it.
     """
-    law, nodes = setting.law, setting.nodes
-    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
     u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
     driving, falling, product = tables.driving, tables.falling, tables.product
     n = u.size
     # 1. The first slipping set and its lines.
     for i in range(n):
-        strength = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
-        if slipping[i] == 0 and trial[i] > strength:
+        if slipping[i] == 0 and trial[i] > node_strength(setting, i, slip[i]):
             slipping[i] = 1
         if slipping[i] == 0:
             u[i] = 0.0
-        start, falling[i] = line_at(law, peak[i], residual[i], weakening[i], slip[i], u[i])
+        start, falling[i] = node_line(setting, i, slip[i], u[i])
         driving[i] = trial[i] - start
     for _ in range(_MAX_NEWTON):
         # 2. The increments of this set on these lines.
@@ -134,7 +135,7 @@ def solve_increment(
         changed = 0
         for i in range(n):
             if slipping[i] == 0:
-                strength = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+                strength = node_strength(setting, i, slip[i])
                 if trial[i] - product[i] > strength + _JOINING * accuracy:
                     slipping[i] = 1
                     changed += 1
@@ -142,7 +143,7 @@ def solve_increment(
                 slipping[i] = 0
                 u[i] = 0.0
                 changed += 1
-            start, slope = line_at(law, peak[i], residual[i], weakening[i], slip[i], u[i])
+            start, slope = node_line(setting, i, slip[i], u[i])
             before = driving[i] + falling[i] * u[i]
             driving[i] = trial[i] - start
             if slipping[i] > 0 and abs(driving[i] + slope * u[i] - before) > line_accuracy:

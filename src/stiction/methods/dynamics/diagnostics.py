@@ -179,16 +179,6 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
 
 @jit_inside
-def _mean_where_breakable(peak: Array, stress: Array, breakable: int) -> float:
-    """Return the mean stress of the `breakable` nodes of finite peak strength, Pa."""
-    total = 0.0
-    for i in range(stress.size):
-        if peak[i] < np.inf:
-            total += stress[i]
-    return total / breakable
-
-
-@jit_inside
 def finish_step(
     state: RuptureState,
     grid: Grid,
@@ -207,9 +197,9 @@ def finish_step(
     now = state.diagnostics[0]
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival
-    front_share = setting.thresholds.front_share
-    top_slip_rate, top_node, weakened, slip_sum, change = -1.0, 0, 0, 0.0, 0.0
-    peak = setting.nodes.peak
+    thresholds, peak = setting.thresholds, setting.nodes.peak
+    top_slip_rate, top_node, weakened = -1.0, 0, 0
+    slip_sum, change, stress_sum = 0.0, 0.0, 0.0  # the last two over nodes that can break
     margin, margin_node = now.reverse_margin, now.reverse_node
     for i in range(slip.size):
         if slip_rate[i] > top_slip_rate:
@@ -219,33 +209,30 @@ def finish_step(
         if slip[i] >= residual_slip[i]:
             weakened += 1
         # A node that does not weaken has d_c = 0: there the first slip counts.
-        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= front_share * residual_slip[i]:
+        front = thresholds.front_share * residual_slip[i]
+        if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= front:
             # Assume that slip grew at a constant rate in the step, and interpolate.
-            passed = (slip[i] - front_share * residual_slip[i]) / max(increments[i], 1e-300)
+            passed = (slip[i] - front) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]
         if peak[i] < np.inf:
             change += strength[i] - peak[i]
+            stress_sum += stress[i]
     whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
     now.whole_stress, now.weakened_nodes = whole_stress, weakened
     now.strength_change = change / slip.size
-    now.mean_stress = whole_stress
-    if setting.thresholds.held:
-        now.mean_stress = _mean_where_breakable(
-            setting.nodes.peak, stress, setting.thresholds.breakable
-        )
+    # Without locked nodes, equation (1) has less round-off than the sum.
+    now.mean_stress = stress_sum / thresholds.breakable if thresholds.held else whole_stress
     now.top_slip_rate, now.top_node = top_slip_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
-    now.work, now.mean_slip = now.work + step.work, slip_sum / setting.thresholds.breakable
-    now.mean_slip_rate = (
-        step.radiated / grid.impedance * slip.size / setting.thresholds.breakable
-    )
+    now.work, now.mean_slip = now.work + step.work, slip_sum / thresholds.breakable
+    now.mean_slip_rate = step.radiated / grid.impedance * slip.size / thresholds.breakable
     now.scale = max(now.scale, value_at(setting.scale, step.load))
-    fall = observe(now, setting.thresholds, step.radiated)
-    if top_slip_rate > setting.thresholds.unstable_slip_rate and not now.event_begun:
-        now.fast_since = now.time if np.isnan(now.fast_since) else now.fast_since
-        now.fast_until = now.time
+    fall = observe(now, thresholds, step.radiated)
+    if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:
+        now.fast_since = now.fast_since if now.fast else now.time
+        now.fast, now.fast_until = 1, now.time
     if now.maximum_time == now.time:  # an event may begin here
         now.maximum_work = now.work
         for i in range(slip.size):

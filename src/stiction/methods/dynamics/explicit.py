@@ -53,9 +53,9 @@ from stiction.methods.dynamics.state import (
     Setting,
     StepRecord,
     Thresholds,
+    node_strength,
     value_at,
 )
-from stiction.problem.friction.kernels import strength_at
 
 _CALM_STRESS = 1e-4  # Z V of waves that implicit steps may smear, in units of the stress scale
 
@@ -69,11 +69,9 @@ def _transfer(grid: Grid, slip_hat: Array, memory_sum: Array, tables: ExplicitTa
     shared[0] = 0.0
     for q in range(1, shared.size):
         o, v_hat = offset[q], slip_rate_hat[q]
-        g, b, c = static[q], response[q], dynamic[q]
-        slip = slip_hat[q] + step * v_hat  # at its end
-        real = c * (memory_sum[o] + b * v_hat.real) - g * slip.real
-        imaginary = c * (memory_sum[o + ENTRIES] + b * v_hat.imag) - g * slip.imag
-        shared[q] = complex(real, imaginary)
+        memory = complex(memory_sum[o], memory_sum[o + ENTRIES])
+        slip = slip_hat[q] + step * v_hat  # at the end of the step
+        shared[q] = dynamic[q] * (memory + response[q] * v_hat) - static[q] * slip
     backward(grid.transform, shared, tables.transfer)
 
 
@@ -82,16 +80,13 @@ def _predict(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> None:
     """Step 1: write to `predicted` the rate at the end if the present rate acts all the time."""
-    nodes, law = setting.nodes, setting.law
-    slip, slip_rate = state.slip, state.slip_rate
-    transfer, predicted = tables.transfer, tables.predicted
-    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
-    profile, initial, step = nodes.profile, nodes.initial, tables.step
+    profile, initial = setting.nodes.profile, setting.nodes.initial
+    slip, slip_rate, transfer, step = state.slip, state.slip_rate, tables.transfer, tables.step
     for i in range(slip.size):
         next_slip = slip[i] + step * slip_rate[i]
-        limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
+        limit = node_strength(setting, i, next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
-        predicted[i] = max(at_rest - limit, 0.0) / impedance
+        tables.predicted[i] = max(at_rest - limit, 0.0) / impedance
 
 
 @jit_inside
@@ -102,17 +97,15 @@ def _correct(
 
     Return the work (without the cell) and the sum of V.
     """
-    nodes, law, step = setting.nodes, setting.law, tables.step
+    profile, initial, step = setting.nodes.profile, setting.nodes.initial, tables.step
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     transfer, predicted, increments = tables.transfer, tables.predicted, tables.increments
-    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
-    profile, initial = nodes.profile, nodes.initial
     work, total = 0.0, 0.0
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     for i in range(slip.size):
         increment = 0.5 * step * (slip_rate[i] + predicted[i])
         next_slip = slip[i] + increment
-        limit = strength_at(law, peak[i], residual[i], weakening[i], next_slip)
+        limit = node_strength(setting, i, next_slip)
         at_rest = transfer[i] + load * profile[i] + initial[i]
         v = max(at_rest - limit, 0.0) / impedance
         work += increment * (mean_load * profile[i] + initial[i])
@@ -133,7 +126,8 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
     # Once all nodes have broken only the load drives steady slip, however fast it is.
-    slow = top < STEADY_STRESS * scale / impedance or now.weakened_nodes >= thresholds.slid_stop
+    slid = thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable
+    slow = top < STEADY_STRESS * scale / impedance or slid
     if quiet or (steady and slow):
         now.calm_steps += 1
     else:
@@ -197,7 +191,8 @@ def explicit_steps(
         )
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
-        if now.weakened_nodes >= thresholds.slid_stop and (calm or not thresholds.held):
+        slid = thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable
+        if slid and (calm or not thresholds.held):
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED

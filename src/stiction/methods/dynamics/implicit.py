@@ -58,9 +58,9 @@ from stiction.methods.dynamics.state import (
     Setting,
     StepRecord,
     Thresholds,
+    node_strength,
     value_at,
 )
-from stiction.problem.friction.kernels import strength_at
 
 LARGEST_STEP = 1e20  # s
 _ROUND_OFF_SHARE = 1e-14  # of the largest stress: ten times the error of the transforms
@@ -120,28 +120,26 @@ def _assemble(
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
     size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
     impedance = grid.impedance
-    if size != tables.valid_for[0]:
+    # Tables of the size and a matrix of size and ratio often serve many steps.
+    other_size = not tables.filled[0] or size != tables.valid_for[0]
+    if other_size:
         tabulate(grid, size, tables)
-    if size != tables.valid_for[0] or ratio != tables.valid_for[1]:
+    if other_size or ratio != tables.valid_for[1]:
         symbol[0] = impedance * (1.0 + ratio) / size
         for q in range(1, symbol.size):
             fading = stiffness[1, q] * (response[entry[q]] + rise * ramp[entry[q]]) / size
             symbol[q] = symbol[0] + stiffness[0, q] - fading
         for q in range(symbol.size):
             tables.inverse[q] = 1.0 / symbol[q]
-        tables.valid_for[0], tables.valid_for[1] = size, ratio
+        tables.valid_for[0], tables.valid_for[1], tables.filled[0] = size, ratio, 1
     fading_memory(grid, state.memory, tables)
     forward(grid.transform, state.past, past_hat)
     trial_hat, trial = tables.work, tables.trial_stress
     trial_hat[0] = impedance * ratio * past_hat[0]
     for q in range(1, trial_hat.size):
-        g, c, ramp_gain = stiffness[0, q], stiffness[1, q], rise * ramp[entry[q]]
-        past, memory, slip = past_hat[q], tables.memory_sum[q], state.slip_hat[q]
-        real = c * (memory.real - ramp_gain * past.real) - g * slip.real
-        imaginary = c * (memory.imag - ramp_gain * past.imag) - g * slip.imag
-        trial_hat[q] = complex(
-            real + impedance * ratio * past.real, imaginary + impedance * ratio * past.imag
-        )
+        memory = tables.memory_sum[q] - rise * ramp[entry[q]] * past_hat[q]
+        elastic = stiffness[1, q] * memory - stiffness[0, q] * state.slip_hat[q]
+        trial_hat[q] = elastic + impedance * ratio * past_hat[q]
     backward(grid.transform, trial_hat, trial)
     profile, initial = setting.nodes.profile, setting.nodes.initial
     largest = 0.0
@@ -162,17 +160,17 @@ def _effect(
 
     Weakening is a share of tau_p - tau_r. Creep at the residual strength counts if it is fast.
     """
-    nodes, law, slip, past = setting.nodes, setting.law, state.slip, state.past
-    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
+    nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
     scale = state.diagnostics[0].scale
     largest, total, radiated = 0.0, 0.0, 0.0
     smallest_drop, fast_slip = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
         if slip[i] < residual_slip[i] and u[i] > 0.0:
-            lost = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
-            lost -= strength_at(law, peak[i], residual[i], weakening[i], slip[i] + u[i])
-            largest = max(largest, lost / max(peak[i] - residual[i], smallest_drop))
+            lost = node_strength(setting, i, slip[i]) - node_strength(
+                setting, i, slip[i] + u[i]
+            )
+            largest = max(largest, lost / max(nodes.peak[i] - nodes.residual[i], smallest_drop))
         elif u[i] > fast_slip and residual_slip[i] > 0.0:
             largest = max(largest, u[i] / residual_slip[i])
         total += u[i]
@@ -208,28 +206,24 @@ def _accept(
 ) -> Any:
     """Step 5: take the step in place and return it. Write the strength after it."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
-    law, nodes, u, transfer = setting.law, setting.nodes, tables.increment, tables.transfer
-    slip_rate_hat, slope_hat, transfer_hat = tables.slip_rate_hat, tables.slope_hat, tables.work
-    stiffness, entry, slip_hat = grid.stiffness, grid.entry, state.slip_hat
+    u, transfer, transfer_hat = tables.increment, tables.transfer, tables.work
+    slip_rate_hat, slope_hat, slip_hat = tables.slip_rate_hat, tables.slope_hat, state.slip_hat
     forward(grid.transform, u, slip_rate_hat)
     for q in range(slip_rate_hat.size):
         slip_hat[q] += slip_rate_hat[q]
+        # Part by part: complex division is slow to compile and to run.
         mean = complex(slip_rate_hat[q].real / size, slip_rate_hat[q].imag / size)
-        slip_rate_hat[q], past = mean, tables.past_hat[q]
-        slope_hat[q] = complex(rise * (mean.real - past.real), rise * (mean.imag - past.imag))
+        slip_rate_hat[q], slope_hat[q] = mean, rise * (mean - tables.past_hat[q])
     advance_with_ramp(grid, state.memory, tables)
     transfer_hat[0] = 0.0
     for q in range(1, transfer_hat.size):
-        response, ramp = tables.response[entry[q]], tables.ramp_response[entry[q]]
-        memory, v, a, slip = tables.memory_sum[q], slip_rate_hat[q], slope_hat[q], slip_hat[q]
-        g, c = stiffness[0, q], stiffness[1, q]
-        real = c * (memory.real + response * v.real + ramp * a.real) - g * slip.real
-        imaginary = c * (memory.imag + response * v.imag + ramp * a.imag) - g * slip.imag
-        transfer_hat[q] = complex(real, imaginary)
+        j = grid.entry[q]
+        memory = tables.memory_sum[q] + tables.response[j] * slip_rate_hat[q]
+        memory += tables.ramp_response[j] * slope_hat[q]
+        transfer_hat[q] = grid.stiffness[1, q] * memory - grid.stiffness[0, q] * slip_hat[q]
     backward(grid.transform, transfer_hat, transfer)
     slip, slip_rate, past, stress = state.slip, state.slip_rate, state.past, state.stress
-    peak, residual, weakening = nodes.peak, nodes.residual, nodes.weakening
-    profile, initial = nodes.profile, nodes.initial
+    profile, initial = setting.nodes.profile, setting.nodes.initial
     mean_load = 0.5 * (load + state.diagnostics[0].load)
     work = 0.0
     for i in range(u.size):
@@ -238,7 +232,7 @@ def _accept(
         slip_rate[i] = max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * slip_rate[i]
-        tables.strength[i] = strength_at(law, peak[i], residual[i], weakening[i], slip[i])
+        tables.strength[i] = node_strength(setting, i, slip[i])
     return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
 
 
@@ -316,7 +310,7 @@ def implicit_steps(
         # 6. The next size, or the end.
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
-        if now.weakened_nodes >= thresholds.slid_stop:
+        if thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable:
             reason = Reason.ALL_SLID
         elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
             reason = Reason.DROPPED

@@ -94,7 +94,9 @@ class Run:
     def strength_after(self, slip: Floats) -> Floats:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
-        strength: Floats = strengths(law, nodes.peak, nodes.residual, nodes.weakening, slip)
+        strength: Floats = strengths(
+            law, nodes.peak, nodes.residual, nodes.weakening_rate, slip
+        )
         return strength
 
     def scale_at(self, load: float) -> float:
@@ -107,15 +109,15 @@ class Run:
         nodes = self.setting.nodes
         return float(np.min((nodes.peak - nodes.initial) / nodes.profile))
 
-    def first_slip(self) -> float:
-        """Return the time, s, at which the first node reaches its strength, or infinity."""
+    def first_slip(self) -> float | None:
+        """Return the time, s, at which the first node reaches its strength, if it ever does."""
         (times, values), target = self.setting.load, self.first_load
         if values[0] >= target:
             return 0.0
         last = int(np.argmax(values >= target)) or values.size - 1
         slope = (values[last] - values[last - 1]) / (times[last] - times[last - 1])
         missing = target - values[last - 1]
-        return float(times[last - 1] + missing / slope) if slope > 0.0 else np.inf
+        return float(times[last - 1] + missing / slope) if slope > 0.0 else None
 
     def slope(self, time: float) -> float:
         """Return the absolute loading rate just after a time, Pa/s."""
@@ -160,10 +162,6 @@ class Run:
             now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)
         now["mean_stress"] = self.mean(stress)
         now["maximum_node"] = now["top_node"] = int(np.argmax(excess))
-        for name in ("first_stress", "onset_stress", "critical_stress", "kinetic_stress"):
-            now[name] = np.nan  # not yet
-        now["onset_time"] = now["onset_load"] = np.nan
-        now["fast_since"] = now["fast_until"] = np.nan
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
@@ -268,7 +266,7 @@ class Run:
         thresholds = self.setting.thresholds
         slides = rests and now["all_broken"] and not thresholds.held
         slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
-        if now["event_open"] and np.isfinite(now["fast_since"]) and not slides:
+        if now["event_open"] and now["fast"] and not slides:
             event = np.zeros((), event_type(slip.size))
             event["time"] = now["event_time"]
             event["duration"] = now["fast_until"] - now["fast_since"]
@@ -276,8 +274,7 @@ class Run:
             event["work"] = now["event_work"], now[work]
             event["slip"] = state.event_slip, slip
             self.events.append(event)
-        now["fast_since"] = now["fast_until"] = np.nan
-        now["event_open"] = now["event_begun"]
+        now["fast"], now["event_open"] = 0, now["event_begun"]
         if rests and now["maximum_time"] == now["time"]:
             now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
         for name in ("time", "load", "work"):

@@ -275,7 +275,7 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
         *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
         np.empty((2, TWO_ROWS)),
     )
-    return ImplicitTables(np.full(2, np.nan), *arrays)
+    return ImplicitTables(np.zeros(1, dtype=np.int64), np.zeros(2), *arrays)
 
 
 @jit_inside

@@ -77,6 +77,8 @@ class Mesh(NamedTuple):
     """Stiffness of the machine for a block, half of the specimen, Pa."""
     drive_mass: float
     """Mass of platen or pusher, kg/m."""
+    impedance: float
+    """G/(2 c_s), Pa s/m."""
     attenuation: float
     """Rate at which momentum is lost, 1/s."""
     viscous_time: float = 0.0
@@ -122,6 +124,7 @@ def _mesh(
         platen=isinstance(drive, Platen),
         stiffness=2.0 * drive.stiffness / depth,
         drive_mass=drive.mass / depth,
+        impedance=0.5 * solid.shear_modulus / solid.shear_wave_speed,
         attenuation=np.pi
         * solid.shear_wave_speed
         / interface.measure

@@ -426,7 +426,7 @@ def _thresholds(
     front_share = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
     breakable = int(np.count_nonzero(finite))
     return Thresholds(
-        slid_stop=np.inf if method.stop == "time" or rests_later else float(breakable),
+        slid_stop=method.stop != "time" and not rests_later,
         held=held,
         event_stop=method.stop == "onset",
         rest_stop=method.stop == "rest",

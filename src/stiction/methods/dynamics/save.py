@@ -65,19 +65,19 @@ _MAX_STEPS_PER_FILE = 50_000  # steps between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
 
-def _over(*dims: str, **meanings: tuple[str, str]) -> dict[str, Variable]:
+def over(*dims: str, **meanings: tuple[str, str]) -> dict[str, Variable]:
     """Return variables over dimensions, by name, from (units, meaning)."""
     return {name: Variable(*meaning, dims) for name, meaning in meanings.items()}
 
 
-FIELDS = _over(
+FIELDS = over(
     "time",
     slip=("m", "slip"),
     slip_rate=("m/s", "slip rate"),
     shear_stress=("Pa", "shear stress on the interface"),
     strength=("Pa", "current strength"),
 )
-SCALARS: dict[str, Variable] = _over(
+SCALARS: dict[str, Variable] = over(
     "time",
     load=("Pa", "load factor tau_0"),
     mean_stress=("Pa", "mean shear stress on the interface"),
@@ -91,7 +91,7 @@ SCALARS: dict[str, Variable] = _over(
     fracture_energy=("J/m", "energy dissipated above the residual"),
     radiated_energy=("J/m", "work minus dissipated and strain energy"),
 )
-STEPS = _over(  # DIAGNOSTICS of these names
+STEPS = over(  # DIAGNOSTICS of these names
     "step",
     step_time=("s", "time after each step"),
     step_load=("Pa", "load factor tau_0 after each step"),
@@ -102,12 +102,16 @@ STEPS = _over(  # DIAGNOSTICS of these names
     step_size=("s", "size of each step"),
     step_work=("J/m", "work of the load up to each step"),
 )
-STATIONS = _over(  # as in STATION
+STATIONS = over(  # as in STATION
     "step",
     "station",
     station_slip=("m", "slip at a station after each step"),
     station_slip_rate=("m/s", "slip rate at a station after each step"),
     station_shear_stress=("Pa", "shear stress (traction) at a station after each step"),
+)
+OVER_NODES = over(
+    peak_strength=("Pa", "peak strength tau_p"),
+    arrival_time=("s", "arrival time of the front, see `Rupture.arrival`"),
 )
 TIME = Variable("s", "time from zero load", ("time",))
 _FROM_DIAGNOSTICS = ("time", "load", "mean_stress", "work")

@@ -11,7 +11,12 @@ STATION_UNITS = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
 """Variables of a station, and their units in a file in SI."""
 UNBROKEN_TIME = 1e9
 """Rupture time of nodes that do not break in files of the comparison, s."""
-COLUMN_TITLES = ("slip (m)", "slip rate (m/s)", "shear stress (MPa)")
+COLUMN_TITLES = (
+    "time (s)",
+    "horizontal slip (m)", "horizontal slip rate (m/s)", "horizontal shear stress (MPa)",
+    "vertical slip (m)", "vertical slip rate (m/s)", "vertical shear stress (MPa)",
+    "normal stress (MPa), compression negative",
+)  # fmt: skip
 MOST_DECIMALS = 9
 """Decimals of places in names of files, in units of 100 m, that tell stations on a grid apart."""
 COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
@@ -88,7 +93,7 @@ def write_scec(
     middle = dict(zip(dims, np.atleast_1d(origin).tolist(), strict=True))
     away = [run[dim].values - middle[dim] for dim in dims] + [np.zeros(1)] * (2 - len(dims))
     size = " x ".join(f"{float(axis[1] - axis[0]):g}" for axis in away[: len(dims)])
-    about = f"# problem={benchmark}\n# code=stiction\n# element_size={size} m\n"
+    about = [f"# problem={benchmark}", "# code=stiction", f"# element_size={size} m"]
     target = Path(folder)
     places = [
         ([float(at[f"station_{dim}"]) - middle[dim] for dim in dims] + [0.0])[:2]
@@ -113,33 +118,27 @@ def write_scec(
         ]
         still = np.zeros_like(time)
         columns = [time, *shown, still, still, still, still + 1e-6 * normal_stress]
-        header = (
-            f"{about}# num_time_steps={time.size}\n# location={j:g} m along strike, {k:g} m"
-        )
-        header += " down-dip\n# Column #1 = time (s)\n"
-        titles = [
-            f"{way} {text}" for way in ("horizontal", "vertical") for text in COLUMN_TITLES
+        header = [
+            *about,
+            f"# num_time_steps={time.size}",
+            f"# location={j:g} m along strike, {k:g} m down-dip",
+            *(f"# Column #{i} = {title}" for i, title in enumerate(COLUMN_TITLES, 1)),
+            COLUMN_NAMES,
         ]
-        titles.append("normal stress (MPa), compression negative")
-        header += "".join(f"# Column #{i} = {text}\n" for i, text in enumerate(titles, 2))
-        header += COLUMN_NAMES
         paths.append(target / file)
-        np.savetxt(
-            paths[-1], np.column_stack(columns), "%21.13e" + 7 * " %15.7e", header=header,
-            comments="",
-        )  # fmt: skip
+        _write_table(paths[-1], header, columns, "%21.13e" + 7 * " %15.7e")
     # Unbroken nodes need a number in the format.
     times = np.nan_to_num(run.arrival_time.values - begin, nan=UNBROKEN_TIME).ravel()
     nodes = [grid.ravel() for grid in np.meshgrid(*away, indexing="ij")]
     paths.append(target / "cplot.txt")
-    header = (
-        f"{about}# Column #1, #2 = distance along strike, down-dip (m)\n# Column #3 = rupture"
-    )
-    header += " time (s)\nj k t"
-    np.savetxt(
-        paths[-1], np.column_stack([*nodes, times]), "%15.7e", header=header, comments=""
-    )
+    distances = "# Column #1, #2 = distance along strike, down-dip (m)"
+    header = [*about, distances, "# Column #3 = rupture time (s)", "j k t"]
+    _write_table(paths[-1], header, [*nodes, times], "%15.7e")
     return paths
+
+
+def _write_table(path: Path, header: list[str], columns: list[Any], form: str) -> None:
+    np.savetxt(path, np.column_stack(columns), form, header="\n".join(header), comments="")
 
 
 def _first_onset(run: Any) -> float:

@@ -10,11 +10,10 @@ import numpy as np
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Number, Progress, checked
 from stiction.base.progress import Meter
-from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.method import Rupture, make_run
-from stiction.methods.dynamics.save import SCALARS, Recorder, Save, open_rupture
+from stiction.methods.dynamics.save import OVER_NODES, SCALARS, Recorder, Save, open_rupture
 from stiction.methods.dynamics.simulate_event import simulate_event
 from stiction.methods.dynamics.state import RuptureState
 from stiction.methods.dynamics.summary import arrested_events, rate_spectrum, summary
@@ -26,11 +25,6 @@ from stiction.problem.sample import Sample
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_ALONG: dict[str, Variable] = {
-    "peak_strength": Variable("Pa", "peak strength tau_p", ()),
-    "arrival_time": Variable("s", "arrival time of the front, see `Rupture.arrival`", ()),
-}
 
 
 @checked
@@ -195,6 +189,7 @@ def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, 
     time, onset = dataset["step_time"].values, float(state.now["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]
     inside = (time >= onset) & (time <= min(later, default=np.inf))
+    inside &= state.now["instabilities"] > 0
     return rate_spectrum(problem, time[inside], moment_rate[inside])
 
 
@@ -203,7 +198,7 @@ def _complete(
 ) -> xr.Dataset:
     """Return a dataset with the variables of the whole run added."""
     problem, interface = run.medium.problem, run.medium.interface
-    variables = {name: along(interface, variable) for name, variable in _ALONG.items()}
+    variables = {name: along(interface, variable) for name, variable in OVER_NODES.items()}
     for name, variable in replace(method, events=0).variables(problem).items():
         variables[name] = replace(variable, dims=variable.dims[1:])  # without 'sample'
     values: dict[str, Any] = {

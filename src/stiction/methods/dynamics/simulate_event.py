@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.dynamics.mesh import layer_matrix
-from stiction.methods.dynamics.save import FIELDS, SCALARS, TIME, Save
+from stiction.methods.dynamics.save import FIELDS, OVER_NODES, SCALARS, TIME, Save, over
 from stiction.methods.dynamics.specimens import (
     DynamicEvent,
     RuptureProgram,
@@ -24,8 +25,6 @@ from stiction.methods.dynamics.specimens import (
     refuse_overstress,
 )
 from stiction.methods.dynamics.summary import SPEEDS, rate_spectrum
-from stiction.methods.dynamics.waves import FORCE, FRICTION, SPEED, TRAVEL
-from stiction.methods.dynamics.waves import TIME as NOW
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
 from stiction.methods.equilibrium.sample import (
     PathStatus,
@@ -43,36 +42,32 @@ if TYPE_CHECKING:
 
 PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
 """Shares of an event's slip at which the velocities of the whole block are kept."""
-OVER_TIME: dict[str, Variable] = {
-    name: SCALARS[name]
-    for name in (
-        "load",
-        "mean_stress",
-        "mean_slip",
-        "top_slip_rate",
-        "weakened_fraction",
-        "moment_rate",
-    )
-} | {
-    "machine_stress": Variable("Pa", "force of the machine per area of interface", ("time",)),
-    "drive_travel": Variable("m", "travel of both drives since the event began", ("time",)),
-    "work": Variable("J/m", "work of the stress before the event on the slip", ("time",)),
-    "friction_energy": Variable("J/m", "energy lost to friction", ("time",)),
-    "strain_energy": Variable(
-        "J/m", "strain energy of the changes in blocks and machine", ("time",)
-    ),
-    "kinetic_energy": Variable("J/m", "kinetic energy of blocks and drives", ("time",)),
-    "attenuated_energy": Variable(
-        "J/m", "energy lost to attenuation, the rest of the work", ("time",)
-    ),
-}
-OF_EVENT: dict[str, Variable] = {
-    "critical_load": Variable("Pa", "drive of the event", ()),
-    "critical_position": Variable("m", "position at which the front arrives first", ()),
-    "onset_time": Variable("s", "time at which the front arrives first", ()),
-    **{name: Variable(speed.units, speed.long_name, ()) for name, speed in SPEEDS.items()},
-}
-BLOCK_DIMS = ("snapshot", "height", "x")
+OVER_TIME = over(
+    "time",
+    machine_stress=("Pa", "force of the machine per area of interface"),
+    drive_travel=("m", "travel of both drives since the event began"),
+    work=("J/m", "work of the stress before the event on the slip"),
+    friction_energy=("J/m", "energy lost to friction"),
+    strain_energy=("J/m", "strain energy of the changes in blocks and machine"),
+    kinetic_energy=("J/m", "kinetic energy of blocks and drives"),
+    attenuated_energy=("J/m", "energy lost to attenuation, the rest of the work"),
+)
+AS_BETWEEN_HALF_SPACES = (
+    "load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction", "moment_rate",
+)  # fmt: skip
+OF_EVENT = over(
+    critical_load=("Pa", "drive of the event"),
+    critical_position=("m", "position at which the front arrives first"),
+    onset_time=("s", "time at which the front arrives first"),
+)
+OF_PICTURES = over(
+    "snapshot", "height", "x", block_velocity=("m/s", "velocity along x in the upper block")
+)
+VARIABLES: dict[str, Variable] = {
+    **{name: SCALARS[name] for name in AS_BETWEEN_HALF_SPACES},
+    **{name: replace(speed, dims=()) for name, speed in SPEEDS.items()},
+    **OVER_TIME, **OF_EVENT, **OF_PICTURES,
+}  # fmt: skip
 
 
 def simulate_event(
@@ -130,7 +125,8 @@ class EventRecord:
         first, last = event.waves.slip.mean(), trial.waves.slip.mean()
         self._due = [first + share * (last - first) for share in PICTURE_SHARES]
         self.frames: list[dict[str, Any]] = []
-        self.blocks: list[tuple[float, Any]] = []
+        self.pictures: list[Any] = []
+        self.picture_times: list[float] = []
         nodes, count = problem.interface.size, event.mesh.heights.size - 1
         self._layers = [layer_matrix(event.mesh, row, nodes) for row in range(count)]
         self._begun = event.waves.slip.copy()
@@ -138,10 +134,10 @@ class EventRecord:
     def add(self) -> None:
         """Keep a frame of the present state, and a picture of the block if it is due."""
         problem, waves, sample = self.problem, self.event.waves, self.event.sample
-        initial, load = self.rows.initial_stress[0], self.event.before.load
+        now, before, initial = waves.now, self.event.before, self.rows.initial_stress[0]
         pieces = present_pieces(sample, waves.slip)
-        before = self.event.before.slip
-        held = initial.mean() + (load - float(problem.blocks.mean_relief(before)))
+        relief = float(problem.blocks.mean_relief(before.slip))
+        stress_before = initial.mean() + (before.load - relief)
         fields = {
             "slip": waves.slip.copy(),
             "slip_rate": waves.slip_rate.copy(),
@@ -152,27 +148,28 @@ class EventRecord:
             {name: fields[name] for name in self.save.fields}
             | self._energies()
             | {
-                "time": waves.now[NOW],
-                "load": load,
+                "time": now["time"],
+                "load": before.load,
                 "mean_stress": problem.interface.mean(fields["shear_stress"]),
                 "mean_slip": problem.interface.mean(waves.slip),
                 "top_slip_rate": waves.slip_rate.max(),
                 "moment_rate": moment_of(problem, waves.slip_rate),
                 "weakened_fraction": problem.interface.mean(residual_nodes(sample, waves.slip)),
-                "machine_stress": held + waves.now[FORCE] / problem.interface.measure,
-                "drive_travel": 2.0 * waves.now[TRAVEL],
+                "machine_stress": stress_before + now["force"] / problem.interface.measure,
+                "drive_travel": 2.0 * now["travel"],
             }
         )
         # Pictures at given shares of the slip show the event better than at equal
         # times.
         while self._due and self._due[0] <= waves.slip.mean():
             self._due.pop(0)
-            self.blocks.append((waves.now[NOW], waves.u_rate.copy()))
+            self.pictures.append(waves.u_rate.copy())
+            self.picture_times.append(float(now["time"]))
 
     def _energies(self) -> dict[str, float]:
         """Return the energies of both blocks, J/m, in the middle of the last step."""
         # Rates are known in the middle of a step, and displacements at its end.
-        mesh, waves = self.event.mesh, self.event.waves
+        mesh, waves, now = self.event.mesh, self.event.waves, self.event.waves.now
         velocities = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
         lag = mesh.viscous_time + 0.5 * mesh.step
         # w holds displacement and viscous time times rate, at the end of the step.
@@ -183,12 +180,12 @@ class EventRecord:
             strain += float(corners @ (matrix @ corners))
         added = waves.slip - self._begun - 0.5 * mesh.step * waves.slip_rate
         strain += 0.5 * mesh.spacing * float(added @ (mesh.correction @ added))
-        speed = waves.now[SPEED]
+        speed = now["speed"]
         if np.isfinite(mesh.stiffness):
-            strain += mesh.stiffness * (waves.now[TRAVEL] - 0.5 * mesh.step * speed) ** 2
+            strain += mesh.stiffness * (now["travel"] - 0.5 * mesh.step * speed) ** 2
         kinetic = (mesh.mass[:, None] * velocities**2).sum() + mesh.drive_mass * speed**2
         work = mesh.spacing * self.event.start @ added
-        friction = 2.0 * waves.now[FRICTION]
+        friction = 2.0 * now["friction"]
         return {
             "work": work,
             "friction_energy": friction,
@@ -199,12 +196,11 @@ class EventRecord:
 
     def dataset(self, method: Any, stopped: str, path: SamplePath) -> xr.Dataset:
         """Return the event's frames, pictures of the block, and all events on the path."""
-        problem, interface = self.problem, self.problem.interface
-        arrival = self.event.waves.arrival
-        reached = bool(np.isfinite(arrival).any())
-        first = (
-            int(np.nanargmin(arrival)) if reached else int(self.event.before.direction.argmax())
-        )
+        problem, interface, event = self.problem, self.problem.interface, self.event
+        arrival = event.waves.arrival
+        first = int(event.before.direction.argmax())
+        if np.isfinite(arrival).any():
+            first = int(np.nanargmin(arrival))
         values: dict[str, Any] = {
             name: np.array([frame[name] for frame in self.frames]) for name in self.frames[0]
         }
@@ -212,39 +208,29 @@ class EventRecord:
         values |= {
             "peak_strength": self.rows.strength[0],
             "arrival_time": arrival,
-            "block_velocity": np.array([velocities for _, velocities in self.blocks]),
-            "critical_load": self.event.before.load,
+            "block_velocity": np.array(self.pictures),
+            "critical_load": event.before.load,
             "critical_position": interface.x[first],
-            "onset_time": arrival[first] if reached else np.nan,
+            "onset_time": arrival[first],
             **front_speeds(problem, self.rows.steepest_weakening_rate, arrival),
         }
-        variables = {name: along(interface, FIELDS[name]) for name in self.save.fields}
-        variables |= OVER_TIME | OF_EVENT
-        variables |= {
-            "peak_strength": Variable("Pa", "peak strength tau_p", ("x",)),
-            "arrival_time": Variable("s", "arrival time of the front", ("x",)),
-            "block_velocity": Variable(
-                "m/s", "velocity along x in the upper block", BLOCK_DIMS
-            ),
-        }
-        variables |= (of_events := event_variables(interface, inertia=True))
+        of_events = event_variables(interface, inertia=True)
         values |= event_table(problem, self.rows, 0, path.all_events, of_events)
+        nodal = {name: FIELDS[name] for name in self.save.fields} | OVER_NODES
+        variables = {name: along(interface, variable) for name, variable in nodal.items()}
+        variables |= VARIABLES | of_events
         if problem.area is not None:
             values |= forces(values, problem.area)
             variables |= force_variables(variables)
         frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"])
         values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
+        taken = Variable("s", "time of a picture of the block", ("snapshot",))
+        above = Variable("m", "height above the interface", ("height",))
         coordinates = {
             "frequency": frequency,
             "time": (time, TIME),
-            "snapshot": (
-                np.array([at for at, _ in self.blocks]),
-                Variable("s", "time of a picture of the block", ("snapshot",)),
-            ),
-            "height": (
-                self.event.mesh.heights,
-                Variable("m", "height above the interface", ("height",)),
-            ),
+            "snapshot": (np.array(self.picture_times), taken),
+            "height": (event.mesh.heights, above),
         }
         attributes = study_attributes(problem=problem, method=method) | {"stopped": stopped}
         return to_dataset(values, variables, coordinates, attributes, interface)

@@ -34,14 +34,7 @@ from stiction.base.variables import Variable
 from stiction.methods.dynamics.mesh import Mesh, make_mesh
 from stiction.methods.dynamics.state import UNSTABLE_STRESS
 from stiction.methods.dynamics.summary import SPEEDS, front_speed
-from stiction.methods.dynamics.waves import (
-    FAST_RATE,
-    FAST_SINCE,
-    FAST_UNTIL,
-    Waves,
-    at_rest,
-    wave_steps,
-)
+from stiction.methods.dynamics.waves import Waves, block_at_rest, wave_steps
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.program import DenseProgram
@@ -102,8 +95,8 @@ class DynamicEvent:
     start : (n,) array
         Stress in the static state at the start, minus the initial stress, Pa.
     front : (n,) array
-        Slip, m, at which the front arrives at a node. Infinite if the front arrived
-        before the event.
+        Slip, m, at which the front arrives at a node. The front does not arrive again
+        at a node that has already slipped so far.
     slides : bool
         Whether every node has slipped.
     steps : int
@@ -165,8 +158,11 @@ def begin(
     # The initial growth is not the arrival of a front: put the threshold just
     # above it.
     front = arrival * sample.critical
-    front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), np.inf)
-    return DynamicEvent(sample, mesh, before, start, at_rest(mesh, slip), front)
+    front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), front)
+    waves = block_at_rest(mesh, slip)
+    typical = float(np.median(sample.excess - sample.residual))
+    waves.now["fast_slip_rate"] = UNSTABLE_STRESS * typical / mesh.impedance
+    return DynamicEvent(sample, mesh, before, start, waves, front)
 
 
 class RuptureProgram(DenseProgram):
@@ -191,12 +187,7 @@ class RuptureProgram(DenseProgram):
 
     def event(self, sample: StaticSample, unstable: EquilibriumState) -> DynamicEvent:
         """Return an event that is about to run from an instability."""
-        stiffness, solid = self.problem.blocks.stiffness, self.problem.solid
-        event = begin(sample, self.mesh, stiffness, unstable, self.arrival)
-        typical = float(np.median(sample.excess - sample.residual))
-        impedance = 0.5 * solid.shear_modulus / solid.shear_wave_speed
-        event.waves.now[FAST_RATE] = UNSTABLE_STRESS * typical / impedance
-        return event
+        return begin(sample, self.mesh, self.problem.blocks.stiffness, unstable, self.arrival)
 
     def jump(
         self, sample: StaticSample, unstable: EquilibriumState, to_rest: bool = False
@@ -216,8 +207,8 @@ class RuptureProgram(DenseProgram):
             stopped=True,
         )  # fmt: skip
         now = event.waves.now
-        timed = {"event_duration": now[FAST_UNTIL] - now[FAST_SINCE]}
-        return Jump(outcome, state, event.waves.arrival, timed)
+        duration = now["fast_until"] - now["fast_since"] if now["fast"] else np.nan
+        return Jump(outcome, state, event.waves.arrival, {"event_duration": duration})
 
 
 class RuptureSolver(OnsetSolver):

@@ -25,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.jit import jit
+from stiction.base.jit import jit, jit_inside
 from stiction.elasticity.operator import Transform
+from stiction.problem.friction.kernels import line_at, strength_at
 
 Ints = NDArray[np.int64]
 Spectrum = NDArray[np.complex128]
@@ -98,7 +99,7 @@ DIAGNOSTICS = np.dtype(
         ("maximum_load", "f8"),
         ("maximum_work", "f8"),
         ("maximum_node", "i8"),  # the fastest
-        # Instabilities. Stresses, times and loads are NaN until the first
+        # Instabilities. Stresses, times and loads have a meaning after the first
         # instability.
         ("instabilities", "i8"),  # number of instabilities so far
         ("in_event", "i8"),  # whether an instability is under way
@@ -111,6 +112,7 @@ DIAGNOSTICS = np.dtype(
         ("event_time", "f8"),  # when it began, s, at this load, Pa, after this work, J/m
         ("event_load", "f8"),
         ("event_work", "f8"),
+        ("fast", "i8"),  # whether a node slipped fast in the event, and if so
         ("fast_since", "f8"),  # first and last time above `unstable_slip_rate`
         ("fast_until", "f8"),  # in the event, s
         ("arrested_events", "i8"),
@@ -122,7 +124,7 @@ DIAGNOSTICS = np.dtype(
         ("onset_load", "f8"),
         ("onset_node", "i8"),
         ("all_broken", "i8"),  # whether all breakable nodes have reached residual strength
-        ("kinetic_stress", "f8"),  # mean stress when that happened
+        ("kinetic_stress", "f8"),  # if so, the mean stress when that happened
         # Choice of steps.
         ("phase", "i8"),  # a `Phase`
         ("next_size", "f8"),  # size that the next implicit step tries, s
@@ -171,7 +173,7 @@ class StepRecord(NamedTuple):
 class Thresholds(NamedTuple):
     """Thresholds at which steps change or end, from the method and the problem."""
 
-    slid_stop: float  # nodes at the residual strength at which to return
+    slid_stop: bool  # return once all nodes that can break are at the residual strength
     held: bool  # whether unbreakable nodes hold the interface; return after slip came to rest
     event_stop: bool  # return at an event
     rest_stop: bool  # return when all is at rest after an event
@@ -210,7 +212,7 @@ class Nodes(NamedTuple):
 
     peak: Array  # tau_p, Pa; infinite beyond the extent of the interface
     residual: Array  # tau_r, Pa
-    weakening: Array  # W at zero slip, Pa/m
+    weakening_rate: Array  # W at zero slip, Pa/m
     residual_slip: Array  # slip from which a node counts as being at its residual strength, m
     profile: Array  # p
     initial: Array  # tau_i, Pa
@@ -228,6 +230,24 @@ class Setting(NamedTuple):
     scale: PiecewiseLinear  # stress scale as a function of the load, Pa
     thresholds: Thresholds
     stations: Ints  # nodes that `StepRecord.stations` holds
+
+
+@jit_inside
+def node_strength(setting: Setting, i: int, slip: float) -> Any:
+    """Return the strength of node i after some slip (m), Pa."""
+    nodes = setting.nodes
+    return strength_at(
+        setting.law, nodes.peak[i], nodes.residual[i], nodes.weakening_rate[i], slip
+    )
+
+
+@jit_inside
+def node_line(setting: Setting, i: int, slip: float, ahead: float) -> Any:
+    """Return the straight line of strength of node i, as `friction.kernels.line_at` does."""
+    nodes = setting.nodes
+    return line_at(
+        setting.law, nodes.peak[i], nodes.residual[i], nodes.weakening_rate[i], slip, ahead
+    )
 
 
 class RuptureState(NamedTuple):
@@ -279,7 +299,8 @@ class ExplicitTables(NamedTuple):
 class ImplicitTables(NamedTuple):
     """Tables for implicit steps of a given size, with the work arrays of a run."""
 
-    valid_for: Array  # size (s) and ratio of the step of the tables; NaN before the first
+    filled: Ints  # (1,): whether the tables hold the values of a step
+    valid_for: Array  # size (s) and ratio of this step
     table: Array  # from here to `ramp_response`, see `memory.tabulate`
     ramp: Array
     response: Array

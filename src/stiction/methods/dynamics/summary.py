@@ -104,7 +104,7 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     drop = np.where(np.isfinite(nodes.peak), nodes.peak - nodes.residual, 0.0)
-    fracture = friction.dissipated(slip, drop, nodes.weakening)
+    fracture = friction.dissipated(slip, drop, nodes.weakening_rate)
     share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
     power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(slip_hat[1:]) ** 2
@@ -150,9 +150,10 @@ def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
     return speeds
 
 
-def _critical_load(run: Run, now: Any, stress: float) -> float:
+def _critical_load(run: Run, now: Any) -> float:
     """Return the load, Pa, that carries the critical stress. NaN if the start was overstressed."""
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
+    stress = float(now["onset_stress"])
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     began = now["start_load"] * nodes.profile + nodes.initial
     overstressed = bool(np.any(began - nodes.peak > margin))
@@ -162,33 +163,34 @@ def _critical_load(run: Run, now: Any, stress: float) -> float:
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     """Return the scalars of a finished run, with NaN for events that did not happen."""
     interface, now = run.medium.interface, state.now
-    stresses = ("onset_stress", "critical_stress", "first_stress", "kinetic_stress")
-    onset, critical, first, kinetic = (float(now[name]) for name in stresses)
+    unstable, broken = now["instabilities"] > 0, bool(now["all_broken"])
     # In a run to sliding, or to an end time, the interface may have survived.
-    if np.isnan(kinetic) and run.stop in ("sliding", "time"):
-        critical = np.nan
+    failed = unstable and (broken or run.stop not in ("sliding", "time"))
+    critical = float(now["critical_stress"]) if failed else np.nan
+    kinetic = float(now["kinetic_stress"]) if broken else np.nan
     node = np.unravel_index(int(now["onset_node"]), interface.shape)
     energies = energy_balance(run, state)
     values: dict[str, Any] = {
-        "critical_load": np.nan if np.isnan(critical) else _critical_load(run, now, onset),
+        "critical_load": _critical_load(run, now) if failed else np.nan,
         "critical_stress": critical,
-        "first_instability": first,
+        "first_instability": float(now["first_stress"]) if unstable else np.nan,
         "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
-        "applied_load": float(now["onset_load"]),
+        "applied_load": float(now["onset_load"]) if unstable else np.nan,
+        "onset_time": float(now["onset_time"]) if unstable else np.nan,
         "kinetic_stress": kinetic,
         "stress_drop": critical - kinetic,
         "seismic_moment": moment_of(run.medium.problem, state.slip),
         "arrested_events": int(now["arrested_events"]),
         "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
         **{name: energies[name] for name in ("radiated_energy", "fracture_energy")},
-        **{name: float(now[name]) for name in ("onset_time", "start_load", "start_error")},
+        **{name: float(now[name]) for name in ("start_load", "start_error")},
         **{name: int(now[name]) for name in ("implicit_steps", "explicit_steps")},
     }
     if not interface.is_plane:
         values["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
     for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & values.keys():
         # A number on a line, and on a plane a number along x and a number along y.
-        along = np.where(np.isnan(onset), np.nan, values[name])
+        along = np.where(unstable, values[name], np.nan)
         values[name] = along if interface.is_plane else along[0]
     return values
 

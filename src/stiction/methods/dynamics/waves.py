@@ -33,6 +33,7 @@ row below it moves.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating, jit_inside
@@ -62,29 +63,40 @@ class Waves(NamedTuple):
     """Stress of the static correction, (nodes,), Pa."""
     arrival: Array
     """Time at which the front arrives, (nodes,), s."""
-    now: Array
-    """Values in the order of `NOW`."""
+    totals: NDArray[Any]
+    """(1,) array of `TOTALS`."""
+
+    @property
+    def now(self) -> Any:
+        """Totals, by name."""
+        return self.totals[0]
 
 
-NOW = (
-    "time", "travel", "speed", "force", "friction", "fast rate", "fast since", "fast until"
-)  # fmt: skip
-"""Time (s), travel (m) and speed (m/s) of a block's drive, change of its force (N/m), and energy
-that friction took from a block (J/m). A slip rate that counts as fast (m/s), and when a node first
-and last slipped faster (s, NaN before)."""
-TIME, TRAVEL, SPEED, FORCE, FRICTION, FAST_RATE, FAST_SINCE, FAST_UNTIL = range(8)
+TOTALS = np.dtype(
+    [
+        ("time", "f8"),  # s
+        ("travel", "f8"),  # of the drive of a block, m
+        ("speed", "f8"),  # of this drive, m/s
+        ("force", "f8"),  # change of the force of this drive, N/m
+        ("friction", "f8"),  # energy that friction took from a block, J/m
+        ("fast_slip_rate", "f8"),  # slip rate that counts as fast, m/s
+        ("fast", "i8"),  # whether a node has slipped faster, and if so
+        ("fast_since", "f8"),  # when this first happened, s,
+        ("fast_until", "f8"),  # and when it last happened
+    ]
+)
+"""Numbers of an event so far."""
 
 
-def at_rest(mesh: Mesh, slip: Array) -> Waves:
+def block_at_rest(mesh: Mesh, slip: Array) -> Waves:
     """Return a block at rest whose interface has a given slip (m)."""
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
     slip_rate, stress, corrected = np.zeros((3, slip.size))
     arrival = np.full(slip.size, np.nan)
-    now = np.zeros(len(NOW))
-    now[FAST_RATE], now[FAST_SINCE:] = np.inf, np.nan
+    totals = np.zeros(1, TOTALS)
     return Waves(
-        u, v, u_rate, v_rate, slip.copy(), slip_rate, stress, corrected, arrival, now
-    )  # fmt: skip
+        u, v, u_rate, v_rate, slip.copy(), slip_rate, stress, corrected, arrival, totals
+    )
 
 
 @jit_inside
@@ -137,7 +149,7 @@ def _slide(
 ) -> int:
     """Step 3: move the nodes of the interface. Return how many nodes never slipped."""
     dx, step = mesh.spacing, mesh.step
-    slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.now
+    slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.totals[0]
     never, fast = 0, False
     for i in range(slip.shape[0]):
         # In double precision, since slip adds up many small increments.
@@ -152,18 +164,18 @@ def _slide(
             waves.stress[i] = free / (gain * dx)
         added = 2.0 * step * after  # both blocks move
         if slip[i] < front[i] <= slip[i] + added:
-            waves.arrival[i] = now[TIME] + step * (front[i] - slip[i]) / added
+            waves.arrival[i] = now.time + step * (front[i] - slip[i]) / added
         slip[i] += added
         waves.slip_rate[i] = 2.0 * after
         # The work of friction, with the mean of the rates before and after the step.
-        now[FRICTION] += 0.5 * dx * step * waves.stress[i] * (before + after)
+        now.friction += 0.5 * dx * step * waves.stress[i] * (before + after)
         u[i] += np.float32(step * after + mesh.viscous_time * (after - before))
         velocities[i] = np.float32(after)
         never += slip[i] == 0.0
-        fast |= 2.0 * after > now[FAST_RATE]
+        fast |= 2.0 * after > now.fast_slip_rate
     if fast:
-        now[FAST_SINCE] = now[TIME] if np.isnan(now[FAST_SINCE]) else now[FAST_SINCE]
-        now[FAST_UNTIL] = now[TIME]
+        now.fast_since = now.fast_since if now.fast else now.time
+        now.fast, now.fast_until = 1, now.time
     # Update the stress of the correction by the added slip only: most nodes rest
     # most of the time.
     for j in range(slip.shape[0]):
@@ -178,25 +190,25 @@ def _slide(
 @jit_inside
 def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     """Step 4: move the top with its platen and spring, or hold the top."""
-    now, top, step = waves.now, waves.u.shape[0] - 1, mesh.step
+    now, top, step = waves.totals[0], waves.u.shape[0] - 1, mesh.step
     total = 0.0
     for i in range(force.shape[0]):
         total += force[i]
-    before = now[SPEED]
+    before = now.speed
     if mesh.stiffness == np.inf:  # the drive holds the top, and balances its force
-        now[FORCE] = -total
+        now.force = -total
         return
     mass = force.shape[0] * mesh.mass[top]
     # The spring acts at the mean travel of the step, which keeps stiff machines
     # stable.
     inert = (mass + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
     lost = 0.5 * mesh.attenuation * mass
-    total -= mesh.stiffness * now[TRAVEL]
+    total -= mesh.stiffness * now.travel
     after = ((inert - lost) * before + total) / (inert + lost)
-    now[SPEED] = after
-    now[TRAVEL] += step * after
-    now[FORCE] = -mesh.stiffness * now[TRAVEL]
-    w, velocity = np.float32(now[TRAVEL] + mesh.viscous_time * after), np.float32(after)
+    now.speed = after
+    now.travel += step * after
+    now.force = -mesh.stiffness * now.travel
+    w, velocity = np.float32(now.travel + mesh.viscous_time * after), np.float32(after)
     for i in range(force.shape[0]):
         waves.u[top, i] = w
         waves.u_rate[top, i] = velocity
@@ -209,21 +221,21 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     The force F changes the speed of the pusher from v to v + g F, with the mobility g of the pushed
     nodes.
     """
-    now, step, last = waves.now, mesh.step, waves.u.shape[1] - 1
+    now, step, last = waves.totals[0], mesh.step, waves.u.shape[1] - 1
     mobility = speed = 0.0
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):
             mobility += mesh.push[j, side] ** 2 * gains[j]
             speed += mesh.push[j, side] * waves.u_rate[j, i]
-    before = now[SPEED]
+    before = now.speed
     if mesh.stiffness == np.inf:  # the force that stops the pushed nodes
         force = -speed / mobility
     else:
         a = 0.5 * mesh.stiffness * step + mesh.drive_mass / step
-        force = -(mesh.stiffness * now[TRAVEL] + a * (speed - before)) / (1.0 + a * mobility)
-    now[SPEED] = speed + mobility * force
-    now[TRAVEL] += step * now[SPEED]
-    now[FORCE] = force if mesh.stiffness == np.inf else -mesh.stiffness * now[TRAVEL]
+        force = -(mesh.stiffness * now.travel + a * (speed - before)) / (1.0 + a * mobility)
+    now.speed = speed + mobility * force
+    now.travel += step * now.speed
+    now.force = force if mesh.stiffness == np.inf else -mesh.stiffness * now.travel
     if force == 0.0:
         return
     for j in range(gains.shape[0]):
@@ -277,7 +289,7 @@ def wave_steps(
                 _move(v[i], v_rate[i], across[i % 2], keep_row, gain, step, lag)
         if not mesh.platen:
             _move_pusher(mesh, waves, gains)
-        waves.now[TIME] += mesh.step
+        waves.totals[0].time += mesh.step
         if ends and never == 0:
             return taken + 1
     return steps
