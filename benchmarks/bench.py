@@ -196,27 +196,6 @@ def equilibrium():
 
 
 @case
-def residual_strength():
-    """Exact onsets where nodes reach their residual strength, and where events are arrested."""
-    marginal = st.Lognormal(mean=1e6, cv=0.3)
-    cases = {
-        "uniform d_c": ({"critical_slip": 2e-6, "residual_strength": 0.3e6}, marginal),
-        "tau_r = 0.5 MPa": ({"weakening_rate": 0.5e12, "residual_strength": 0.5e6}, None),
-        "tau_r = 0.6 MPa": ({"weakening_rate": 0.5e12, "residual_strength": 0.6e6}, None),
-    }
-    for name, (law, own) in cases.items():
-        problem = line(2048, **law)
-        tau_p = field(1.7e-3, own).sample(problem.interface, samples=16, seed=0)
-        tau_p = np.maximum(tau_p, 1.001 * law["residual_strength"])
-        ours, found = solver_time(problem, st.Equilibrium(), tau_p, 3)
-        free = line(2048)
-        plain, _ = solver_time(free, st.Equilibrium(), tau_p, 3)
-        arrested = int(np.sum(found["arrested_events"] > 0))
-        note = f"{arrested} of 16 with arrested events; without residual strength"
-        row(name, ours, (), f"{note} {plain * 1e3:.2f} ms")
-
-
-@case
 def specimens():
     """Response of blocks beside inverting K, and their onsets beside those of half-spaces."""
     free = line()
@@ -404,28 +383,6 @@ def reliability():
     cv = result.getCoefficientOfVariation()
     note = f"P = {result.getProbabilityEstimate():.1e} ({cv:.2f})"
     row("OpenTURNS, local, 661.6 kPa", spent, (), note)
-
-
-@case
-def store():
-    """A stored run, beside the same samples in memory and beside the bare solver."""
-    problem = st.paper.problem(nodes=1024)
-    strength = st.paper.strength(problem, correlation_ratio=0.5)
-    samples = st.Ensemble(samples=4000)
-    study = st.Study(
-        problem=problem, random=strength, method=st.Equilibrium(), ensemble=samples
-    )
-    sample = partial(strength.sample, problem.interface, samples=4000, seed=0)
-    solver, rows = st.Equilibrium().prepare(problem), problem.sample(sample())
-    plain = timed(lambda: solver(rows), 3) + timed(sample, 3)
-
-    def stored():
-        with tempfile.TemporaryDirectory() as folder:
-            study.run(out=os.path.join(folder, "run"), workers=1, progress=False)
-
-    memory = timed(lambda: study.run(workers=1, progress=False), 3)
-    ours = timed(stored, 3)
-    row("4,000 samples, stored", ours, [("in memory", memory), ("bare solver", plain)])
 
 
 @case

@@ -1,4 +1,4 @@
-"""The two pictures of the README: the Monte Carlo study, and one rupture in space and time.
+"""The picture of the README: the Monte Carlo study.
 
 Run it with ``python examples/pictures.py [folder]``; it takes about half a minute.
 """
@@ -23,7 +23,7 @@ PIXELS = 1400
 def main(
     folder: str | Path = "docs/images", samples: int = 10_000, nodes: int = 1024
 ) -> list[float]:
-    """Draw both; the median critical stress at the ends of the range, MPa."""
+    """Draw it; return the median critical stress at the ends of the range, MPa."""
     folder = Path(folder)
     problem = st.paper.problem(nodes=nodes)
     onsets, profiles = {}, {}
@@ -34,11 +34,6 @@ def main(
         )
         profiles[ratio] = strength.sample(problem.interface, samples=min(samples, 2000), seed=0)
     save(monte_carlo(problem, onsets, profiles), folder / "monte_carlo.png")
-    run = st.simulate_rupture(
-        problem, profiles[RATIOS[0]][0], method=st.Rupture(loading_rate=2e7),
-        save=st.Save(every=4),
-    )  # fmt: skip
-    save(rupture(run, problem), folder / "rupture.png")
     return [1e-6 * float(onsets[ratio].critical_stress.median()) for ratio in RATIOS[::3]]
 
 
@@ -103,14 +98,6 @@ def monte_carlo(
 def _density(axes: Axes, values: Any, index: int) -> None:
     estimate = st.statistics.density(values, bounds=(0.66, 1.66))
     axes.plot(estimate.value, estimate.x, color=color(index), linewidth=1.0)
-
-
-def rupture(run: xr.Dataset, problem: st.Problem) -> Figure:
-    """Slip rate in space and time."""
-    with paper_style():
-        figure = Figure(figsize=(PAGE, 3.4))
-        st.plot.rupture(run, problem=problem, ax=figure.subplots())
-    return figure
 
 
 if __name__ == "__main__":

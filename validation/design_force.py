@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.stats
-from design_force_closed import SCATTER, factors, law
+from design_force_closed import SCATTER, factors, law, student
 
 import stiction as st
 from stiction.inference import bootstrap
@@ -97,9 +97,7 @@ def campaign(truth, seed, method):
         for name, right in (("strength.mean", 1e6), ("between.strength", SCATTER)):
             low, high = np.quantile(draws[name], [0.05, 0.95])
             held.append(low < right < high)
-    logs = np.log(peaks)
-    t = scipy.stats.t.ppf(PROMISED, TESTS - 1) * np.sqrt(1.0 + 1.0 / TESTS)
-    designs.append(np.exp(logs.mean() + t * logs.std(ddof=1)))
+    designs.append(student(peaks))
     p = min(both.agreement.p_values.values())
     return np.array(designs), [*held, False, False], p
 

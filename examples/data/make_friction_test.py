@@ -14,16 +14,12 @@ import numpy as np
 
 import stiction as st
 
+DRIVE = st.Pusher(height=0.01, width=0.004, stiffness=2e7)
 PROBLEM = st.Problem(
     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
     interface=st.Interface(length=0.1, nodes=256),
     friction=st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.35e6),
-    specimen=st.Blocks(
-        height=0.05,
-        thickness=0.006,
-        drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7),
-        pressing="glued",
-    ),
+    specimen=st.Blocks(height=0.05, thickness=0.006, drive=DRIVE, pressing="glued"),
     load=st.Load(pressing_force=3e3),
 )
 FIELD = st.RandomField(

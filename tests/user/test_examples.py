@@ -38,39 +38,18 @@ def critical_slip(found):
     assert float(change.mean()) < -2.0 * float(change.std()) / np.sqrt(change.size)
 
 
-def failure(found):
-    """Two methods agree in the tail, and P = 1e-6 lies between 1 and 3 kPa above the bound."""
-    one, other = found["found"], found["again"]
-    error = np.hypot(one.cv, other.cv)  # joint
-    assert abs(np.log(one.probability / other.probability)) < 4.0 * error
-    assert 1e3 < found["design"].stress_above_bound < 3e3
-
-
-def stored(found):
-    """All is there; longer correlation lowers the static strength."""
-    assert found["status"].done == found["status"].samples == 3000
-    medians = found["result"].critical_stress.median("sample").values
-    assert np.all(np.diff(medians) < 0.0)
-
-
 CHECKS = {
     "my_method": method,
     "correlated_residual_strength": correlated,
     "random_critical_slip": critical_slip,
-    "failure_probability": failure,
-    "stored_sweep": stored,
 }
-QUICK = CHECKS.keys() - {"failure_probability"}  # tests/oracle compares the same two methods
-HOW_TOS = [
-    "my_measured_profile", "my_spectrum", "nonuniform_load", "scanned_interface",
-    "between_specimens", "one_rupture", "arrested_events", *CHECKS,
-]  # fmt: skip
+HOW_TOS = ["my_spectrum", "nonuniform_load", "between_specimens", "arrested_events", *CHECKS]
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in HOW_TOS],
+    [pytest.param(name, marks=() if name in CHECKS else pytest.mark.slow) for name in HOW_TOS],
 )
 def test_a_how_to(name, monkeypatch, tmp_path, capsys):
     """Those without a check run whenever the pages are built: their gallery is made of them."""
@@ -90,6 +69,18 @@ def test_a_how_to(name, monkeypatch, tmp_path, capsys):
 def test_the_tables_list_every_how_to():
     text = (ROOT / "examples" / "README.md").read_text()
     assert [name for name in HOW_TOS if f"]({name}.py)" not in text] == []
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_simulated_campaigns_of_inference():
+    """A campaign of validation/inference.py in small: the script calls the package as it is."""
+    inference = load("inference")
+    for case in inference.cases().values():
+        names, ranks = inference.ranks(1, case, samples=60, points=10 ** len(case.prior))
+        assert names == tuple(case.prior)
+        assert ranks.shape == (1, len(names))
+        assert ((ranks >= 0) & (ranks <= inference.DRAWS)).all()
 
 
 # -- docs/rupture-benchmarks.md, coarser: the community's fault, and its line ----------------------
