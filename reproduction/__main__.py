@@ -22,7 +22,6 @@ FIGURES = TEXTS["figure"]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
     options = _options(arguments)
     import stiction as st
     from reproduction import claims, page, runner
@@ -116,12 +115,13 @@ def _drawn(data, chosen: int | None) -> list[int]:
 def _draw(data, number: int, folder: Path) -> Path:
     """Draw a figure as soon as its studies are done, and return its file."""
     import stiction as st
-    from reproduction.figures import beyond, paper
+    from reproduction.figures import beyond, common, paper
 
     folder.mkdir(parents=True, exist_ok=True)
     module = paper if number <= 7 else beyond
     with st.plot.paper_style():
-        figure = getattr(module, f"figure_{number}")(data)
+        figure, *panels = getattr(module, f"figure_{number}")(data)
+        common.letters(*panels)
         path = folder / f"figure_{number:02}.png"
         figure.savefig(path, dpi=200)
     return path

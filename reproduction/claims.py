@@ -111,14 +111,6 @@ def series(quantity: Sequence[str], data: Data, key: str = "") -> Series:
     return Series(f"({key}) {label}" if key else label, unit, values)
 
 
-def verdicts(rule: Rule, cases: Mapping[str, Sequence[Series]]) -> dict[str, Verdict]:
-    """Return the verdict of a rule on each case."""
-    return {
-        key: rule([[number for _, number in row.rows] for row in judged])
-        for key, judged in cases.items()
-    }
-
-
 def judge(claim: Claim, data: Data) -> Finding | None:
     """Compute the numbers of a claim and apply its rule; None if a study is left out.
 
@@ -143,11 +135,15 @@ def judge(claim: Claim, data: Data) -> Finding | None:
 
 def decide(claim: Claim, cases: Mapping[str, Sequence[Series]], beside=()) -> Finding:
     """Apply the rule of a claim to its numbers in each reading."""
-    readings = verdicts(claim.rule, cases)
+    numbers = {
+        key: [[number for _, number in row.rows] for row in judged]
+        for key, judged in cases.items()
+    }
+    readings = {key: claim.rule(rows) for key, rows in numbers.items()}
     verdict, otherwise = together(readings.values()), {}
     for factor, text in ((0.5, "half"), (2.0, "twice")):
         with limits_times(factor):
-            moved = together(verdicts(claim.rule, cases).values())
+            moved = together(claim.rule(rows) for rows in numbers.values())
         if moved is not verdict:
             otherwise[text] = moved
     judged = [row for rows in cases.values() for row in rows]

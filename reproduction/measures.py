@@ -59,16 +59,10 @@ def slope(d: Data) -> float:
     return float(np.diff(np.log(rows))[0] / np.diff(np.log(rows.ratio))[0])
 
 
-def remaining_deviations() -> Rows:
-    """Return the root of 1 - Var[tau_n]/Var[tau_p] at long correlation."""
-    ratios = (2.0, 4.0, 8.0, 16.0)
-    return [(r, Number(math.sqrt(1.0 - infinite_variance_ratio(r)))) for r in ratios]
-
-
-def short_deviations() -> Rows:
-    """Return the standard deviation of tau_n over that of tau_p at short correlation."""
-    ratios = (0.02, 0.05, 0.1, 0.2)
-    return [(r, Number(math.sqrt(infinite_variance_ratio(r)))) for r in ratios]
+def deviations(*ratios: float, remaining: bool = False) -> Rows:
+    """Return the root of Var[tau_n]/Var[tau_p], or of the remaining share."""
+    shares = [(ratio, infinite_variance_ratio(ratio)) for ratio in ratios]
+    return [(r, Number(math.sqrt(1.0 - share if remaining else share))) for r, share in shares]
 
 
 def from_normal(d: Data, ratio: float) -> Number:
@@ -243,16 +237,10 @@ def most_arrested(d: Data) -> tuple[float, Number]:
     return max(shares.items(), key=lambda item: item[1].value)
 
 
-def with_inertia(d: Data, ratio: float) -> Number:
-    """Return the share of samples with an arrested event, with inertia."""
-    return arrested(d, ratio, "dynamic")
-
-
-def rarer(d: Data, function) -> Rows:
+def rarer(d: Data, study: str) -> Rows:
     """Return by how much the last share of arrested samples exceeds the first two."""
-    return [
-        (f"less the share at {r:g}", function(d, LAST) - function(d, r)) for r in RATIOS[:2]
-    ]
+    shares = {ratio: arrested(d, ratio, study) for ratio in (*RATIOS[:2], LAST)}
+    return [(f"less the share at {r:g}", shares[LAST] - shares[r]) for r in RATIOS[:2]]
 
 
 def _over_griffith(d: Data, name: str) -> np.ndarray:
@@ -291,7 +279,7 @@ def arrest_shares(d: Data, name: str, chosen=None) -> Rows:
 def so_many(d: Data, name: str, point: int) -> Number:
     """Return the chance of as many ruptures with an arrested event as at a point of a what-if."""
     events = d[f"{name}-inertia"]["arrested_events"].isel(point=point).values > 0
-    return estimates.chance_of_so_many(events, with_inertia(d, setting.SECOND))
+    return estimates.chance_of_so_many(events, arrested(d, setting.SECOND, "dynamic"))
 
 
 def skewed(d: Data, skew: int, ratio: float) -> np.ndarray:

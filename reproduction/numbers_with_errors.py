@@ -80,7 +80,6 @@ def _estimate(value, influence) -> Number:
 
 
 def mean(values) -> Number:
-    """Return the mean."""
     values = np.ravel(values)
     return Number(float(values.mean()), float(values.std(ddof=1)) / math.sqrt(values.size))
 
@@ -95,12 +94,10 @@ def deviation(values) -> Number:
 
 
 def variation(values) -> Number:
-    """Return the coefficient of variation."""
     return deviation(values) / float(np.mean(values))
 
 
 def skewness(values) -> Number:
-    """Return the skewness."""
     values = np.ravel(values)
     u = (values - values.mean()) / values.std()
     g = float(np.mean(u**3))
@@ -123,7 +120,6 @@ def chance_of_so_many(events, usual: Number) -> Number:
 
 
 def root_mean_square(values) -> Number:
-    """Return the root mean square."""
     square = mean(np.ravel(values) ** 2)
     root = math.sqrt(square.value)
     return Number(root, square.error / (2.0 * root) if root else 0.0)
@@ -137,7 +133,6 @@ def _quantile_influence(values, p: float):
 
 
 def quantile(values, p: float) -> Number:
-    """Return a quantile."""
     return _estimate(*_quantile_influence(np.ravel(values), p))
 
 

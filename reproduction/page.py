@@ -39,13 +39,7 @@ def physics(text: str) -> Markup:
     return Markup(plain.replace(" +- ", " ± "))
 
 
-OUTCOMES = {
-    Verdict.HOLDS: "Confirmed",
-    Verdict.CORRECTED: "Confirmed with a correction",
-    Verdict.FAILS: "Not confirmed",
-    Verdict.OPEN: "Undecided",
-    Verdict.TEXT: "Undecided from the text",
-}
+OUTCOMES = {Verdict[name]: text for name, text in TEXTS["outcome"].items()}
 
 
 def outcome(data: Data, name: str) -> str:
@@ -61,13 +55,8 @@ def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool)
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
     JINJA.filters |= {"number": rounded, "short": short}
     environment.filters |= JINJA.filters | {"physics": physics}
-    known = NAMES | {
-        "d": data,
-        "own": PARAMETERS,
-        "OUTCOMES": OUTCOMES,
-        "below": below,
-        "outcome": functools.partial(outcome, data),
-    }
+    known = NAMES | {"d": data, "own": PARAMETERS, "OUTCOMES": OUTCOMES, "below": below}
+    known["outcome"] = functools.partial(outcome, data)
 
     def filled(text: str) -> str:
         """Return a text with its numbers, or nothing if one of its studies is left out."""
@@ -85,21 +74,12 @@ def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool)
         for number in images if (about := TEXTS["figure"][str(number)])
     ]  # fmt: skip
     template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
+    known |= {"texts": TEXTS, "figures": figures, "groups": groups, "done": done}
+    known |= {"verdicts": Verdict, "modulus": modulus, "runner": runner, "warnings": warned}
     text = template.render(
-        known,
-        short=[line for line in map(filled, TEXTS["short"]) if line],
-        figures=figures,
-        done=done,
-        texts=TEXTS,
-        groups=groups,
-        verdicts=Verdict,
-        modulus=modulus,
-        runner=runner,
-        seconds=time.monotonic() - runner.began,
-        version=version,
-        platform=platform,
-        warnings=warned,
-    )
+        known, short=[line for line in map(filled, TEXTS["short"]) if line], version=version,
+        platform=platform, seconds=time.monotonic() - runner.began,
+    )  # fmt: skip
     unfinished = path.with_suffix(".unfinished")
     unfinished.write_text(text, encoding="utf-8")
     unfinished.replace(path)

@@ -90,12 +90,10 @@ def within(low: float, high: float, why: str = "", *, share: bool = False) -> Ru
 
 
 def below(limit: float, why: str = "", *, share: bool = False) -> Rule:
-    """Every number is below a limit."""
     return within(-math.inf, limit, why, share=share)
 
 
 def above(limit: float, why: str = "", *, share: bool = False) -> Rule:
-    """Every number is above a limit."""
     return within(limit, math.inf, why, share=share)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 import stiction as st
-from reproduction import PARAMETERS, setting
+from reproduction import PARAMETERS, TEXTS, setting
 from reproduction.runner import Runner, along, kept
 from reproduction.setting import FIRST, MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
@@ -20,14 +20,8 @@ NORMAL = np.linspace(-2.0, 2.0, 17)
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LOAD_SHARES = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
-READINGS = {
-    "a": "plane stress throughout",
-    "b": "plane strain throughout",
-    "c": "plane-stress simulations, printed modulus in the prediction and in xi_0/h_n",
-    "c'": "plane-stress simulations, printed modulus in the prediction only",
-}
-
-
+READINGS = TEXTS["reading"]
+"""The interpretations of the modulus, by their letters."""
 SWEEPS = {
     "local": ("Onsets by the local criterion", PROBLEM, LOCAL, "samples", RATIOS),
     "exact": ("Onsets by exact equilibrium, with interaction", PROBLEM, EXACT, "samples", RATIOS),
@@ -119,7 +113,7 @@ def infinite_variance_ratio(ratio: float) -> float:
 
 def readings(run: Runner) -> xr.Dataset:
     """Onsets under four readings of the modulus, for all that is printed and depends on it."""
-    count = run.size.readings
+    count, interface = run.size.readings, PROBLEM.interface
 
     def in_printed(ratio: float):
         return strength(ratio, nucleation_length=setting.PRINTED_H)
@@ -147,27 +141,22 @@ def readings(run: Runner) -> xr.Dataset:
         gap = setting.distance(predicted["critical_position"], place)
         least = []  # tau_n at the place of the simulated onset
         for ratio, row in zip(SIMULATED, place.values, strict=True):
-            tau_p = field_of(ratio).sample(
-                PROBLEM.interface, samples=count, seed=run.seed_of(ratio)
-            )
-            away = setting.distance(PROBLEM.interface.x[None, :], row[:, None])
+            tau_p = field_of(ratio).sample(interface, samples=count, seed=run.seed_of(ratio))
+            away = setting.distance(interface.x[None, :], row[:, None])
             tau_n = st.theory.nucleation_stress(problem, tau_p)
             least.append(np.where(away < 0.5 * length, tau_n, np.inf).min(axis=1))
-        parts.append(
-            xr.Dataset(
-                {
-                    "simulated": stress,
-                    "predicted": predicted["first_instability"],
-                    "excess": predicted["first_instability"] / stress - 1.0,
-                    "consistent_excess": by_one_modulus["first_instability"] / stress - 1.0,
-                    "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
-                    "patches": simulated["slip_patches"],
-                    "contest": least / predicted["first_instability"] - 1.0,
-                    "helped": least / stress - 1.0,
-                    "length": length / setting.L,
-                }
-            ).drop_vars("sample", errors="ignore")
-        )
+        variables = {
+            "simulated": stress,
+            "predicted": predicted["first_instability"],
+            "excess": predicted["first_instability"] / stress - 1.0,
+            "consistent_excess": by_one_modulus["first_instability"] / stress - 1.0,
+            "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
+            "patches": simulated["slip_patches"],
+            "contest": least / predicted["first_instability"] - 1.0,
+            "helped": least / stress - 1.0,
+            "length": length / setting.L,
+        }
+        parts.append(xr.Dataset(variables).drop_vars("sample", errors="ignore"))
     return along("reading", list(READINGS), parts)
 
 
@@ -354,14 +343,10 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=number)[0]
         static = st.onset(PROBLEM, tau_p, method=st.Equilibrium(events=1), progress=False)
         moving = st.onset(PROBLEM, tau_p, method=RUPTURE, progress=False)
-        length, events = (
-            static["event_length"].values[0, 0],
-            moving["arrested_events"].values[0],
-        )
-        return xr.Dataset({"length": length, "dynamic": events})
+        length, count = static["event_length"].values[0, 0], moving["arrested_events"].values[0]
+        return xr.Dataset({"length": length, "dynamic": count})
 
-    parts = run.map(again, chosen)
-    names = ("length", "dynamic")
+    parts, names = run.map(again, chosen), ("length", "dynamic")
     return xr.Dataset(
         {name: ("event", [float(part[name]) for part in parts]) for name in names}
     )

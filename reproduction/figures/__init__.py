@@ -1,1 +1,1 @@
-"""Figures of one column: each is a function of the studies and returns a matplotlib figure."""
+"""Figures of one column: each function returns a matplotlib figure and its lettered panels."""

@@ -8,7 +8,6 @@ from reproduction.setting import HIGH, LOW, MEAN, RATIOS
 
 WIDTH = 4.5
 """Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
-INK, QUIET, PALE, ACCENT = "#1a1a1a", "#7a7a7a", "#d9d9d9", "#b5322a"
 DASHES = ("-", "--", "-.", ":", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (2.5, 2.5)))
 STRENGTHS = (LOW / MEAN, HIGH / MEAN)
 """The range of the strength over its mean."""
@@ -19,14 +18,19 @@ OVER_MEAN = r"/\langle\tau_\mathrm{p}\rangle$"
 
 
 def new(height: float) -> Figure:
-    """Return an empty figure of one column."""
     return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
-def mosaic(height: float, rows, height_ratios, **shape):
-    """Return a figure of one column and its panels by name, as `Figure.subplot_mosaic` does."""
+def stacked(height: float, count: int, ratios=None, **shape):
+    """Return a figure of one column, and its panels below each other."""
     figure = new(height)
-    return figure, figure.subplot_mosaic(rows, height_ratios=height_ratios, **shape)
+    return figure, *np.ravel(figure.subplots(count, height_ratios=ratios, **shape))
+
+
+def mosaic(height: float, rows, height_ratios, **shape):
+    """Return a figure of one column and its panels, as `Figure.subplot_mosaic` places them."""
+    figure = new(height)
+    return figure, *figure.subplot_mosaic(rows, height_ratios=height_ratios, **shape).values()
 
 
 def line(ratio: float) -> dict:

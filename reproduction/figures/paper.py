@@ -7,7 +7,7 @@ from scipy.stats import norm
 import stiction as st
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import ACCENT, INK, MEAN_P, OVER_MEAN, PALE, QUIET, TAU_CR, XI
+from reproduction.figures.common import MEAN_P, OVER_MEAN, TAU_CR, XI
 from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
@@ -22,16 +22,15 @@ X = PROBLEM.interface.x / L
 def figure_1(d: Data):
     """Draw the system, the load, the friction law, and one field with its statistics."""
     rows = (8 * ["system"], 4 * ["load"] + 4 * ["law"], 6 * ["field"] + 2 * ["density"])
-    figure, panels = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
-    system, load, law, field, density = panels.values()
+    figure, system, load, law, field, density = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
     _system(system)
     load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color="C0")
-    load.plot(1, 1, "o", color=INK, ms=4)
+    load.plot(1, 1, "o", color="black", ms=4)
     load.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
     load.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
-    for peak, style, colour in ((1.0, "-", "C0"), (0.8, "--", QUIET), (1.2, "--", QUIET)):
+    for peak, style, colour in ((1.0, "-", "C0"), (0.8, "--", "grey"), (1.2, "--", "grey")):
         law.plot([0, peak - 0.2, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
-    law.plot([0.8, 0.8], [0, 0.2], ":", color=INK, lw=0.8)
+    law.plot([0.8, 0.8], [0, 0.2], ":", color="black", lw=0.8)
     law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
     law.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
     law.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
@@ -46,7 +45,7 @@ def figure_1(d: Data):
         ("correlation", "-", r"$\tau_\mathrm{p}$"), ("gaussian_correlation", ":", "$z$")
     ):  # fmt: skip
         correlation = d.at("theory", name, FIRST)
-        inset.plot(X * L / H, correlation, style, color=INK, lw=0.9, label=label)
+        inset.plot(X * L / H, correlation, style, color="black", lw=0.9, label=label)
     inset.set(xlim=(0, 2.4 * FIRST), ylabel=r"$C$", yticks=(0, 1))
     inset.text(1.2 * FIRST, 0.3, r"$\xi/h_\mathrm{n}$", ha="center")
     inset.legend(loc="upper right", handlelength=1.2)
@@ -54,18 +53,17 @@ def figure_1(d: Data):
     density.plot(LAW.pdf(s) * MEAN, s / MEAN, color="C0")
     density.set(ylim=field.get_ylim(), xlabel=rf"$f(\tau_\mathrm{{p}})\,${MEAN_P}")
     density.tick_params(labelleft=False)
-    common.letters(system, load, law, field)
-    return figure
+    return figure, system, load, law, field
 
 
 def _system(axes) -> None:
-    axes.axhspan(0, 0.9, color="#e8edf2", lw=0)
-    axes.axhspan(-0.9, 0, color="#f2ece8", lw=0)
+    axes.axhspan(0, 0.9, color="aliceblue", lw=0)
+    axes.axhspan(-0.9, 0, color="linen", lw=0)
     axes.axhline(0, color="C1", lw=3)
     for y, sign in ((0.72, 1), (-0.72, -1)):
         for start in (0.15, 0.45, 0.75):
             axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
-                          arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 0.9})  # fmt: skip
+                          arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 0.9})  # fmt: skip
     axes.text(0.5, 0.36, r"elastic half-space: $G,\ \nu,\ \rho$", ha="center", va="center")
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
     axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color="C1")
@@ -76,16 +74,16 @@ def _system(axes) -> None:
 
 def figure_2(d: Data):
     """Draw the mapping from z to the strength, and the spectrum."""
-    figure, panels = common.mosaic(4.9, (["z", "strength"], 2 * ["spectrum"]), (1.1, 1.0))
-    left, right, axes = panels.values()
+    rows = (["z", "strength"], 2 * ["spectrum"])
+    figure, left, right, axes = common.mosaic(4.9, rows, (1.1, 1.0))
     z, s = np.linspace(-3.5, 3.5, 300), np.linspace(*common.span((LOW, HIGH)), 300)
     peak = max(LAW.pdf(s)) * MEAN
     left.plot(z, norm.cdf(z), color="C0", label=r"$\Phi$")
-    left.plot(z, norm.pdf(z), "--", color=QUIET, label="density")
+    left.plot(z, norm.pdf(z), "--", color="grey", label="density")
     right.plot(s / MEAN, LAW.cdf(s), color="C2", label="$F$")
     density = LAW.pdf(s) * MEAN / peak
-    right.plot(s / MEAN, density, "--", color=QUIET, label=f"density / {peak:.2g}")
-    for value, colour in ((-0.6, "C1"), (1.1, ACCENT)):
+    right.plot(s / MEAN, density, "--", color="grey", label=f"density / {peak:.2g}")
+    for value, colour in ((-0.6, "C1"), (1.1, "firebrick")):
         level = norm.cdf(value)
         strength = LAW.ppf(level) / MEAN
         left.plot([value, 3.5], [level, level], ":o", color=colour, lw=0.9, markevery=[0])
@@ -104,11 +102,10 @@ def figure_2(d: Data):
     axes.loglog(k, value, color="C0")
     floor = max(float(value[k <= 1.2 * cutoff].min()) / 10.0, 1e-12)
     for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
-        axes.axvline(place, color=QUIET, lw=0.8, ls=":")
+        axes.axvline(place, color="grey", lw=0.8, ls=":")
         axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
     axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(floor, 3))
-    common.letters(left, axes)
-    return figure
+    return figure, left, axes
 
 
 PLACE = 0.75
@@ -125,8 +122,7 @@ def figure_3(d: Data):
     """Draw one rupture: slip rate in space and time, load, strength."""
     study, solid = d["representative"], PROBLEM.solid
     rows = (4 * ["zoom"], ["load"] + 3 * ["wide"], 4 * ["strength"])
-    figure, panels = common.mosaic(7.4, rows, (1.25, 1.25, 0.8))
-    zoom, load, wide, strength = panels.values()
+    figure, zoom, load, wide, strength = common.mosaic(7.4, rows, (1.25, 1.25, 0.8))
     mean_stress = study["mean_stress"].values
     onset = float(study.time[mean_stress.argmax()])
     time = study["time"].values / onset
@@ -145,7 +141,7 @@ def figure_3(d: Data):
         way = 0.6 * late * 1e-4 * onset * speed / L
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
-        zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color=INK, lw=1.2, ls="--")
+        zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color="black", lw=1.2, ls="--")
         zoom.text(PLACE - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
     label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
     figure.colorbar(picture, ax=zoom, label=label)
@@ -157,50 +153,47 @@ def figure_3(d: Data):
     wide.set(xlim=(0, 1), xlabel="$x/L$")
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, PLACE)):
-        axes.plot(place, 1, "o", color=INK, ms=4, clip_on=False)
+        axes.plot(place, 1, "o", color="black", ms=4, clip_on=False)
         axes.set_ylim(time[0] - 0.01, 1.005)
     tau_p = _shifted(study, "strength") / MEAN
     strength.plot(X, tau_p, color="C0", lw=0.9)
     above = tau_p.max() + 0.08
-    strength.errorbar(PLACE, above, xerr=0.5 * H / L, color=ACCENT, capsize=3, lw=1.4)
-    strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color=ACCENT)
+    strength.errorbar(PLACE, above, xerr=0.5 * H / L, color="firebrick", capsize=3, lw=1.4)
+    strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color="firebrick")
     strength.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(None, above + 0.08))
-    common.letters(zoom, load, strength)
-    return figure
+    return figure, zoom, load, strength
 
 
 def figure_4(d: Data):
     """Draw the nucleation stress of one field, and theory against the ruptures."""
-    figure = common.new(7.6)
-    top, middle, bottom = figure.subplots(3, 1, height_ratios=(0.9, 1.0, 1.3))
+    figure, top, middle, bottom = common.stacked(7.6, 3, ratios=(0.9, 1.0, 1.3))
     tau_p, tau_n = (
         _shifted(d["representative"], name) / MEAN for name in ("strength", "tau_n")
     )
-    top.plot(X, tau_p, "--", color=QUIET, lw=0.8, label=r"$\tau_\mathrm{p}$")
+    top.plot(X, tau_p, "--", color="grey", lw=0.8, label=r"$\tau_\mathrm{p}$")
     top.plot(X, tau_n, color="C1", label=r"$\tau_\mathrm{n}$")
-    top.plot(X[tau_n.argmin()], tau_n.min(), "o", color=INK, ms=5)
+    top.plot(X[tau_n.argmin()], tau_n.min(), "o", color="black", ms=5)
     top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
-    bottom.plot([0, 1], [0, 1], color=QUIET, lw=0.8)
+    bottom.plot([0, 1], [0, 1], color="grey", lw=0.8)
     for ratio in SIMULATED:
         stress, style = d.stress(ratio, "ruptures") / MEAN, common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
         place, predicted, off = is_misplaced(d, ratio)
         bottom.plot(predicted / L, place / L, **style, ms=4)
-        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec=ACCENT, ms=9)
+        bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec="firebrick", ms=9)
         if "printed" in d:
-            pale = style | {"color": PALE, "mfc": "none", "ms": 3, "zorder": 1}
+            pale = style | {"color": "lightgrey", "mfc": "none", "ms": 3, "zorder": 1}
             middle.plot(stress, 100 * offsets(d, ratio, "printed"), **pale)
             place, predicted, off = is_misplaced(d, ratio, "printed")
-            bottom.plot(predicted[off] / L, place[off] / L, "x", color=ACCENT, ms=6)
-    middle.axhline(0, color=QUIET, lw=0.8)
+            bottom.plot(predicted[off] / L, place[off] / L, "x", color="firebrick", ms=6)
+    middle.axhline(0, color="grey", lw=0.8)
     middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
                ylabel="theory above rupture (%)")  # fmt: skip
     middle.legend(title=XI, ncols=3)
     bottom.set(xlabel=r"predicted $x_\mathrm{cr}/L$", ylabel=r"simulated $x_\mathrm{cr}/L$",
                xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")  # fmt: skip
-    common.letters(top, middle, bottom)
-    return figure
+    return figure, top, middle, bottom
 
 
 def figure_5(d: Data):
@@ -208,11 +201,11 @@ def figure_5(d: Data):
     rows = [[f"field {ratio}", "strengths", "minima"] for ratio in RATIOS]
     rows += [["nucleation", "densities", "."], 3 * ["stress"], 3 * ["place"]]
     heights = (*len(RATIOS) * (1.5 / len(RATIOS),), 0.9, 0.9, 0.6)
-    figure, panels = common.mosaic(8.4, rows, heights, width_ratios=(4, 1, 1.2))
-    fields = [panels.pop(f"field {ratio}") for ratio in RATIOS]
-    strengths, minima, nucleation, densities, stress, place = panels.values()
+    figure, first, strengths, minima, *panels = common.mosaic(8.4, rows, heights,
+                                                              width_ratios=(4, 1, 1.2))  # fmt: skip
+    *fields, nucleation, densities, stress, place = first, *panels
     s = np.linspace(LOW, HIGH, 300)
-    strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color=INK)
+    strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color="black")
     low, high = common.span(common.STRENGTHS)
     strengths.set(ylim=(low, high), title=r"$f(\tau_\mathrm{p})$")
     shown = {minima: [], nucleation: [], stress: []}
@@ -258,17 +251,16 @@ def figure_5(d: Data):
     nucleation.set(ylabel=TAU_N, xlabel="$x/L$", xlim=(0, 1))
     densities.set_title(r"$f(\tau_\mathrm{n})$")
     error = 2 * np.sqrt(20.0 / d.size.samples)
-    place.axhspan(1 - error, 1 + error, color="#eeeeee", lw=0, zorder=0)
+    place.axhspan(1 - error, 1 + error, color="0.93", lw=0, zorder=0)
     if setting.SUPPORT[0] > 0.0:
-        stress.axvline(LOW / MEAN, color=QUIET, lw=0.8, ls=":")
+        stress.axvline(LOW / MEAN, color="grey", lw=0.8, ls=":")
         shown[stress].append(LOW / MEAN)
     stress.set(xlim=common.span(*shown[stress], margin=0.02), ylim=(0, None),
                xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
                ylabel=rf"$f(\tau_\mathrm{{cr}})\,${MEAN_P}")  # fmt: skip
     place.set(xlim=(0, 1), ylim=(0, None), xlabel=r"$x_\mathrm{cr}/L$",
               ylabel=r"$f(x_\mathrm{cr})\,L$")  # fmt: skip
-    common.letters(fields[0], nucleation, stress, place)
-    return figure
+    return figure, fields[0], nucleation, stress, place
 
 
 _PLACES = np.array([np.log2(FIRST) - 1.2, *np.log2(RATIOS), np.log2(LAST) + 1.2])
@@ -296,8 +288,7 @@ def _statistics(axes, table, end) -> None:
 
 def figure_6(d: Data):
     """Draw mean, median and lower quartile of tau_n and of tau_cr."""
-    figure = common.new(6.4)
-    top, bottom = figure.subplots(2, 1, height_ratios=(0.85, 1.3))
+    figure, top, bottom = common.stacked(6.4, 2, ratios=(0.85, 1.3))
     edges = np.linspace(LOW, HIGH, d["moments"].sizes["cell"] + 1) / MEAN
     table = []
     for ratio in RATIOS:
@@ -313,7 +304,7 @@ def figure_6(d: Data):
     low = LOW / MEAN if setting.SUPPORT[0] > 0.0 else np.nan  # no limit without a bound
     _statistics(bottom, table, [low, low, low])
     bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}")
-    bottom.axhline(low, color=QUIET, lw=0.8, ls=":")
+    bottom.axhline(low, color="grey", lw=0.8, ls=":")
     places = np.log2(SIMULATED)
     raw = [d.stress(ratio, "ruptures").mean() / MEAN for ratio in SIMULATED]
     errors = [2 * d.stress(ratio, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
@@ -321,16 +312,15 @@ def figure_6(d: Data):
     inset = bottom.inset_axes((0.42, 0.46, 0.56, 0.52))
     for axes in (bottom, inset):
         drawn = axes.errorbar(
-            places, raw, errors, fmt="D", color=ACCENT, mfc="none", ms=6, lw=0.8
+            places, raw, errors, fmt="D", color="firebrick", mfc="none", ms=6, lw=0.8
         )
     best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
     inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color="C0", ms=4)
-    inset.plot(places, best, "x", color=ACCENT, ms=7)
+    inset.plot(places, best, "x", color="firebrick", ms=7)
     common.ratio_axis(inset)
     inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
     bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc=(0.02, 0.12))
-    common.letters(top, bottom)
-    return figure
+    return figure, top, bottom
 
 
 def figure_7(d: Data):
@@ -355,11 +345,12 @@ def figure_7(d: Data):
                   label="infinite interface")  # fmt: skip
         axes.plot(theory["usable"], theory["periodic"], "--", color="C1",
                   label="this interface")  # fmt: skip
-        axes.plot([0, 1.0 / slope], [0, 1.0], ":", color=ACCENT, label=rf"{slope:.2f} {XI}")
-        axes.plot(RATIOS, sampled, "o", color=INK, ms=4)
+        axes.plot(
+            [0, 1.0 / slope], [0, 1.0], ":", color="firebrick", label=rf"{slope:.2f} {XI}"
+        )
+        axes.plot(RATIOS, sampled, "o", color="black", ms=4)
         axes.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
-        axes.axhline(1.0, color=QUIET, lw=0.8, ls="--")
+        axes.axhline(1.0, color="grey", lw=0.8, ls="--")
     variances[0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     variances[0].legend(loc="lower right")
-    common.letters(correlation, eigenfunction, *variances)
-    return figure
+    return figure, correlation, eigenfunction, *variances
