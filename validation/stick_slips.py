@@ -293,22 +293,17 @@ def infer(machine, table, peaks, rows):
 
 def predict(machine, weakening_rate, excess, cv=0.5):
     """Print peaks of other set-ups, in which nothing is fitted any more."""
-    print(
-        f"W {weakening_rate / 1e9:.1f} GPa/m, excess {excess / 1e3:.0f} kPa +- {100 * cv:.0f} %:"
-    )
-    set_ups = {
-        "half as long": {"length": 0.5 * LENGTH},
-        "from rest without stress": {"start": 0.0},
-    }
+    print(f"W {weakening_rate / 1e9:.1f} GPa/m, excess {excess / 1e3:.0f} kPa +- {cv:.0%}:")
+    set_ups = {"half as long": {"length": 2.0}, "from rest without stress": {"start": 0.0}}
     for name, changed in set_ups.items():
         problem = rig(machine, weakening_rate=weakening_rate, **changed)
         found, _ = onsets(problem, strength_of(excess, cv, 0.2))
         peak = found.critical_stress.to_numpy()
-        both = np.mean(share_of_weaker_end(found, problem.interface.length) > SHARE)
+        weaker = share_of_weaker_end(found, problem.interface.length)
         print(
-            f"  {name}: {peak.mean() / 1e3:.1f} +- {peak.std(ddof=1) / 1e3:.1f} kPa,", end=" "
+            f"  {name}: {peak.mean() / 1e3:.1f} +- {peak.std(ddof=1) / 1e3:.1f} kPa,"
+            f" from both ends {np.mean(weaker > SHARE):.2f}"
         )
-        print(f"from both ends {both:.2f}")
 
 
 def last_events(problem, strength, method=None):
