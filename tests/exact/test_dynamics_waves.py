@@ -129,15 +129,6 @@ def test_kernel_equals_its_closed_form(t, mode, eta):
     assert abs(memory_kernel(t, mode, eta) - expected) < 1e-12
 
 
-@pytest.mark.parametrize("t", [0.5, 3.0, 12.0])
-def test_kernel_equals_high_precision_laplace_inversion(t):
-    def transform(s):
-        return (static_stiffness("II", ETA) + s - mode_two_stiffness(s, ETA)) / s
-
-    expected = from_laplace(transform, t, degree=80)
-    assert abs(memory_kernel(t, "II", ETA) - expected) < 1e-12
-
-
 @pytest.mark.parametrize(
     ("mode", "eta"), [("II", ETA), ("II", ALMOST_INCOMPRESSIBLE), ("III", 1.0)]
 )

@@ -15,12 +15,6 @@ from stiction.base.kinds import register
 from stiction.base.model import model
 from stiction.problem.load import LoadShape
 
-MIXED = {
-    "average.py", "diagnostics.py", "explicit.py", "implicit.py", "loading.py",
-    "mapping.py", "rice.py", "sample.py",
-}  # fmt: skip
-"""Files with kernels that hold messages as well, or import those that do."""
-
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "stiction"
 
@@ -40,22 +34,6 @@ def test_public_modules_show_their_functions():
         _ = st.montecarlo
     stub = (SOURCES / "statistics" / "__init__.pyi").read_text()
     assert sorted(re.findall(r" as (\w+)", stub)) == st.statistics.__all__ == dir(st.statistics)
-
-
-def test_an_edited_message_compiles_no_kernel_anew():
-    """Files with kernels refuse nothing and import none that do, whose states they depend on."""
-    texts = {path: path.read_text(encoding="utf-8") for path in SOURCES.rglob("*.py")}
-    names = {
-        ".".join(path.relative_to(SOURCES.parent).with_suffix("").parts): path for path in texts
-    }
-    for path, text in texts.items():
-        if path.name in MIXED or not re.search(
-            r"^from stiction\.base.(jit|lanes) import", text, flags=re.MULTILINE
-        ):
-            continue
-        for module in re.findall(r"^from (stiction[\w.]*) import", text, flags=re.MULTILINE):
-            imported = texts.get(names.get(module), "")
-            assert module == "stiction.base.jit" or "InputError" not in imported, (path, module)
 
 
 def worked_examples(language: str) -> list[str]:

@@ -235,12 +235,3 @@ def test_links_and_paths():
         places = [page.parent / link for link in links]
         for place in places + [ROOT / path for path in re.findall(pattern, text)]:
             assert place.exists(), f"{page.name}: {place}"
-
-
-def test_the_glossary_names_what_the_code_names():
-    page = (ROOT / "docs" / "conventions.md").read_text("utf-8")
-    rows = re.findall(r"^\| (`.*?) \|", page.split("## Glossary")[1], flags=re.MULTILINE)
-    names = {name.split(".")[-1] for row in rows for name in re.findall(r"`([\w.]+)`", row)}
-    assert len(names) > 50
-    code = "\n".join(path.read_text("utf-8") for path in (ROOT / "src").rglob("*.py"))
-    assert names - set(re.findall(r"\w+", code)) == set()

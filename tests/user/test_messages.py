@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import os
 import re
 import shlex
@@ -19,9 +18,6 @@ import stiction as st
 from stiction.base import files
 from stiction.cli.commands import app
 from stiction.problem.friction import laws
-
-MAX_LETTERS = 450
-"""Of a signature; xarray's `concat` has 428."""
 
 
 @pytest.fixture(autouse=True)
@@ -140,18 +136,6 @@ def test_commands_need_neither_a_backend_nor_all_letters(line, encoding, inside)
         PYTHONPATH=os.pathsep.join([str(files.Path(st.__file__).parents[1])]),
     )  # fmt: skip
     assert ("valid, '?'" in said) == (encoding == "cp1252")
-
-
-def test_signatures_are_short_and_plain():
-    """As help() and the tooltips of notebooks show them."""
-    for name in st.__all__ if hasattr(st, "__all__") else dir(st):
-        thing = getattr(st, name)
-        if callable(thing) and not (isinstance(thing, type) and issubclass(thing, Exception)):
-            shown = str(inspect.signature(thing))
-            assert len(shown) <= MAX_LETTERS, name
-            assert not re.search("Annotated|Validator|FieldInfo|~", shown), (name, shown)
-    assert "method: Method" in str(inspect.signature(st.onset))
-    assert str(inspect.signature(st.Solid)).startswith("(shear_modulus: float,")
 
 
 def test_a_law_whose_inverse_fails_at_zero_is_refused_by_name():

@@ -5,10 +5,12 @@ import json
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from recording import read
 
 import stiction as st
 
@@ -68,24 +70,7 @@ def objects():
     }
 
 
-SHOWN = {
-    "fit": ["efolding_length", "mm", "90 % interval", "p-values"],
-    "sample": ["3 interfaces of 256 nodes", "strength", "MPa"],
-    "quantiles": ["0.5", "MPa", "95 % interval", "0.69"],
-    "density": ["bandwidth"],
-    "moments": ["0.993333", "MPa"],
-    "curve": ["peak", "4.1", "kN", "precursors"],
-    "curves": ["Peaks of 1 test", "kN"],
-    "peaks": ["5 peaks", "0.73", "MPa"],
-    "probability": ["Probability of sliding", "95 % interval", "0.7", "MPa", "plain"],
-    "design": ["friction coefficient", "force", "N", "reliability index", "0.1"],
-    "posterior": ["marginal.low", "MPa", "0.514 to 0.785 MPa before the tests", "nats"],
-    "agreement": ["p-value", "cramer_von_mises"],
-    "problem": ["shear_modulus", "1000", "MPa", "friction.weakening_rate", "Pa m-1"],
-    "field": ["marginal.alpha", "spectrum.correlation_length", "mm"],
-    "method": ["loading_rate", "Pa s-1"],
-    "uncertain": ["problem.friction.residual_ratio", "0.15", "0.105 to 0.195"],
-}
+SHOWN = read(Path(__file__).parents[1] / "records" / "shown.json")
 
 
 @pytest.mark.parametrize("name", SHOWN)

@@ -1,12 +1,14 @@
 """Profiles and maps of one's own: units, coordinates and gaps decide, wherever one enters."""
 
 import sys
+from pathlib import Path
 
 import astropy.units as u
 import numpy as np
 import openpyxl
 import pytest
 import xarray as xr
+from recording import read
 from refusals import refuses
 from setups import LOCAL, make_problem
 from small_study import small_study
@@ -109,32 +111,16 @@ def test_everything_beside_the_strength_is_read_alike():
     assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
 
 
-MM, INCH, KSI = 1e3, 1.0 / 0.0254, 1.0 / 6894757.293168
-HEADINGS = {  # scales of x and of the strength
-    "x / mm;tau / MPa": (MM, 1e-6),
-    "#x_mm tau_MPa": (MM, 1e-6),
-    "\ufeffx (mm);tau (MPa)": (MM, 1e-6),
-    "Wegl\u00e4nge [mm];tau [N/mm\u00b2]": (MM, 1e-6),
-    "x (mm);tau (N mm-2)": (MM, 1e-6),
-    "x,tau\nmm,MPa": (MM, 1e-6),
-    "x (in);tau (ksi)": (INCH, KSI),
-    "pos mm;taup MPa": (MM, 1e-6),
-    "x (mm);N/mm^2": (MM, 1e-6),
-    "position: mm;tau_p: MPa": (MM, 1e-6),
-    "mm,MPa": (MM, 1e-6),
-    "Interferometer\nrun 14, room 3\nx (mm);tau (MPa)": (MM, 1e-6),
-    "Messung 3;\nDatum;3. Mai\n;\nx (mm);tau\nmm;MPa": (MM, 1e-6),
-    "Probe;12\nTemperatur;21,5\nx (mm);tau (MPa)": (MM, 1e-6),
-    "# x (mm)  tau (kPa)": (MM, 1e-3),
-    "": (1.0, 1.0),
-}
+MM = 1e3
+HEADINGS = Path(__file__).parents[1] / "records" / "headings.json"
+"""Of a table, with the scales of x and of the strength in SI."""
 
 
 @pytest.mark.parametrize("comma", [False, True])
 @pytest.mark.filterwarnings("error")
 def test_headings_of_laboratories(tmp_path, comma):
     path = tmp_path / "p.csv"
-    for head, (x_scale, scale) in HEADINGS.items():
+    for head, (x_scale, scale) in read(HEADINGS).items():
         last = (head or ";").splitlines()[-1]
         separator = next((mark for mark in (";", "\t", ",") if mark in last), "  ")
         rows = zip(X * x_scale, STRENGTH * scale, strict=True)
