@@ -12,6 +12,7 @@ from setups import EXACT, LOCAL, ensemble, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.base.progress import SILENT
+from stiction.reliability.answer import few_members
 from stiction.reliability.counting import Counted, binomial_interval, count_failures
 from stiction.reliability.curve import curve_of
 from stiction.reliability.subset import Descent, Population, ancestral_variance, generator
@@ -135,6 +136,15 @@ def test_a_curve_of_an_event_that_never_happens_is_unknown():
     assert curve.sizes["point"] == 1
     assert curve.survived == 1.0
     assert np.isnan(curve.probability.values).all()
+
+
+@pytest.mark.parametrize(("known", "carried"), [(0.2, True), (math.nan, False)])
+def test_a_short_list_names_only_interfaces_whose_probability_is_known(known, carried):
+    random = SimpleNamespace(kinds=np.arange(5), source=None)
+    members = np.array([known, *[math.nan] * 4])
+    short = SimpleNamespace(members=members, cv=0.3, members_cv=0.25)
+    (text,) = few_members(random, short, 0.1)
+    assert ("1 of its 5 different ones carry 90%" in text) == carried
 
 
 def test_draws_of_a_list_must_have_their_dimension():

@@ -86,6 +86,7 @@ class Gathered:
         """Return why a table cannot belong to these points, or '' if it can."""
         pairs = [failure[:2] for failure in table.failures]
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
+        # Numbers of failures may be anything in a stranger's file, so they are objects.
         for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
             if not within(points, len(self.points)) or np.any(samples < self.first):
                 return "a point or a sample is not in the study"
@@ -103,6 +104,7 @@ class Gathered:
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places. Ignore other samples."""
+        # The folder of a run may hold more samples than this ensemble.
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure
@@ -113,6 +115,7 @@ class Gathered:
         for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
             if self._only is None or name in self._only:
                 values = table.rows[name][inside]
+                # The type and the shape of a variable are known from its first table.
                 if name not in self._arrays:
                     self._types[name] = values.dtype
                     self._arrays[name] = np.full(self.done.shape + values.shape[1:], np.nan)
@@ -140,6 +143,7 @@ class Gathered:
         for name in variables:
             if name in self._arrays:
                 array, kind = self._arrays[name], self._types[name]
+                # Whole numbers and flags cannot be NaN. They remain floats if any is missing.
                 if kind.kind == "f" or not np.isnan(array).any():
                     array = array.astype(kind, copy=False)
                 values[name] = array

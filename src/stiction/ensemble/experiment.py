@@ -160,6 +160,7 @@ class Experiment:
                         UnitWarning,
                     )
             check_residual(self.problem, member)
+            # Stresses and slips of a solid lie in known ranges. Others are in another unit.
             means = {name: mean_in_stress(self.problem, member, name) for name in member.names}
             friction = self.problem.friction
             residual = float(friction.residual(np.array(means["strength"])).mean())
@@ -196,6 +197,7 @@ class Experiment:
         if not constants:
             profiles = self.profiles(draws)
             return profiles, self.onset(profiles)
+        # Solve the samples with equal constants together, then restore their order.
         variant = self.random.variant(draws)
         parts, order = [], []
         for number in np.unique(variant).tolist():

@@ -113,6 +113,7 @@ class LimitState:
                 f"method: {experiment.method.label} returned an onset at minus infinity. It must"
                 " return a stress, Pa, or NaN if the event does not happen"
             )
+        # NaN means that the event does not happen at any stress.
         stress = np.where(np.isnan(stress), np.inf, stress)
         stress = np.maximum(stress, self.bounds[0])  # rounding may be slightly below
         return stress if np.ndim(draws) != 1 else stress[0]
@@ -168,6 +169,7 @@ class LimitState:
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # measured values may be rarer
+        # Each factor at each node takes an equal part of the negligible probability.
         chance = negligible / (MAX_FACTORS * problem.interface.size)
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
@@ -181,6 +183,7 @@ class LimitState:
         if self._random_pressure:
             ends = support_in_stress(problem, random, "normal_pressure", chance)
             mean = self.experiment.pressure
+            # Stresses are multiplied by the mean pressure over the pressure of the sample.
             ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
             low, high = low * ratios[low < 0.0], high * ratios[1]
         bounded = optional_member(self.experiment.method, "bounded_by_strength")
@@ -201,9 +204,11 @@ def weakest_first(state: LimitState) -> LimitState:
         return state
     by = state if isinstance(state.guide, str) else state.guide
     ranked = int(np.clip(RANKINGS // count, 4, MAX_RANKED))
+    # Each sample once for each member, selected by the middle of its interval of the first draw.
     draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)
     onset = by(draws).reshape(ranked, count)
+    # A sample that survives counts as the strongest, so that means are finite.
     onset = np.minimum(onset, onset.max(where=np.isfinite(onset), initial=0.0))
     lowest = np.array(state.bounds_of_members())[:, 0]
     weak = np.maximum(onset.mean(axis=0) - LOW_QUANTILE_SIGMAS * onset.std(axis=0), lowest)

@@ -101,8 +101,10 @@ def complete(
             if store:
                 store.add(table)
             items.add(table)
+            # Several points have samples with equal numbers.
             warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
             meter.advance(span.samples)
+            # If nothing succeeds from the start, later samples would fail for the same reason.
             lost += len(table.failures)
             if lost >= min(MAX_FAILED_FROM_START, total) and not items.done.any():
                 failure = table.failures[0]
@@ -130,6 +132,7 @@ def gather(
     arguments.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
+    # Samples that are stored, or that another job computes, are not missing.
     if store:
         store.resume(rows)
     missing = ~(elsewhere | rows.done)
@@ -142,6 +145,7 @@ def gather(
         rows, points, spans_of(missing, ensemble.first), solve_span,
         Meter(label, int(missing.sum()), progress), store=store, executor=executor, workers=cores,
     )  # fmt: skip
+    # A stored run is compared once, by the first process that finishes its part.
     comparison = store.pilot if store else None
     if comparison is None and pilot:
         show = progress is True

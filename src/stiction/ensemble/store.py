@@ -95,6 +95,7 @@ class Store:
             if names and not names & {STUDY, CHUNKS}:
                 some = ", ".join(sorted(names)[:3])
                 raise StoreError(f"{path}: has other files ({some}). Choose a new folder")
+            # Another process may create the folder at the same moment.
             with suppress(FileExistsError):
                 (path / CHUNKS).mkdir()
             _check_folder(path / CHUNKS)
@@ -107,6 +108,7 @@ class Store:
         except Damaged:
             if list(store._tables()) or STUDY in names:
                 store.warn(f"{STUDY} is damaged or missing. It is rebuilt from the given study")
+        # The same study with another title or more samples replaces the description.
         if before != study:
             # A pilot of fewer samples is no longer valid.
             if before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES:
@@ -142,6 +144,7 @@ class Store:
                 data = _read(folder / name, MAX_FILE_BYTES)
             except Damaged:  # another process has deleted a damaged chunk
                 continue
+            # The name proves the content, so no list of chunks is needed.
             if name != f"{digest(data)}.npz":
                 self.damage[name] = "fails its checksum"
                 continue
@@ -158,6 +161,7 @@ class Store:
         """Pass on the stored samples, warn about different versions, and delete damaged chunks."""
         self.read_into(rows)
         for name, text in self.damage.items():
+            # The samples are missing in `rows`, so the run computes them again.
             self.warn(f"{CHUNKS}/{name}: {text}. Its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
         for version in sorted({*self.versions} - {versions()}):
@@ -188,6 +192,7 @@ class Store:
     def save(self) -> None:
         """Store the collected tables, as a chunk for each set of variables."""
         _check_folder(self.path / CHUNKS)
+        # An array of rows has one type, and a chunk one version of the packages.
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
             groups.setdefault((table.rows.dtype, table.versions), []).append(table)
@@ -224,6 +229,7 @@ def _table_in(data: bytes) -> tuple[str, Table]:
     numbers = [number for failure in failures for number in failure[:3]]
     rows, long = arrays["rows"], np.dtype(np.int64)
     fields: Any = rows.dtype.fields or {}
+    # Types are checked before any value is used, because the folder may be a stranger's.
     valid = (
         all(isinstance(text, str) for text in texts)
         and all(isinstance(number, int) for number in numbers)

@@ -234,6 +234,7 @@ class Answer(Result):
             over("force", self.area, "N"),
             over("friction coefficient", 1.0 / self.normal_pressure, "1"),
         ]
+        # The requested quantity comes first, and the other number of the answer beside it.
         rows.sort(key=lambda row: row.name != self.quantity.replace("_", " "))
         chance = Row("probability", self.probability, () if ends else self.interval)
         rows.insert(len(rows) if ends else 0, chance)
@@ -337,6 +338,7 @@ def band_of(members: Array) -> tuple[float, float]:
     shares = np.array([0.05, 0.95])
     ends = np.quantile(np.nan_to_num(members), shares)
     zeros, known_from = np.sum(members == 0.0), np.sum(~(members > 0.0))
+    # A quantile lies between the two ranks around it. It is unknown if either is unknown.
     ranks = shares * (members.size - 1)
     hidden = (zeros < known_from) & (np.ceil(ranks) >= zeros) & (np.floor(ranks) < known_from)
     low, high = np.where(hidden, math.nan, ends).tolist()
@@ -366,6 +368,7 @@ def prepare(
         problems.append(f"algorithm: 'two_level' is not possible: {reason}")
     if problems:
         raise InputError(problems)
+    # Warnings come after errors: nobody needs a warning about a call that is refused.
     check_fields([experiment])
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return state, max_evaluations or int(
@@ -397,7 +400,7 @@ def sampling_target(state: LimitState, target_cv: float) -> float:
 
 def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     """Return the number of members to draw from a source, 0 if there are enough."""
-    least = cv / (LIST_SHARE * target_cv)
+    least = cv / (LIST_SHARE * target_cv)  # the error falls with the root of the number
     count = len(random.members)
     if getattr(random, "source", None) is None or least <= 1.0 or count >= MAX_MEMBERS:
         return 0
@@ -442,11 +445,11 @@ def with_enough_members(
             return experiment, solution
         meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
-        # The list of a posterior over a list has few more different members.
+        # A posterior over a list has hardly more different members, however many are drawn.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
             return experiment, solution
         experiment = replace(experiment, random=larger)
-        warned.clear()
+        warned.clear()  # the new solution warns again where it must
 
 
 def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> list[str]:
@@ -454,16 +457,18 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
     by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
+    # Add up the probabilities of equal interfaces, the largest first. None may be known.
     members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
+    carried = f", and {count} of its {shares.size} different ones carry {CARRIED_SHARE:.0%}"
     advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
     if random.source is not None:
         advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
     return [
-        f"the list of interfaces is a sample, and {count} of its {shares.size} different ones carry"
-        f" {CARRIED_SHARE:.0%} of the mean. By this alone the coefficient of variation is"
-        f" {by_list:.2g} (target {target_cv:g}). {advice}, or measure more"
+        f"the list of interfaces is a sample{f'{carried} of the mean' * bool(shares[-1])}. By this"
+        f" alone the coefficient of variation is {by_list:.2g} (target {target_cv:g}). {advice}, or"
+        " measure more"
     ]
 
 
@@ -498,6 +503,7 @@ def exact_doubts(point: TailPoint) -> list[str]:
     if exact is None or not near.size:
         return []
     seconds = seconds_per_sample(experiment.problem, exact)
+    # Different values, because samples of a chain repeat.
     count = int(np.clip(CHECK_SECONDS / seconds, *EXACT_CHECKS))
     chosen = near[different(population.values[near], count, np.random.default_rng(0))]
     state.meter.note = f"checking by {exact.label}"
@@ -505,6 +511,8 @@ def exact_doubts(point: TailPoint) -> list[str]:
         fails_exactly = state.by(exact)(population.draws[chosen]) < stress
     fails = population.values[chosen] < stress
     failed, failed_exactly = int(fails.sum()), int(fails_exactly.sum())
+    # If both methods are right on average, the samples that change sides go both ways, and the
+    # difference of the counts has the square root of their number as standard deviation.
     differing = int(np.sum(fails != fails_exactly))
     if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
         return []

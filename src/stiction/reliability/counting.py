@@ -69,10 +69,10 @@ class Counted(NamedTuple):
         return math.sqrt(held / (self.failures - last))
 
     def interval(self) -> tuple[float, float]:
-        """Return the interval of Clopper and Pearson, or the negative binomial interval
-        (step 2)."""
+        """Return the interval of Clopper and Pearson, or the negative binomial interval."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
+            # At least n samples before failure r are at most r - 1 failures in n - 1 samples.
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]
         return low, high
 

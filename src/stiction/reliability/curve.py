@@ -162,6 +162,7 @@ def curve_doubts(end: TailPoint, smallest: float, target_cv: float = CURVE_CV) -
 
 def chances(smallest: float) -> Array:
     """Return the probabilities of the points on a curve."""
+    # The last point lies at the smallest probability, also if it is no power of ten.
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
     probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
@@ -180,6 +181,8 @@ def curve_of(
         members.append(point.members)
         values = stress, stress - lowest, stress / pressure, stress * area, point.probability
         ends = lognormal_interval(point.probability, point.cv)
+        # Both intervals come from the same error: of the probability at this stress, and of the
+        # stress at this probability.
         sides = tail.stress_interval(chance, point.cv, lowest)
         rows.append((*values, *ends, point.cv, *sides, *band_of(members[-1]), point.members_cv))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))

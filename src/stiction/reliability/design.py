@@ -165,7 +165,7 @@ def _quantile(
     lowest = state.bounds[0]
     goal = Goal(sampling_target(state, target_cv), probability=probability)
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
-    # 1.
+    # 1. Counted specimens are whole samples, so they also give the characteristic value.
     if counts := count_tail(state, goal, budget):
         tail = counts.tail
         asked |= {
@@ -183,7 +183,7 @@ def _quantile(
         doubts = [tail.short_of(f"P = {probability:g}")]
         return Answer.at(point, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
     point, doubts = TailPoint(state, tail, tail.quantile(probability)), []
-    # 2.
+    # 2. A lower bound of strength, or the accuracy of the method, lets onsets accumulate.
     bound = TailPoint(state, tail, math.nextafter(lowest, math.inf))
     if bound.probability >= probability:
         point, asked["stress"] = bound, lowest
@@ -246,7 +246,7 @@ def sensitivities_of(
 
     rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
     with collect_warnings():
-        # 3. and 4.
+        # 3. and 4. The reference takes the same samples as the ends, not those of the design.
         experiment = replace(experiment, random=random)
         counts = solve_specimens(replace(state, experiment=experiment), 0, SAMPLES_PER_END)
         reference = counts.tail.quantile(probability)
@@ -254,7 +254,7 @@ def sensitivities_of(
         if len(families) > 1:
             least, most = (pick(families, key=families.__getitem__) for pick in (min, max))
             rows.append((FAMILY, least, most, families[least], families[most]))
-        # 5.
+        # 5. Only the problem changes, so the draws remain the same.
         for key, ends in ranges_of(problem, state.experiment.random, stated).items():
             state.meter.note = f"what moves the design: {key}"
             try:
@@ -262,7 +262,7 @@ def sensitivities_of(
             except InputError:  # the constant cannot have this value
                 continue
             rows.append((f"problem.{key}", f"{ends[0]:.4g}", f"{ends[1]:.4g}", low, high))
-    # 6.
+    # 6. The widest range comes first.
     rows.sort(key=lambda row: -abs(row[4] - row[3]))
     area = problem.area or np.nan
     effects = xr.Dataset(

@@ -150,7 +150,7 @@ def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
     if not _expands(state):
         return Counts(state, onsets[:, None], members[:, None], np.full((samples, 1), np.nan))
     laws, law = random.factor_laws
-    # 2.
+    # 2. The ratio of onset and strength depends on the field alone.
     ratios, own_factor = (
         onsets / random.means[members],
         draws[:, random.factor_column(interface)],
@@ -182,12 +182,14 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
         chance, cv = goal.probability or tail.probability(stress), tail.cv(stress)
-        if counts.values.shape[1] == 1 and goal.probability:  # the error of plain counting
+        # At a quantile, the share of plain samples below it is given. Its error is not in the
+        # families, since each family has a single specimen.
+        if counts.values.shape[1] == 1 and goal.probability:
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
         state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
             return counts
-        # Compare the costs of counting to the target and of subset simulation.
+        # 5. Compare the costs of counting to the target and of subset simulation.
         wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
         price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2

@@ -217,7 +217,7 @@ def _probability(
     allowed: int | None,
 ) -> Answer:  # fmt: skip
     """Return the answer from the chosen algorithm (steps 1 to 4)."""
-    # 1.
+    # 1. Beyond these bounds the probability is negligible, so no sample would show it.
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
@@ -229,7 +229,7 @@ def _probability(
         # 2.
         if counts := count_tail(state, goal, budget):
             return _by_tail(TailPoint(state, counts.tail, stress), goal.cv)
-        # 3.
+        # 3. Members in order help the chains, and the pilot must have the order of the chains.
         state = weakest_first(state)
         draws = state.draws(state.experiment.seed, 0, least)
         pilot = draws, state(draws)
@@ -285,7 +285,7 @@ def _by_counting(
     spent = start + counted.evaluations
     point = TailPoint(state, Tail([counted], "plain", reason, spent), goal.stress)
     cv, interval = math.hypot(count.cv, point.members_cv), count.interval()
-    if point.members_cv:
+    if point.members_cv:  # the exact interval of a count holds for its sampling error only
         interval = lognormal_interval(count.probability, cv)
     # 4.
     doubts = imprecise(count.cv, goal.cv, spent) + exact_doubts(point)
@@ -301,12 +301,14 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
     interval = lognormal_interval(probability, point.cv)
     doubts = imprecise(point.sampling_cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
+        # No exact sample fails, so the interval ends at the probability of the guide's level.
         rarest = tail.repetitions[-1].populations[-1]
         interval = 0.0, math.exp(rarest.log_probability)
         doubts = [
             f"{tail.short_of('a failure')}. The interval ends at the last level of the first stage"
         ]
     elif not tail.complete:
+        # The requested stress is below all samples, so its probability is below the last known.
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{point.stress:.7g} Pa')}. The interval ends there"]
@@ -329,7 +331,7 @@ def _failing_profiles(point: TailPoint) -> xr.Dataset:
     experiment, last = point.state.experiment, point.tail.repetitions[-1]
     draws, stresses = last.failing
     failed = np.flatnonzero(stresses < point.stress)
-    rng = generator(experiment.seed, 2)
+    rng = generator(experiment.seed, 2)  # draws of its own, so that estimates do not change
     chosen = failed[different(stresses[failed], SHOWN_PROFILES, rng)]
     if not chosen.size:
         return xr.Dataset()

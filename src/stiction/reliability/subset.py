@@ -273,7 +273,7 @@ def descend(
         values = here.values
         if len(populations) > KEPT_POPULATIONS:
             populations[-KEPT_POPULATIONS - 1] = populations[-KEPT_POPULATIONS - 1].light()
-        # 2. the next ceiling
+        # 2. the next ceiling: the value after the lowest tenth
         lowest = float(np.partition(values, count)[count])
         final, bottom = lowest < threshold, lowest <= floor
         if final:
@@ -282,8 +282,8 @@ def descend(
             lowest = float(np.nextafter(floor, math.inf))
         elif lowest == values.min() < values.max():
             lowest = float(values[values > lowest].min())
-        # States repeat along chains: with ties at the threshold a few fewer go on.
-        # 3. the probability of the next level
+        # 3. the probability of the next level. States repeat along chains: with ties at the
+        # ceiling a few fewer go on.
         chosen = values < lowest
         share = float(chosen.mean())
         reached = here.log_probability + math.log(share) if share else -math.inf

@@ -142,17 +142,17 @@ class Tail(NamedTuple):
     @property
     def survived(self) -> float:
         """Share of plain samples in which the event does not happen."""
-        return float(self._shares @ [descent.survived for descent in self.repetitions])
+        return float(self._weights @ [descent.survived for descent in self.repetitions])
 
     @property
-    def _shares(self) -> Array:
+    def _weights(self) -> Array:
         """Weight of each repetition, from its size, which does not depend on the outcome."""
         sizes = np.array([descent.samples for descent in self.repetitions])
         return sizes / sizes.sum()
 
     def _parts(self, stress: float) -> Array:
         """Contribution of each repetition to the probability."""
-        return self._shares * [descent.probability(stress) for descent in self.repetitions]
+        return self._weights * [descent.probability(stress) for descent in self.repetitions]
 
     def probability(self, stress: float) -> float:
         """Return the estimate of P(onset below `stress`) (step 3)."""
@@ -175,49 +175,51 @@ class Tail(NamedTuple):
         The probability is NaN if fewer than `RESOLVED` samples of an interface are so
         low. For plain samples, it is the share among the samples of the interface,
         because their number is random and causes most of the error near P = 1.
-        Repetitions are added up, because some have few samples of an interface.
         """
-        chances, seen, low, plain = np.zeros((4, count))
-        weight = 0.0
-        for share, descent in zip(self._shares, self.repetitions, strict=True):
-            per_sample, members, _, drawn = descent.below(stress)
-            by_member = np.bincount(members, minlength=count)
-            seen += by_member
-            if drawn is None:
-                chances += share * count * per_sample * by_member
+        in_chains, seen, low, plain = np.zeros((4, count))
+        plain_weight = 0.0
+        for weight, descent in zip(self._weights, self.repetitions, strict=True):
+            below = descent.below(stress)
+            failures = np.bincount(below.members, minlength=count)
+            seen += failures
+            if below.drawn is None:
+                # P(T < s | member) = P(T < s and member) / P(member), and P(member) = 1/count.
+                in_chains += weight * count * below.probability * failures
             else:
-                low += by_member
-                plain += np.bincount(drawn, minlength=count)
-                weight += share
-        chances += weight * low / np.maximum(plain, 1.0)
+                # Plain samples of all repetitions are added up before the division, because
+                # some repetitions have few samples of an interface.
+                low += failures
+                plain += np.bincount(below.drawn, minlength=count)
+                plain_weight += weight
+        chances = in_chains + plain_weight * low / np.maximum(plain, 1.0)
         return np.where(seen >= RESOLVED, np.minimum(chances, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation due to the list, which is a sample of interfaces.
 
-        As in importance sampling, its square is the sum of (p - w)^2 over the entries
-        of the list. An entry has the share w of the list and the share p of the
-        failures. The sum of p^2 is the chance that two failures belong to one entry.
-        This chance is estimated from pairs with different ancestors, which are
-        independent, so that it is not too large if entries have few samples. Members
-        with the same number in `kinds` are one entry.
+        Members with the same number in `kinds` are one entry of the list. An entry has
+        the share w of the list and the share p of the failures. As in importance
+        sampling, the square of the result is the sum of (p - w)^2 over the entries.
         """
         entries = np.bincount(kinds)
-        total, pairs, alike = np.zeros(entries.size), 0.0, 0.0
+        failures, pairs, alike = np.zeros(entries.size), 0.0, 0.0
         for descent in self.repetitions:
-            per_sample, members, ancestors, _ = descent.below(stress)
-            per_sample, sample_kinds = per_sample * descent.samples, kinds[members]
-            total += per_sample * np.bincount(sample_kinds, minlength=entries.size)
-            pairs -= per_sample * per_sample * _squares(ancestors)
-            alike -= per_sample * per_sample * _squares(sample_kinds, ancestors)
-        pairs, alike = pairs + float(total.sum()) ** 2, alike + float(total @ total)
+            below = descent.below(stress)
+            # Samples count by the probability that they represent.
+            per_sample, of_sample = below.probability * descent.samples, kinds[below.members]
+            failures += per_sample * np.bincount(of_sample, minlength=entries.size)
+            pairs -= per_sample * per_sample * _squares(below.ancestors)
+            alike -= per_sample * per_sample * _squares(of_sample, below.ancestors)
+        # The sum of p^2 is the chance that two failures belong to one entry. Only pairs with
+        # different ancestors are independent. Counting all pairs would give too large a chance
+        # if entries have few samples.
+        pairs, alike = pairs + float(failures.sum()) ** 2, alike + float(failures @ failures)
         if not pairs > 0.0:
             return 0.0
-        held = entries / kinds.size
-        expected = float(held @ held)
-        spread = alike / pairs - 2.0 * float(held @ total / total.sum()) + expected
+        w, p = entries / kinds.size, failures / failures.sum()
+        spread = alike / pairs - 2.0 * float(w @ p) + float(w @ w)
         # The entries determine their own mean, which takes one degree of freedom.
-        excess = spread / max(1.0 - expected, 1e-300)
+        excess = spread / max(1.0 - float(w @ w), 1e-300)
         return math.sqrt(max(excess, 0.0))
 
     def quantile(self, probability: float) -> float:
@@ -228,7 +230,7 @@ class Tail(NamedTuple):
         if probability > 1.0 - self.survived:
             return math.inf
         low, high = self.extent
-        for _ in range(80):
+        for _ in range(80):  # bisection halves the interval to the last bit
             middle = 0.5 * (low + high)
             if self.probability(middle) < probability:
                 low = middle
@@ -243,11 +245,10 @@ class Tail(NamedTuple):
         least, highest = self.extent
         if not math.isfinite(cv):
             return lowest, highest
-        width = min(log_width(cv), 700.0)
-        below = probability * math.exp(-width)
+        below, above = lognormal_interval(probability, cv)
+        # No sample is below the least one, so smaller probabilities have no stress.
         seen = self.probability(float(np.nextafter(least, math.inf)))
-        low = self.quantile(below) if below >= seen else lowest
-        return low, self.quantile(min(probability * math.exp(width), 1.0))
+        return self.quantile(below) if below >= seen else lowest, self.quantile(above)
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,12 +321,12 @@ def repeat_until_precise(
         spent += latest.evaluations
         if not latest.complete:
             return repetitions or [latest]
-        # 3.
+        # 3. Only the latest repetition keeps its draws, for checks and failing profiles.
         repetitions = [*(earlier.light() for earlier in repetitions), latest]
         cv = judge(repetitions)
         if cv <= target_cv:
             break
-        # 4.
+        # 4. The error falls with the square root of the number of samples.
         meter.note = f"repetition {len(repetitions)}, c.o.v. {cv:.2g} (target {target_cv:g})"
         total = wanted = sum(repetition.samples for repetition in repetitions)
         price = sum(repetition.evaluations for repetition in repetitions) / total
@@ -376,12 +377,13 @@ def sample_tail(
     label = guide.experiment.method.label if guide else ""
     if auto and guide and pilot:
         share = share_picked(guide(pilot[0]), pilot[1])
+        # The reason is part of the answer, also if the guide is not used.
         reason += f"; of {spent} plain samples the {label} picks {share:.0%} of the weakest"
         guide = guide if share >= LEAST_SHARE_PICKED else None
     # 2. to 4.
     repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
     spent += sum(descent.evaluations for descent in repetitions)
-    # 5.
+    # 5. A walk by a poor guide ends far from the failures, and misses many of them.
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
