@@ -105,7 +105,7 @@ def keep_pages_clean(conf, name):
     """Leave paths, progress and the compilation of kernels out of the printed output of scripts."""
     warnings.formatwarning = lambda text, kind, *_, **__: f"{kind.__name__}: {text}\n"
     logging.getLogger("stiction").setLevel(logging.ERROR)
-    progress.LONG = math.inf
+    progress.PIPE_INTERVAL = math.inf
 
 
 sphinx_gallery_conf = {

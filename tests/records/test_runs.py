@@ -69,7 +69,7 @@ def command(line):
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
         warnings.catch_warnings(action="ignore", category=ResourceWarning),  # of other tests
-        mock.patch.object(progress, "SILENCE", math.inf),
+        mock.patch.object(progress, "PIPE_INTERVAL", math.inf),
     ):
         try:
             commands.main()
