@@ -8,7 +8,8 @@ import numba
 import pytest
 from checks import python
 
-from stiction.base.jit import decorators, folder, internals
+from stiction.base import files
+from stiction.base.jit import decorators, internals
 
 SOURCES = Path(__file__).parents[2] / "src"
 WITHOUT = 'import sys\nsys.modules["stiction.base.jit.internals"] = None\n'
@@ -19,11 +20,10 @@ def test_an_edited_kernel_is_another_folder_for_those_who_call_it(tmp_path, monk
     """numba looks at the kernel's own file only; the kernels here call those of other files."""
     copy = tmp_path / "stiction"
     shutil.copytree(SOURCES / "stiction", copy)
-    monkeypatch.setattr(folder, "__file__", str(copy / "base" / "jit" / "folder.py"))
-    monkeypatch.setattr(folder, "CHOSEN", "")
-    sources = folder._kernel_sources.__wrapped__
-    monkeypatch.setattr(folder, "_kernel_sources", sources)
-    find = folder.kernel_folder.__wrapped__
+    monkeypatch.setattr(files, "__file__", str(copy / "base" / "files.py"))
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr(files, "_kernel_sources", files._kernel_sources.__wrapped__)
+    find = files.kernel_folder.__wrapped__
     monkeypatch.setenv("STICTION_CACHE_DIR", str(tmp_path / "cache"))
     folders = []
     for edited in (

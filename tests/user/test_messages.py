@@ -150,7 +150,7 @@ def test_a_law_whose_inverse_fails_at_zero_is_refused_by_name():
 def test_a_cache_that_cannot_be_used_is_said_once(inside):
     (inside / "file").write_text("")
     folder = inside / "file" / "compiled" / "digest"
-    files._warn_of_no_cache.cache_clear()
+    files._warn_once.cache_clear()
     with pytest.warns(UserWarning, match="cache: .*cannot be used.*STICTION_CACHE_DIR") as seen:
         assert {files.private_folder(folder) for _ in range(2)} == {folder}
     assert len(seen) == 1

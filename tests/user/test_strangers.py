@@ -39,8 +39,7 @@ SOURCES = Path(__file__).parents[2] / "src"
 
 def kept(folder):
     """Where kernels of this folder are kept, and what is warned of."""
-    for cached in (files._stand_in, files._warn_of):
-        cached.cache_clear()
+    files._warn_once.cache_clear()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         return private_folder(folder), [str(one.message) for one in caught]
@@ -98,7 +97,7 @@ def test_the_current_folder_chooses_no_folder_of_kernels(tmp_path, monkeypatch):
     where = (
         "import warnings\nwith warnings.catch_warnings(record=True) as caught:\n"
         "    warnings.simplefilter('always')\n"
-        "    from stiction.base.jit.folder import kernel_folder\n"
+        "    from stiction.base.files import kernel_folder\n"
         "    print(kernel_folder('stiction.random.synthesis', 'x').resolve())\n"
         "    print(*[one.message for one in caught])"
     )

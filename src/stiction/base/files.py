@@ -1,4 +1,4 @@
-"""Files that are complete or absent, archives of arrays, and folders of the cache.
+"""Files that are complete or absent, archives of arrays, folders of the cache and of kernels.
 
 Files may come from strangers. Every reader in the package gets its bytes from
 `read_regular` or `content_of`, and checks the size of its result before it
@@ -6,8 +6,10 @@ allocates memory.
 """
 
 import atexit
+import hashlib
 import io
 import os
+import re
 import shutil
 import stat
 import struct
@@ -26,7 +28,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from stiction.base.errors import InputError, StoreError, warn_user
+from stiction.base.errors import InputError, StoreError
 
 PART = ".part"
 MAX_FILE_BYTES = 2**30
@@ -79,18 +81,9 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
     try:
         return read_regular(path, max_bytes=max_bytes)
     except FileNotFoundError:
-        raise InputError(f"does not exist{_near_file(path)}") from None
+        raise InputError("does not exist") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}") from None
-
-
-def _near_file(path: Path) -> str:
-    """Return a question that suggests a file whose name differs only in case, or ''."""
-    with suppress(OSError):
-        for name in os.listdir(path.parent):
-            if name.casefold() == path.name.casefold():
-                return f"; did you mean {str(path.with_name(name))!r}?"
-    return ""
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
@@ -152,14 +145,11 @@ def cannot(what: str, path: Path, error: BaseException) -> StoreError:
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
     """Write an .npz archive, completely or not at all. Errors are the same as in `write_whole`."""
-
-    def write(aside: Path) -> None:
-        with open(aside, "wb") as stream:  # np.savez would append .npz to a path
-            np.savez(stream, **arrays)
-
+    archive = io.BytesIO()
+    np.savez(archive, **arrays)
     with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, write)
+    write_whole(path, archive.getvalue())
 
 
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
@@ -193,14 +183,9 @@ def cache_folder() -> Path:
 
 
 @cache
-def _warn_of_no_cache(folder: Path, reason: str) -> None:
+def _warn_once(text: str) -> None:
     """Warn once in a process, even where warnings are collected."""
-    warnings.warn(
-        f"cache: {folder} cannot be used ({reason}), so that kernels are compiled in every"
-        " process, which takes up to half a minute; set STICTION_CACHE_DIR to a folder of your own",
-        UserWarning,
-        stacklevel=2,
-    )
+    warnings.warn(f"cache: {text}", UserWarning, stacklevel=2)
 
 
 def private_folder(folder: Path) -> Path:
@@ -222,7 +207,11 @@ def private_folder(folder: Path) -> Path:
             missing.mkdir(mode=0o700, exist_ok=True)
         weakness = _weakness(folder) if os.name == "posix" else ""
     except OSError as error:  # nothing can be kept there
-        _warn_of_no_cache(folder.parent, error.strerror or str(error))
+        _warn_once(
+            f"{folder.parent} cannot be used ({error.strerror or error}), so that kernels are"
+            " compiled in every process, which takes up to half a minute. Set STICTION_CACHE_DIR"
+            " to a folder of your own"
+        )
         return folder
     return _stand_in(weakness, folder.name) if weakness else folder
 
@@ -244,23 +233,16 @@ def _weakness(folder: Path) -> str:
     return ""
 
 
-@cache
 def _stand_in(weakness: str, name: str) -> Path:
     """Return a temporary folder for this process, and warn why it is needed."""
-    _warn_of(weakness)
+    _warn_once(
+        f"{weakness}, so that others could put compiled code there that runs as you. Kernels are"
+        " compiled again in each process. Take write access from others (chmod go-w), or set"
+        " STICTION_CACHE_DIR to an absolute path of a folder of your own"
+    )
     folder = _temporary_folder() / name
     folder.mkdir(mode=0o700, exist_ok=True)
     return folder
-
-
-@cache
-def _warn_of(weakness: str) -> None:
-    warn_user(
-        f"cache: {weakness}, so that others could put compiled code there that runs as you. Kernels"
-        " are compiled again in each process. Take write access from others (chmod go-w), or set"
-        " STICTION_CACHE_DIR to an absolute path of a folder of your own",
-        UserWarning,
-    )
 
 
 @cache
@@ -273,3 +255,59 @@ def _temporary_folder() -> Path:
 
     atexit.register(remove)
     return Path(folder)
+
+
+# -- compiled kernels ----------------------------------------------------------------------------
+
+_IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?", re.MULTILINE)
+
+
+@cache
+def _kernel_sources() -> dict[str, bytes]:
+    """Return, by module, the text of every file that may hold a part of a kernel.
+
+    Files that refuse input hold no part of a kernel, unless they hold one themselves: an
+    edited message recompiles nothing.
+    """
+    package = Path(__file__).parents[1]
+    sources = {}
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        has_kernels = re.search(rb"stiction\.base\.jit import", text)
+        if has_kernels or path.parent.name == "jit" or b"InputError" not in text:
+            name = ".".join(path.relative_to(package.parent).with_suffix("").parts)
+            sources[name.removesuffix(".__init__")] = text
+    return sources
+
+
+@cache
+def kernel_folder(module: str, compiler: str) -> Path:
+    """Return the folder for a module's kernels that a `compiler` (any name) compiled.
+
+    numba treats a compiled kernel as current if the file of the kernel has not
+    changed. It does not notice changes of functions or constants in other files.
+    Therefore every state of the files that a module imports, directly or not, has a
+    separate folder. Friction laws are resolved by type inside kernels and belong to
+    every state. Kernels are code, so only the package or the environment choose their folder.
+    """
+    texts = _kernel_sources()
+    waiting = [
+        name for name in texts if name == module or name.startswith("stiction.problem.friction")
+    ]
+    reached = set(waiting)
+    while waiting:
+        for source, member in _IMPORT.findall(texts[waiting.pop()]):
+            names = {source.decode(), f"{source.decode()}.{member.decode()}"}
+            new = (names & texts.keys()) - reached
+            waiting += new
+            reached |= new
+    state = compiler.encode() + b"".join(texts[name] for name in sorted(reached))
+    digest = hashlib.sha256(state).hexdigest()[:16]
+    if os.path.lexists(".numba_config.yaml"):  # it may come from a stranger
+        _warn_once(
+            ".numba_config.yaml: numba reads this file in the current folder. stiction does not"
+            " take the folder of its compiled kernels from it"
+        )
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    kept = Path(given) if given else cache_folder() / "compiled"
+    return private_folder(kept / digest / module)

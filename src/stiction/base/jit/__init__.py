@@ -1,4 +1,4 @@
-"""Compiled kernels: decorators, use of numba's private parts, and the folder of compiled code."""
+"""Compiled kernels: decorators, and the use of numba's private parts."""
 
 from stiction.base.jit.decorators import ZERO as ZERO
 from stiction.base.jit.decorators import jit as jit

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 
-from stiction.base.jit.folder import kernel_folder
+from stiction.base.files import kernel_folder
 
 internals: Any = None
 with contextlib.suppress(Exception):  # it was deleted, or numba is not one that was tried

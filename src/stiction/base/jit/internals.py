@@ -28,7 +28,7 @@ from numba.core.caching import (
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 
-from stiction.base.jit.folder import kernel_folder
+from stiction.base.files import kernel_folder
 
 NEWEST = (0, 68)
 """The newest numba with which the tests ran."""
