@@ -120,12 +120,10 @@ class OneOf:
         return core_schema.with_info_wrap_validator_function(read, schema, serialization=plain)
 
     def _written(self, value: Any, handler: Any) -> Any:
-        if hasattr(value, "plain"):
-            return value.plain()
         if not dataclasses.is_dataclass(value):
             return handler(value)
         plain = to_plain(value)
-        if self.kinds.get(plain.get("type")) is not type(value):
+        if not hasattr(value, "plain") and self.kinds.get(plain.get("type")) is not type(value):
             raise ValueError(
                 f"{type(value).__name__} is a class of your own that study files cannot name."
                 " Decorate it with stiction.extensions.register"

@@ -414,6 +414,8 @@ def to_plain(value: Any) -> Any:
 
     Raises an `InputError` for parts that exist only in Python, such as a function.
     """
+    if hasattr(value, "plain"):
+        return value.plain()
     try:
         return pydantic.TypeAdapter(type(value)).dump_python(
             value, mode="json", exclude_none=True, by_alias=True

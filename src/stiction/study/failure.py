@@ -79,9 +79,8 @@ def solve_repetition(smallest: float, state: LimitState, span: Span) -> Table:
             rows[name] = getattr(descent, name)
         for name in OF_LEVEL:
             rows[name] = getattr(population, name)
-        columns = population.values, population.ancestors, population.members
-        for name, column in zip(OF_SAMPLE, columns, strict=True):
-            rows[name] = column
+        for name in OF_SAMPLE:
+            rows[name] = getattr(population, f"{name}s")
         parts.append(rows)
     seconds = time.perf_counter() - begin
     return Table(np.concatenate(parts), (), seconds, versions(), tuple(merged(warned)))

@@ -47,7 +47,7 @@ def _part(value: Any) -> tuple[int, int]:
     return number, of
 
 
-AnyPart: TypeAlias = Annotated[Any, BeforeValidator(_part)]
+PartOfRun: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 """Number of a part, from 1, and the number of parts."""
 
 
@@ -158,17 +158,16 @@ class StoredRun:
 
     def curves(self) -> list[xr.Dataset]:
         """Return the failure curve at each point, or NaN at a point without repetitions."""
-        curves: list[xr.Dataset] = self._read(None).curves(self.study.attributes)
+        curves: list[xr.Dataset] = self._read().curves(self.study.attributes)
         return curves
 
-    def _rows(self, only: Sequence[str] | None) -> Any:
+    def _read(self, only: Sequence[str] | None = None) -> Any:
         points, ensemble = self.study.experiments, self.study.ensemble
+        rows: Any
         if self.settings:
-            return Repetitions(points, ensemble.samples, self.settings, only)
-        return Gathered(points, ensemble, only)
-
-    def _read(self, only: Sequence[str] | None) -> Any:
-        rows = self._rows(only)
+            rows = Repetitions(points, ensemble.samples, self.settings, only)
+        else:
+            rows = Gathered(points, ensemble, only)
         self._store.read_into(rows)
         return rows
 
@@ -194,7 +193,7 @@ class StoredRun:
         RunError
             If the run is not complete, and `partial` is False.
         """
-        rows, place = self._read(None), check("path", path, FilePath)
+        rows, place = self._read(), check("path", path, FilePath)
         if not (partial or rows.done.all()):
             raise RunError(
                 f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} exist."

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import re
-import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -13,12 +11,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import pydantic
 import tomli_w
 from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag, model_validator
 
 from stiction.base.errors import InputError, StoreError, prefixed
-from stiction.base.files import content_of, write_whole
+from stiction.base.files import write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
     Count,
@@ -30,9 +27,6 @@ from stiction.base.model import (
     Text,
     check,
     checked,
-    describe,
-    explain,
-    keys_of,
     model,
     to_plain,
 )
@@ -41,11 +35,10 @@ from stiction.ensemble.experiment import Ensemble, Experiment
 from stiction.ensemble.limit_state import StressName
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
-from stiction.inference.peaks import Peaks, make_peaks, read_peaks
+from stiction.inference.peaks import Peaks, make_peaks
 from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem
-from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import (
     FIRST_MEMBERS,
@@ -60,7 +53,8 @@ from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
 from stiction.study.failure import Repetitions, complete_curves
-from stiction.study.run import AnyPart, StoredRun, samples_of_part
+from stiction.study.reading import TABLES, check_toml, read_toml, validated
+from stiction.study.run import PartOfRun, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
 
 if TYPE_CHECKING:
@@ -69,16 +63,9 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 CURVES = "failure_curve"
 """Key of the settings of failure curves beside the study of a run."""
-MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
-"""Bytes of a study file, bytes beside lists of numbers, and dots in a line of those bytes."""
 MOST_WRITTEN = 8
 """Random interfaces that a study file holds itself; more of them are in a file beside it."""
-SHOWN_KEYS = 10
-"""Keys in a message about a file that is no study."""
-_NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
-"""A line that holds numbers, or a key and numbers."""
-
-AnyMethod: Any = Annotated[
+MethodOfStudy: Any = Annotated[
     Any,
     OneOf(
         METHODS, lambda given: NotImplemented if isinstance(given, dict) else as_method(given)
@@ -86,7 +73,7 @@ AnyMethod: Any = Annotated[
     "Method",
 ]
 """Any registered method. In a study file ``type`` selects it."""
-_One: Any = Annotated[
+_Interface: Any = Annotated[
     RandomInterface,
     BeforeValidator(
         lambda given: as_random_interface(given) if isinstance(given, RandomField) else given
@@ -103,8 +90,8 @@ def _interfaces(given: Any) -> Any:
     return given.interfaces(FIRST_MEMBERS) if isinstance(given, Source) else given
 
 
-AnyRandom: Any = Annotated[
-    Annotated[_One, Tag("one")] | Annotated[list[_One], Tag("several")],
+RandomOfStudy: Any = Annotated[
+    Annotated[_Interface, Tag("one")] | Annotated[list[_Interface], Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, list | tuple) else "one"),
     BeforeValidator(_interfaces),
     "RandomInterface | list",
@@ -116,9 +103,9 @@ def _peaks_of(given: Any) -> Any:
     """Return peaks. A study in plain form holds them as a table {unit, values, lengths}."""
     if not isinstance(given, Mapping) or "values" not in given:
         return make_peaks(given)
-    values = given["values"]
-    lengths = given.get("lengths", [None] * len(values))
-    return make_peaks(dict(zip(lengths, values, strict=True)), given.get("unit", "Pa"))
+    lengths = given.get("lengths", [None] * len(given["values"]))
+    groups = dict(zip(lengths, given["values"], strict=True))
+    return make_peaks(groups, given.get("unit", "Pa"))
 
 
 def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
@@ -126,7 +113,7 @@ def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
     return plain if None in peaks.lengths else plain | {"lengths": list(peaks.lengths)}
 
 
-AnyPeaks: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plain_peaks)]
+PeaksOfStudy: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plain_peaks)]
 """Measured peaks; in a study file the name of a file beside it, as `read_peaks` reads."""
 
 
@@ -151,9 +138,8 @@ class Question:
     target_cv: TargetCv = 0.1
 
     @model_validator(mode="after")
-    def _one(self) -> Question:
-        given = [name for name, value in vars(self).items() if value is not None]
-        asked = [name for name in given if name != "target_cv"]
+    def _single(self) -> Question:
+        asked = [name for name in self._given if name != "target_cv"]
         if len(asked) != 1:
             raise InputError(
                 "give either stress (Pa), force (N), friction_coefficient or probability, got"
@@ -161,17 +147,22 @@ class Question:
             )
         return self
 
+    @property
+    def _given(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if value is not None}
+
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
         """Answer the question for a point of a study."""
-        options: dict[str, Any] = {
-            name: value for name, value in vars(self).items() if value is not None
+        options = self._given | {
+            "method": experiment.method,
+            "seed": experiment.seed,
+            "workers": workers,
+            "mixture": getattr(experiment.random, "complete", False),
         }
-        options |= {"method": experiment.method, "seed": experiment.seed, "workers": workers}
-        options["mixture"] = getattr(experiment.random, "complete", False)
-        ask = failure_probability if self.probability is None else design_stress
-        if self.probability is not None:
-            options["sensitivities"] = True
-        return ask(experiment.problem, experiment.random, **options)
+        if self.probability is None:
+            return failure_probability(experiment.problem, experiment.random, **options)
+        options["sensitivities"] = True
+        return design_stress(experiment.problem, experiment.random, **options)
 
 
 @model(kw_only=True)
@@ -179,12 +170,9 @@ class _Parts:
     """The parts of a study at a point of a sweep. Each part is valid by itself."""
 
     problem: Problem
-    random: AnyRandom
-    method: AnyMethod
+    random: RandomOfStudy
+    method: MethodOfStudy
     ensemble: Ensemble
-
-
-PARTS = tuple(_Parts.__dataclass_fields__)
 
 
 @model(kw_only=True)
@@ -255,7 +243,7 @@ class Study(_Parts):
     mixture: Flag = False
     save: Save | None = None
     reliability: Question | None = None
-    peaks: AnyPeaks | None = None
+    peaks: PeaksOfStudy | None = None
     title: Text = ""
 
     @model_validator(mode="after")
@@ -302,33 +290,29 @@ class Study(_Parts):
 
         A mistake is reported once, with the first point at which it occurs.
         """
-        base = _Parts(**{name: getattr(self, name) for name in PARTS})
+        base = _Parts(**{name: getattr(self, name) for name in TABLES})
         made: dict[Any, Any] = {}
-
-        def part(name: str, values: Mapping[str, Any]) -> Any:
-            inside = {key: values[key] for key in values if key.split(".")[0] == name}
-            key = name, *map(id, inside.values())
-            if key not in made:
-                made[key] = getattr(with_values(base, inside), name)
-            return made[key]
-
         experiments: list[Experiment] = []
         problems: dict[str, str] = {}
         for point in self.points:
             try:
-                problem, random, method, ensemble = (part(n, point.values) for n in PARTS)
-                if self.uncertain:
-                    likely = "uncertain", id(random)
-                    made[likely] = made.get(likely) or self._likely(random)
-                    random = made[likely]
-                if self.mixture:
-                    complete = "mixture", id(random)
-                    made[complete] = made.get(complete) or self._mixture(random)
-                    random = made[complete]
-                key = id(problem), id(random), id(method)
+                parts = {}
+                for name in TABLES:
+                    values = {k: v for k, v in point.values.items() if k.split(".")[0] == name}
+                    key = name, *map(id, values.values())
+                    if key not in made:
+                        made[key] = getattr(with_values(base, values), name)
+                    parts[name] = made[key]
+                random = parts["random"]
+                if self.uncertain or self.mixture:
+                    key = "several", id(random)
+                    made[key] = random = made.get(key) or self._several(random)
+                key = id(parts["problem"]), id(random), id(parts["method"])
                 if key not in made:
-                    made[key] = Experiment(problem, random, method, self.ensemble.keep)
-                experiments.append(made[key].with_seed(ensemble.seed))
+                    made[key] = Experiment(
+                        parts["problem"], random, parts["method"], self.ensemble.keep
+                    )
+                experiments.append(made[key].with_seed(parts["ensemble"].seed))
             except InputError as error:
                 where = f", at {point} of the sweep" if point.values else ""
                 for text in error.problems:
@@ -337,27 +321,23 @@ class Study(_Parts):
             raise InputError(problems.values())
         return experiments
 
-    def _mixture(self, random: Any) -> Any:
-        """Return a mixture from a list of interfaces that is complete."""
-        if self.uncertain:
+    def _several(self, random: Any) -> Any:
+        """Return a mixture of a complete list, or of what the uncertain parameters allow."""
+        parameters = dict(self.uncertain or {})
+        count = parameters.pop("count", 0)
+        if not parameters:
+            return as_random(random, mixture=True)
+        if self.mixture:
             raise InputError(
                 "mixture: cannot be combined with [uncertain], whose interfaces are a sample and"
                 " not a complete mixture. Remove mixture"
             )
-        return as_random(random, mixture=True)
-
-    def _likely(self, random: Any) -> Any:
-        """Return equally likely interfaces that follow from the uncertain parameters."""
-        parameters = dict(self.uncertain)
-        count = parameters.pop("count")
         axes = [key for axis in self.sweep for key in axis]
-        swept = [
-            key for key in parameters if any(f"{key}.".startswith(f"{axis}.") for axis in axes)
-        ]
-        if swept:
-            raise InputError(
-                f"uncertain: {swept[0]} is also swept. Remove it from [uncertain] or from the sweep"
-            )
+        for key in parameters:
+            if any(f"{key}.".startswith(f"{axis}.") for axis in axes):
+                raise InputError(
+                    f"uncertain: {key} is also swept. Remove it from [uncertain] or from the sweep"
+                )
         if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
             return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
         return random.uncertain(parameters, count, self.ensemble.seed)
@@ -388,7 +368,7 @@ class Study(_Parts):
         workers: Count | None = None,
         executor: Executor | None = None,
         progress: Progress = True,
-        part: AnyPart | None = None,
+        part: PartOfRun | None = None,
         pilot: Flag = True,
     ) -> xr.Dataset:
         """Run the study, or the samples that are still missing.
@@ -450,7 +430,7 @@ class Study(_Parts):
         workers: Count | None = None,
         executor: Executor | None = None,
         progress: Progress = True,
-        part: AnyPart | None = None,
+        part: PartOfRun | None = None,
     ) -> xr.Dataset:
         """Estimate failure probabilities at every point, or at the missing points.
 
@@ -523,7 +503,7 @@ class Study(_Parts):
             plain["random"] = beside.name
         text = tomli_w.dumps(plain)
         with prefixed("path"):
-            _check_toml(text.encode())
+            check_toml(text.encode())
         try:
             if many:
                 write_whole(beside, json.dumps(interfaces).encode())
@@ -534,13 +514,13 @@ class Study(_Parts):
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
         """Make a study from plain dictionaries. Files of profiles are in `folder`."""
-        return _read(cls, given, folder)
+        place = None if folder is None else check("folder", folder, FilePath)
+        return validated(cls, given, place)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """Read a study from a TOML file."""
-        study: Study = read_with_files(check("path", path, FilePath))[0]
-        return study
+        return read_with_files(check("path", path, FilePath))[0]
 
     @classmethod
     def from_result(cls, result: xr.Dataset) -> Study:
@@ -559,110 +539,20 @@ class Setup:
     """The interface that a study file describes, without random properties."""
 
     problem: Problem
-    method: AnyMethod | None = None
+    method: MethodOfStudy | None = None
     save: Save | None = None
 
 
 def read_setup(path: Path) -> Setup:
     """Read an interface from a study file. The file need not contain the other tables."""
-    keys, given = Setup.__dataclass_fields__, _read_toml(path)
-    return _read(Setup, {key: given[key] for key in given if key in keys}, path.parent)
-
-
-def _check_toml(content: bytes) -> None:
-    """Refuse text that Python's parser would need long for, such as keys with a thousand parts."""
-    words = 0
-    for line in content.split(b"\n"):
-        match = _NUMBERS.fullmatch(line)
-        if match and match[1].count(b".") <= match[1].count(b",") + 1:
-            line = line[: match.start(1)]
-        words += len(line)
-        if line.count(b".") > MAX_DOTS and not line.lstrip().startswith(b"#"):
-            raise InputError(f"has a line with more than {MAX_DOTS} dots beside its numbers")
-    if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
-        raise InputError(
-            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} beside lists of numbers."
-            " Name profiles by files beside the study, such as strength.npy"
-        )
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    with prefixed(str(path)):
-        content = content_of(path)
-        _check_toml(content)
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
-        ) from None
-    except (RecursionError, ValueError) as error:  # a ValueError for integers of many digits
-        raise InputError(
-            f"{path}: is not valid TOML: {error} (`stiction example` prints a study)"
-        ) from None
+    keys, given = Setup.__dataclass_fields__, read_toml(path)
+    return validated(Setup, {key: given[key] for key in given if key in keys}, path.parent)
 
 
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
-    """Return the study in a TOML file, and the files of profiles named in it."""
+    """Return the study in a TOML file, and the files beside it that it names."""
     named: list[Path] = []
-    return _read(Study, _read_toml(path), path.parent, named), named
-
-
-def _read(
-    cls: type[T],
-    given: dict[str, Any],
-    folder: str | Path | None,
-    named: list[Path] | None = None,
-) -> T:
-    """Validate a study or a `Setup` in plain form. Its files are in `folder`.
-
-    Paths of files in the study are added to `named`.
-    """
-    check("study", given, dict)
-    context = {}
-    if given and not {*keys_of(cls)} & {*given}:
-        some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
-        raise InputError(
-            f"study: must have the tables {', '.join(PARTS)}, got {some}. `stiction example` prints"
-            " a study to start from"
-        )
-    saved = given.get("save")
-    if folder is not None and isinstance(saved, dict) and "to" in saved:
-        raise InputError(
-            "save.to: does not belong in a study file. Pass --out to stiction rupture"
-        )
-    if folder is not None:
-        place = check("folder", folder, FilePath)
-
-        def read(profile: Any, name: str) -> Any:
-            file = profile_in_file(profile, name, place)
-            if named is not None and isinstance(file, ProfileFile):
-                named.append(file.path)
-            return file
-
-        context["read"] = read
-        given = dict(given)
-        for key, reader in (("random", _stored_interfaces), ("peaks", read_peaks)):
-            if isinstance(given.get(key), str):
-                file = place / given[key]
-                with prefixed(key):
-                    given[key] = reader(file)
-                if named is not None:
-                    named.append(file)
-    try:
-        return pydantic.TypeAdapter(cls).validate_python(given, context=context)
-    except pydantic.ValidationError as error:
-        raise InputError(explain(error, given)) from None
-
-
-def _stored_interfaces(path: Path) -> list[Any]:
-    """Return the interfaces in a file that `Study.to_toml` wrote."""
-    with prefixed(str(path)):
-        try:
-            interfaces = json.loads(content_of(path))
-        except (RecursionError, ValueError) as error:
-            raise InputError(f"is not valid JSON: {error}") from None
-        return list(check("interfaces", interfaces, list))
+    return validated(Study, read_toml(path), path.parent, named), named
 
 
 def open_run(path: Any) -> StoredRun:

@@ -17,6 +17,7 @@ from stiction.base.variables import UNITS, Variable, unit_of_key
 from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.random.dotted_keys import distributions_of, full_key
 from stiction.random.marginals import Marginal, marginal_of
+from stiction.study.reading import TABLES
 
 INTERFACES = 30
 """Number of equally likely interfaces of a study with uncertain parameters."""
@@ -24,7 +25,6 @@ MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
 """Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
 _FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
-_TABLES = ("problem", "random", "method", "ensemble")
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
@@ -92,8 +92,8 @@ def read_axes(given: Any) -> list[Axis]:
         inside = [longer for longer in keys if f"{longer}.".startswith(f"{key}.")]
         if key in _FIXED:
             problems[f"{key}: cannot be swept"] = None
-        elif table not in _TABLES:
-            problems[unknown_name(key, table, _TABLES)] = None
+        elif table not in TABLES:
+            problems[unknown_name(key, table, TABLES)] = None
         elif len(inside) > 1:
             problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
     points = math.prod(len(next(iter(axis.values()))) for axis in axes)
@@ -113,11 +113,7 @@ def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
     return [{key: list(map(plain, values)) for key, values in axis.items()} for axis in axes]
 
 
-Sweep: TypeAlias = Annotated[
-    Any,
-    BeforeValidator(read_axes),
-    PlainSerializer(_plain_axes),
-]
+Sweep: TypeAlias = Annotated[Any, BeforeValidator(read_axes), PlainSerializer(_plain_axes)]
 """Axes that are crossed: tables of dotted keys that vary together, with lists of values."""
 
 
@@ -138,9 +134,7 @@ def _read_uncertain(given: Any) -> dict[str, Any] | None:
             table = isinstance(given, Marginal) or (
                 isinstance(given, Mapping) and "type" in given
             )
-            plain = marginal_of(given if table else distribution)
-            written = plain.plain() if hasattr(plain, "plain") else to_plain(plain)
-            uncertain[full_key(key)] = written
+            uncertain[full_key(key)] = to_plain(marginal_of(given if table else distribution))
         except ValueError as error:
             raise InputError(f"{key}: {error}") from None
     if len(uncertain) == 1:
