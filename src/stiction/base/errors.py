@@ -176,12 +176,12 @@ def merged(caught: Iterable[Warned]) -> list[Warned]:
         groups.setdefault((key, warning.category, warning.total > 0), []).append(warning)
     return [
         Warned(
-            group[0].text if of_samples else _with_ranges([one.text for one in group]),
+            group[0].text if of_samples else _with_ranges([warning.text for warning in group]),
             category,
-            sum(one.total for one in group),
-            sum(one.affected for one in group),
-            tuple(sorted({number for one in group for number in one.numbers})[:LISTED]),
-            max(one.worst for one in group),
+            sum(warning.total for warning in group),
+            sum(warning.affected for warning in group),
+            tuple(sorted({number for warning in group for number in warning.numbers})[:LISTED]),
+            max(warning.worst for warning in group),
         )
         for (_, category, of_samples), group in groups.items()
     ]

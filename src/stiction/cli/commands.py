@@ -1,4 +1,7 @@
-"""The command line: parse, call, print. Commands import numerics late, so that help is quick."""
+"""The command line: parse, call, print.
+
+Commands import numerics late, so that help is quick. Public names are imported on first use.
+"""
 
 import functools
 import inspect
@@ -20,14 +23,8 @@ import typer
 from typer import Argument, Option
 from typer.models import OptionInfo
 
-from stiction import __version__
-from stiction.base.errors import (
-    InputError,
-    RunError,
-    collect_warnings,
-    printable,
-    unknown_name,
-)
+import stiction as st
+from stiction.base.errors import InputError, RunError, collect_warnings, printable, unknown_name
 from stiction.base.progress import Meter, duration, interrupted
 
 MAX_SHOWN_LINES = 12
@@ -177,9 +174,7 @@ def run(
     """
     import pandas as pd
 
-    from stiction.study.study import Study, open_run
-
-    loaded = Study.from_toml(study)
+    loaded = st.Study.from_toml(study)
     with _resumable(out), _executor(scheduler) as executor:
         result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
     from stiction.cli.report import Page, add_tables  # matplotlib, once the samples are stored
@@ -189,9 +184,7 @@ def run(
     for table in page.parts:
         rows = pd.DataFrame(table["rows"], columns=table["columns"])
         echo(f"{table['title']}\n{rows.to_string(index=False, max_rows=48)}")
-    state = open_run(out).status()
-    echo(f"part {part}: " * bool(part) + f"{state.done} of {state.samples} samples in {out}")
-    if state.failures:
+    if (state := _state_of(out, part)).failures:
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
@@ -208,9 +201,8 @@ def status(run: RunPath) -> None:
     Examples:
       stiction status run
     """
-    from stiction.study.study import open_run
 
-    stored = open_run(run)
+    stored = st.open_run(run)
     state, points = stored.status(), stored.study.points
     samples = state.samples // len(points)
     echo(f"{run}: {' '.join(stored.study.title.split())}".removesuffix(": "))
@@ -256,9 +248,8 @@ def export(
       stiction export run samples.csv --partial
       stiction export run events.csv --events
     """
-    from stiction.study.study import open_run
 
-    stored = open_run(run)
+    stored = st.open_run(run)
     stored.export(out, partial=partial, events=events)
     state = stored.status()
     rest = "" if state.complete else "; the others are missing"
@@ -280,9 +271,8 @@ def report(
     """
     _ignore_local_style()
     from stiction.cli.report import write_report
-    from stiction.study.study import open_run
 
-    path, stored = out or run / "report.html", open_run(run)
+    path, stored = out or run / "report.html", st.open_run(run)
     with Meter("writing the report"):
         write_report(stored, path)
     echo(f"report: {path}")
@@ -443,9 +433,7 @@ def onset(
     import pandas as pd
 
     from stiction.base.variables import ONSET_VARIABLES
-    from stiction.methods.onset import onset as find
     from stiction.methods.protocol import METHODS
-    from stiction.problem.profiles.reading import read_profile
     from stiction.study.run import table_of
     from stiction.study.study import read_setup
 
@@ -453,7 +441,7 @@ def onset(
     problem, of_study = setup.problem, setup.method
     if unknown := [name for name in method or () if name not in METHODS]:
         raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
-    profile = read_profile(
+    profile = st.read_profile(
         strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
         gaps=gaps, value=_column(value), x=_column(x), quantity=quantity, decimal=decimal,
         missing=None if missing is None else [_number(text) for text in missing], skip=skip,
@@ -470,12 +458,8 @@ def onset(
         timed = name == "rupture" and problem.specimen is None
         options = {"loading_rate": LOADING_RATE} if timed else {}
         try:
-            given = of_study is not None and of_study.type == name
-            result = find(
-                problem,
-                profile,
-                method=of_study if of_study and given else METHODS[name](**options),
-            )
+            given = of_study if of_study and of_study.type == name else None
+            result = st.onset(problem, profile, method=given or METHODS[name](**options))
             table = table_of(result[[key for key in printed if key in result]])
             rows[name] = {key: v[0] for key, v in table.items() if key.startswith(printed)}
         except (InputError, TypeError) as error:  # TypeError: it has options without defaults
@@ -507,8 +491,7 @@ def rupture(
         int | None, Option(min=0, help="Sample of the study's strength; 0 by default.")
     ] = None,
     strength: Annotated[
-        Path | None,
-        Option(metavar="PROFILE", help="Peak strength, instead of a sample."),
+        Path | None, Option(metavar="PROFILE", help="Peak strength, instead of a sample.")
     ] = None,
     film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
 ) -> None:
@@ -527,37 +510,33 @@ def rupture(
       stiction rupture study.toml --strength profile.csv --out rupture
     """
     _ignore_local_style()
-    from stiction import plot
-    from stiction.methods.dynamics.method import Rupture
-    from stiction.methods.dynamics.simulate import simulate_rupture
-    from stiction.problem.profiles.reading import read_profile
     from stiction.study.run import write_result
-    from stiction.study.study import Study, read_setup
+    from stiction.study.study import read_setup
 
     out.mkdir(parents=True, exist_ok=True)
     profiles: Any
     if strength is not None and sample is not None:
         raise InputError("--sample: has no effect beside --strength. Leave one of them out")
     if strength is None:
-        loaded = Study.from_toml(study)
+        loaded = st.Study.from_toml(study)
         point, save = loaded.experiments[0], loaded.save
         problem, method = point.problem, point.method
         profiles = point.profiles(point.draws(sample or 0, 1))
     else:
         setup = read_setup(study)
         problem, method, save = setup.problem, setup.method, setup.save
-        profiles = read_profile(strength, interface=problem.interface)
-    if not isinstance(method, Rupture):
-        method = Rupture(loading_rate=None if problem.specimen else LOADING_RATE)
-    result = simulate_rupture(problem, profiles, method=method, save=save)
+        profiles = st.read_profile(strength, interface=problem.interface)
+    if not isinstance(method, st.Rupture):
+        method = st.Rupture(loading_rate=None if problem.specimen else LOADING_RATE)
+    result = st.simulate_rupture(problem, profiles, method=method, save=save)
     write_result(result, out / "rupture.nc")
     echo(_summary(result))
     with Meter("drawing the figures"):
-        _save_figure(plot.rupture(result, problem=problem), out / "rupture")
+        _save_figure(st.plot.rupture(result, problem=problem), out / "rupture")
         if problem.specimen is not None:
-            _save_figure(plot.block(result, problem=problem).flat[0], out / "block")
+            _save_figure(st.plot.block(result, problem=problem).flat[0], out / "block")
     if film:
-        echo(f"film: {plot.film(result, out / 'rupture.gif')}")
+        echo(f"film: {st.plot.film(result, out / 'rupture.gif')}")
     echo(f"written to {out}")
 
 
@@ -632,9 +611,8 @@ def reliability(
       stiction reliability study.toml --out curve --smallest 1e-6
     """
     from stiction.study.run import table_of
-    from stiction.study.study import Study, open_run
 
-    loaded = Study.from_toml(study)
+    loaded = st.Study.from_toml(study)
     if lines:
         try:
             table = tomllib.loads("\n".join(lines))
@@ -644,34 +622,24 @@ def reliability(
                 f" 'problem.friction.residual_ratio = [0.6, 0.8]': {error}"
             ) from None
         loaded = replace(loaded, uncertain=(loaded.uncertain or {}) | table)
-    options = {
-        "force": force, "stress": stress, "friction_coefficient": friction_coefficient,
-        "probability": probability,
-    }  # fmt: skip
-    asked = {name: value for name, value in options.items() if value is not None}
-    of_curve = {
-        "smallest": smallest, "repetitions": repetitions, "part": part, "scheduler": scheduler,
-    }  # fmt: skip
+    asked = _given(
+        force=force, stress=stress, friction_coefficient=friction_coefficient,
+        probability=probability,
+    )  # fmt: skip
+    of_curve = _given(smallest=smallest, repetitions=repetitions, part=part)
     if out is None:
-        given = [name for name, value in of_curve.items() if value is not None]
-        if given:
+        if given := of_curve | _given(scheduler=scheduler):
             raise InputError(
                 f"{_options_of(given)}: applies to a whole curve only. Add --out FOLDER"
             )
         _answer(loaded, asked, workers, page)
         return
-    if page is not None:
-        asked["page"] = 0.0
-    if asked:
+    if asked := asked | _given(page=page):
         raise InputError(
             f"--out: computes a whole curve. Leave out --out or {_options_of(asked)}"
         )
     with _resumable(out), _executor(scheduler) as executor:
-        curve = loaded.failure_curve(
-            out=out, workers=workers, executor=executor, part=part,
-            repetitions=8 if repetitions is None else repetitions,
-            smallest=1e-9 if smallest is None else smallest,
-        )  # fmt: skip
+        curve = loaded.failure_curve(out=out, workers=workers, executor=executor, **of_curve)
     echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
     if "members" in curve:
         echo(
@@ -679,10 +647,21 @@ def reliability(
             " decide with. probability_low and _high: its 95 % interval. band_low and _high: 90 %"
             " of the interfaces"
         )
-    state = open_run(out).status()
-    echo(
-        f"part {part}: " * bool(part) + f"{state.done} of {state.samples} repetitions in {out}"
-    )
+    _state_of(out, part)
+
+
+def _state_of(out: Path, part: str | None) -> Any:
+    """Print how much of a run is stored, and return its state."""
+
+    stored = st.open_run(out)
+    state = stored.status()
+    beginning = f"part {part}: " if part else ""
+    echo(f"{beginning}{state.done} of {state.samples} {stored.counted} in {out}")
+    return state
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def _options_of(names: Iterable[str]) -> str:
@@ -694,8 +673,6 @@ def _answer(
     study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
 ) -> None:
     """Print, for each point, the answer to the question in the command or in the study."""
-    from stiction.ensemble.monte_carlo import monte_carlo
-    from stiction.inference.agreement import agreement
     from stiction.study.study import Question
 
     question = study.reliability
@@ -717,19 +694,16 @@ def _answer(
         echo(f"{where}{answer}")
         evidence = []
         if study.peaks is not None:
-            predicted = monte_carlo(
+            predicted = st.monte_carlo(
                 experiment.problem, experiment.random, method=experiment.method,
                 samples=COMPARED_SAMPLES, seed=experiment.seed, workers=workers,
             )  # fmt: skip
-            evidence.append(agreement(predicted, study.peaks))
+            evidence.append(st.statistics.agreement(predicted, study.peaks))
             echo(f"{where}{evidence[0]}")
         if page is not None:
-            from stiction.cli.design_page import write_design_page
-
-            number = f"_{point.number}" if point.values else ""
-            path = page.with_stem(page.stem + number)
+            path = page.with_stem(page.stem + (f"_{point.number}" if point.values else ""))
             title = study.title or "Design of a joint"
-            write_design_page(
+            st.write_design_page(
                 answer, path, problem=experiment.problem, evidence=evidence, title=title
             )
             echo(f"page: {path}")
@@ -748,7 +722,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        echo(f"stiction {__version__}")
+        echo(f"stiction {st.__version__}")
         raise typer.Exit
 
 

@@ -29,12 +29,7 @@ from stiction.study.run import StoredRun
 MOST_ROWS = 200
 MOST_FIGURES = 12
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
-REPORTED = (
-    "critical_stress",
-    "first_instability",
-    "friction_coefficient",
-    "critical_force",
-)
+REPORTED = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
 SPREAD = ("mean", "standard deviation")
 
 
@@ -110,10 +105,7 @@ def write_report(run: StoredRun, path: Path) -> None:
         if run.settings:
             add_curves(page, run)
         else:
-            result, axes = (
-                run.dataset(only=[*REPORTED, "critical_position"]),
-                run.study.axes,
-            )
+            result, axes = (run.dataset(only=[*REPORTED, "critical_position"]), run.study.axes)
             add_figures(page, result, list(axes))
             add_tables(page, result, axes)
     if state.failures:
