@@ -7,7 +7,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Names, Number, Numbers, check, checked, describe
+from stiction.base.model import Count, Names, Number, RealArray, check, checked, describe
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import limit_state
 from stiction.inference.likelihood import Simulation, simulate
@@ -92,7 +92,7 @@ def simulator(
     def simulated(theta: Any, *, first: int = 0) -> Array:
         """Return the peaks (samples,), Pa, of samples first, first + 1, ... at theta."""
         first = check("first", first, Number)
-        values = check("theta", theta, Numbers)
+        values = check("theta", theta, RealArray)
         if values.shape != (len(parameters),) or not np.isfinite(values).all():
             raise InputError(
                 f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"

@@ -10,7 +10,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.model import FilePath, Number, Numbers, check, checked, describe, is_finite
+from stiction.base.model import FilePath, Number, RealArray, check, checked, describe, is_finite
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, is_in, magnitude
 from stiction.inference.curves import Curves
@@ -142,7 +142,7 @@ def _values(given: Any, unit: str) -> Array:
         numbers, stated = with_stated_unit(given, VARIABLES)
     if si_of(stated or unit) != si_of(unit):
         raise InputError(f"peaks: are in {stated}, but unit = {unit!r}. Pass unit={stated!r}")
-    values: Array = check("peaks", numbers, Numbers)
+    values: Array = check("peaks", numbers, RealArray)
     if values.ndim != 1:
         raise InputError(
             "peaks: must be a list of numbers for a single kind of specimen, got"

@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Number, Numbers, check, checked
+from stiction.base.model import Count, Number, RealArray, check, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
@@ -178,7 +178,7 @@ class Posterior(Result):
         return float(values[0]) if given.ndim == 1 else values
 
     def _points(self, name: str, given: Any) -> Array:
-        points: Array = check(name, given, Numbers)
+        points: Array = check(name, given, RealArray)
         wanted = len(self.names)
         if points.ndim not in (1, 2) or points.shape[-1] != wanted:
             raise InputError(

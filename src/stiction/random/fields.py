@@ -37,9 +37,9 @@ from stiction.base.model import (
     Count,
     Flag,
     Number,
-    Numbers,
     Positive,
     Real,
+    RealArray,
     check_memory,
     checked,
     describe,
@@ -489,7 +489,7 @@ class RandomInterface:
         return draws[0] if len(draws) == 1 else np.concatenate(draws, axis=1)
 
     @checked
-    def from_draws(self, interface: Interface, draws: Numbers) -> dict[str, Array]:
+    def from_draws(self, interface: Interface, draws: RealArray) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles (samples, *shape) by name.
 
         For a property that is not random, the name is `FACTOR` followed by the

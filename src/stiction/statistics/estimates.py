@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Numbers, Real, check, checked
+from stiction.base.model import Real, RealArray, check, checked
 from stiction.base.representation import Result, Row, Summary, brief
 
 GRID_CELLS = 4096
@@ -30,7 +30,7 @@ class WithError:
 
 def as_sample(values: Any, fewest: int = 2) -> Array:
     """Return finite values as a flat array with at least `fewest` entries."""
-    array = check("values", values, Numbers).ravel()
+    array = check("values", values, RealArray).ravel()
     if array.size < fewest:
         raise InputError(f"values: at least {fewest} are needed, got {array.size}")
     if not np.all(np.isfinite(array)):
@@ -92,7 +92,7 @@ class Quantiles(Result):
 
 
 @checked
-def quantiles(values: Any, probability: Numbers) -> Quantiles:
+def quantiles(values: Any, probability: RealArray) -> Quantiles:
     """Estimate quantiles of independent values, with distribution-free confidence intervals.
 
     Parameters

@@ -27,7 +27,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Flag, Numbers, Positive, Real, checked, describe
+from stiction.base.model import Flag, Positive, Real, RealArray, checked, describe
 from stiction.problem.problem import Problem
 
 MIN_POINTS = 512  # Gauss-Chebyshev points along a crack, exact to round-off for smooth drops
@@ -38,7 +38,7 @@ N_HALVINGS = 30
 
 @checked
 def energy_release_rate(
-    problem: Problem, load: Real, lengths: Numbers, *, centre: Real = 0.0
+    problem: Problem, load: Real, lengths: RealArray, *, centre: Real = 0.0
 ) -> Array:
     """Return the static energy release rate at both tips of a crack, from Bueckner's weights.
 
@@ -95,7 +95,7 @@ def energy_release_rate(
 @checked
 def griffith_length(
     problem: Problem,
-    load: Numbers,
+    load: RealArray,
     fracture_energy: Positive,
     *,
     centre: Real = 0.0,

@@ -18,7 +18,7 @@ import xarray as xr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Numbers, check, check_memory, describe
+from stiction.base.model import RealArray, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.equilibrium.events import (
     elongation_of,
@@ -49,7 +49,7 @@ LOAD_RTOL = 1e-9
 
 
 def _check_loads(loads: Any) -> Array:
-    given = np.atleast_1d(check("loads", loads, Numbers))
+    given = np.atleast_1d(check("loads", loads, RealArray))
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
     if not (rises and np.isfinite(given[-1])):
         raise InputError(
