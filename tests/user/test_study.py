@@ -12,6 +12,7 @@ from setups import LOCAL, beta_strength, make_problem
 from small_study import altered, small_study
 
 import stiction as st
+from stiction.base.errors import StoreError
 
 STUDY = small_study()
 BASE = st.Study.from_dict(STUDY)
@@ -76,6 +77,12 @@ def test_a_sweep_in_toml_python_and_the_result(tmp_path):
     assert st.Study.from_result(study.run()) == study
     study.to_toml(path)
     assert st.Study.from_toml(path) == study
+
+
+def test_a_study_that_cannot_be_written_is_a_failure_of_the_run(tmp_path):
+    """As for other files: a full disk is no invalid input."""
+    path = tmp_path / "missing" / "study.toml"
+    refuses("cannot be written: No such file", lambda: BASE.to_toml(path), StoreError)
 
 
 def test_a_function_cannot_be_written_down(tmp_path):

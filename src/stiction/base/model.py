@@ -338,24 +338,31 @@ def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.Val
     return pydantic.ValidationError.from_exception_data(error.title, kept)
 
 
-def call_by_names(
-    call: Callable[..., Any], signature: inspect.Signature, owner: str, args: Any, kwargs: Any,
-    root: str = "",
-) -> Any:  # fmt: skip
-    """Call a function that pydantic validates, or raise an `InputError` that lists all mistakes."""
-    by_place = [
-        name
-        for name, parameter in signature.parameters.items()
-        if parameter.kind is not parameter.KEYWORD_ONLY
-    ]
-    given = dict(zip(by_place, args, strict=False)) | kwargs
-    names = [name for name in signature.parameters if name != "self"]
-    if len(given) < len(args) + len(kwargs):  # too many by place, or a name given twice
-        raise InputError(f"{owner}: give the arguments by name (valid: {', '.join(names)})")
-    try:
-        return call(**given)
-    except pydantic.ValidationError as error:
-        raise InputError(explain(named(error, names), given, root, owner)) from None
+class Door:
+    """A public call or constructor, where an `InputError` lists all mistakes in the arguments."""
+
+    def __init__(self, owner: str, signature: inspect.Signature, root: str = "") -> None:
+        parameters = signature.parameters.values()
+        self.owner, self.root = owner, root
+        self.names = [parameter.name for parameter in parameters if parameter.name != "self"]
+        self.by_place = [
+            parameter.name
+            for parameter in parameters
+            if parameter.kind is not parameter.KEYWORD_ONLY
+        ]
+
+    def call(self, validated: Callable[..., Any], args: Any, kwargs: dict[str, Any]) -> Any:
+        """Call a function that pydantic validates, with all arguments by name."""
+        given = dict(zip(self.by_place, args, strict=False)) | kwargs
+        if len(given) < len(args) + len(kwargs):  # too many by place, or a name given twice
+            raise InputError(
+                f"{self.owner}: give the arguments by name (valid: {', '.join(self.names)})"
+            )
+        try:
+            return validated(**given)
+        except pydantic.ValidationError as error:
+            error = named(error, self.names)
+            raise InputError(explain(error, given, self.root, self.owner)) from None
 
 
 # -- objects and functions -----------------------------------------------------------------------
@@ -395,8 +402,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 
     @functools.wraps(validated_init)
     def init(self: Any, *args: Any, **kwargs: Any) -> None:
-        validate, owner = functools.partial(validated_init, self), cls.__name__
-        call_by_names(validate, signature, owner, args, kwargs, root=owner)
+        door.call(functools.partial(validated_init, self), args, kwargs)
 
     # Validation inside another model must keep calling pydantic's own path, not
     # this wrapper.
@@ -405,7 +411,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of
     hints = typing.get_type_hints(cls, include_extras=True)
     keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
-    signature = wrapped.__signature__ = plain_signature(wrapped, keys)
+    wrapped.__signature__ = plain_signature(wrapped, keys)
+    door = Door(cls.__name__, wrapped.__signature__, cls.__name__)
     return wrapped
 
 
@@ -445,10 +452,11 @@ def checked(function: Function) -> Function:
     )
     function.__annotations__ = written
     signature = plain_signature(function, hints)
+    door = Door(function.__name__, signature)
 
     @functools.wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        return call_by_names(validated, signature, function.__name__, args, kwargs)
+        return door.call(validated, args, kwargs)
 
     typing.cast(Any, call).__signature__ = signature
     return typing.cast(Function, call)

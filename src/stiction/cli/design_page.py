@@ -59,7 +59,9 @@ def write_design_page(
     Raises
     ------
     InputError
-        If the answer is not a design, or if the file cannot be written.
+        If the answer is not a design.
+    StoreError
+        If the file cannot be written.
 
     Examples
     --------
@@ -100,10 +102,7 @@ def write_design_page(
         page.listing(f"Evidence: {type(item).__name__}", str(item))
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
     page.table("Doubts", ["doubt"], [[text] for text in dict.fromkeys(doubts or ["none"])])
-    try:
-        write_whole(place, page.html().encode())
-    except OSError as error:
-        raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
+    write_whole(place, page.html().encode())
     return place
 
 

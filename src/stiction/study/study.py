@@ -493,23 +493,20 @@ class Study(_Parts):
     def to_toml(self, path: str | Path) -> None:
         """Write the study to a TOML file. Many interfaces are written to a JSON file beside it.
 
-        Raises an `InputError` if a part exists only in Python, or if the file cannot
-        be written.
+        Raises an `InputError` if a part exists only in Python, and a `StoreError` if the
+        file cannot be written.
         """
         plain, place = self.to_dict(), check("path", path, FilePath)
         beside = place.with_suffix(".random.json")
         interfaces = plain["random"]
         if many := isinstance(interfaces, list) and len(interfaces) > MOST_WRITTEN:
             plain["random"] = beside.name
-        text = tomli_w.dumps(plain)
+        text = tomli_w.dumps(plain).encode()
         with prefixed("path"):
-            check_toml(text.encode())
-        try:
-            if many:
-                write_whole(beside, json.dumps(interfaces).encode())
-            place.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"path: {path} cannot be written: {error.strerror}") from None
+            check_toml(text)
+        if many:
+            write_whole(beside, json.dumps(interfaces).encode())
+        write_whole(place, text)
 
     @classmethod
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
