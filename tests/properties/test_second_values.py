@@ -70,6 +70,45 @@ def test_a_plot_of_sample_1_is_the_plot_of_its_row_alone(kind):
     assert not same(second, first)
 
 
+def test_a_plot_reads_units_and_directions_like_a_call():
+    """A profile in MPa was drawn as one in Pa, and a map over (y, x) with its axes swapped."""
+    onset = st.onset(LINE, TWO, method=LOCAL)
+    labelled = xr.DataArray(TWO * 1e-6, dims=("sample", "x"), attrs={"units": "MPa"})
+    pairs = [
+        [drawn(st.plot.onset(onset, rows, problem=LINE)) for rows in (labelled, TWO)],
+        [drawn(st.plot.field(LINE, rows)) for rows in (labelled, TWO)],
+        [
+            drawn(st.plot.field(PLANE, rows))
+            for rows in (xr.DataArray(PLANE_STRENGTH.T, dims=("y", "x")), PLANE_STRENGTH)
+        ],
+    ]
+    for drawing, reference in pairs:
+        assert same(drawing, reference)
+
+
+def test_a_plot_refuses_what_it_cannot_draw():
+    for name in {*st.plot.__all__} - {"paper_style", "field", "film", "onset"}:
+        for wrong in (3, "result", None, [3]):
+            with pytest.raises(st.InputError):
+                getattr(st.plot, name)(wrong)
+    assert not plt.get_fignums()
+
+
+def test_a_sample_that_does_not_exist_is_refused():
+    onset = st.onset(JOINT, JOINT_STRENGTH, method=LOCAL)
+    for sample in (2, -1, 0.5, "a"):
+        with pytest.raises(st.InputError, match="sample: "):
+            st.plot.specimen(JOINT, JOINT_STRENGTH, onset, sample=sample)
+        with pytest.raises(st.InputError, match="sample: "):
+            st.plot.onset(onset, JOINT_STRENGTH, problem=JOINT, sample=sample)
+    with pytest.raises(st.InputError, match="sample: 1 of results and strength with 1, 2"):
+        st.plot.specimen(JOINT, JOINT_STRENGTH[:1], onset, sample=1)
+    run = xr.Dataset({"slip_rate": (("time", "x"), np.ones((3, 96)))})
+    with pytest.raises(st.InputError, match=r"problem: has \(64,\) nodes, the result \(96,\)"):
+        st.plot.rupture(run.assign(onset_time=0.0, critical_position=0.0), problem=JOINT)
+    assert not plt.get_fignums()
+
+
 SWEPT = {
     name: xr.Dataset(
         {"critical_stress": (("length", "sample"), values, {"units": "Pa"})},

@@ -1,7 +1,7 @@
 """Axes, which are given or new, units of their scales, and the problem behind a result."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -19,7 +19,7 @@ from matplotlib.ticker import (
 )
 
 from stiction.base.errors import InputError
-from stiction.base.model import check
+from stiction.base.model import check, describe
 from stiction.base.units import unit_for
 from stiction.base.variables import DIRECTION, FRICTION_COEFFICIENT
 from stiction.plot.style import COLUMN, keep_contrast, paper_style
@@ -104,7 +104,11 @@ def on_axes(
 def problem_of(result: Any, problem: Problem | None = None) -> Problem:
     """Return the given problem, or the problem in the attributes of a result."""
     if problem is not None:
-        return check("problem", problem, Problem)
+        sizes = check("problem", problem, Problem).interface.shape
+        shape = tuple(result.sizes[dim] for dim in ("x", "y") if dim in result.sizes)
+        if shape not in ((), sizes):
+            raise InputError(f"problem: has {sizes} nodes, the result {shape}")
+        return problem
     try:
         plain = json.loads(result.attrs["study"])["problem"]
         return pydantic.TypeAdapter(Problem).validate_python(plain)
@@ -121,7 +125,7 @@ def need(result: Any, *names: str, hint: str = "") -> None:
     missing = [name for name in names if name not in result]
     if missing:
         raise InputError(
-            f"result: has no {', '.join(missing)}. It holds"
+            f"result: has no {', '.join(map(str, missing))}. It holds"
             f" {', '.join(map(str, result.data_vars))}{hint}"
         )
 
@@ -130,6 +134,10 @@ def named(results: Any) -> dict[str, xr.Dataset]:
     """Return results by name. If no names are given, use the names of the methods."""
     if isinstance(results, xr.Dataset):
         results = [results]
+    if isinstance(results, str) or not isinstance(results, Sequence | Mapping):
+        raise InputError(f"result: must be a Dataset, or several, got {describe(results)}")
+    for result in results.values() if isinstance(results, Mapping) else results:
+        check("result", result, xr.Dataset)
     if not isinstance(results, Mapping):
         by_name: dict[str, Any] = {}
         for number, result in enumerate(results):

@@ -354,6 +354,7 @@ def failure_curve(
     return axes
 
 
+@checked
 def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     """Draw the sensitivities of a design. The widest is at the top.
 

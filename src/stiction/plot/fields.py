@@ -1,5 +1,6 @@
 """Figures of profiles along a line and maps of a plane, with onsets."""
 
+import math
 from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
@@ -9,8 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from stiction.base.errors import InputError
-from stiction.base.model import check
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, prefixed
+from stiction.base.model import as_numbers, check, is_whole
 from stiction.base.units import unit_for
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.methods.criterion.local import nucleation_stress
@@ -28,9 +30,9 @@ from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import IN_GAP, MEASURED
+from stiction.problem.profiles.reading import at_nodes
 from stiction.random.fields import RandomField
 
-Array = NDArray[np.float64]
 MOST_LINES = 6
 
 
@@ -85,7 +87,8 @@ def field(
     if quantity not in (known := (*PROFILES, "friction_coefficient")):
         raise InputError(f"quantity: must be in {', '.join(known)}, got {quantity!r}")
     si = QUANTITIES[quantity].units
-    rows = rows_of(interface, profile.quantile(interface, 0.5) if of_field else profile)
+    given = profile.quantile(interface, 0.5) if of_field else profile
+    rows = rows_of(interface, given, quantity)
     factor, unit = unit_for(si, rows)
     text = with_unit(quantity.replace("_", " "), unit)
     scale, _ = unit_for("m", interface.lengths)
@@ -113,10 +116,12 @@ def field(
     return axes
 
 
-def rows_of(interface: Interface, profile: Any) -> Array:
-    """Return a profile as (samples, *shape), or raise an `InputError` for a wrong shape."""
-    values = np.asarray(getattr(profile, "values", profile), dtype=np.float64)
+def rows_of(interface: Interface, profile: Any, quantity: str = "strength") -> Array:
+    """Return a profile as (samples, *shape) in SI, with NaN in gaps, or raise an `InputError`."""
     shape = interface.shape
+    given, _ = at_nodes(quantity, profile, interface, "skip")
+    with prefixed("profile"):
+        values = as_numbers(given)
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:
         wanted = ", ".join(map(str, shape))
         raise InputError(
@@ -206,28 +211,44 @@ def onset(
     for dataset in results.values():
         need(dataset, "critical_load", "critical_position")
     problem = problem_of(next(iter(results.values())), problem)
-    rows = rows_of(problem.interface, strength)
-    if is_coefficient(strength) and problem.given_pressure is not None:
-        rows = rows * problem.normal_pressure
-    counts = {rows.shape[0], *(dataset.sizes["sample"] for dataset in results.values())}
-    if len(counts) > 1 or not 0 <= sample < min(counts):
-        raise InputError(
-            f"sample: {sample} of results and strength with {', '.join(map(str, sorted(counts)))}"
-            " samples. They must have the same number"
-        )
-    chosen = {
-        name: dataset.isel(sample=slice(sample, sample + 1))
-        for name, dataset in results.items()
-    }
+    rows = strength_of(problem, strength)
+    row = chosen_row(rows, results, sample)
     is_plane = problem.interface.is_plane
     size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
-        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], chosen)
+        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], row)
         if ax is None:  # below new axes, but inside axes of the caller, whose layout stays
             axes.figure.legend(loc="outside lower center", ncols=2)
         else:
             axes.legend(fontsize="small")
     return axes
+
+
+def strength_of(problem: Problem, strength: Any) -> Array:
+    """Return profiles (samples, *shape), Pa. Coefficients are multiplied by the pressure."""
+    if is_coefficient(strength) and problem.given_pressure is not None:
+        coefficient = rows_of(problem.interface, strength, "friction_coefficient")
+        return np.asarray(coefficient * problem.normal_pressure)
+    return rows_of(problem.interface, strength)
+
+
+def chosen_row(
+    rows: Array | None, results: Mapping[str, xr.Dataset], sample: int
+) -> dict[str, xr.Dataset]:
+    """Return one sample of results, which must have as many samples as given rows of a profile."""
+    by_sample = {
+        name: result if "sample" in result.dims else result.expand_dims("sample")
+        for name, result in results.items()
+    }
+    counts = {result.sizes["sample"] for result in by_sample.values()}
+    counts |= set() if rows is None else {len(rows)}
+    if len(counts) > 1 or not is_whole(sample, 0) or sample >= min(counts, default=math.inf):
+        raise InputError(
+            f"sample: {sample} of results and strength with {', '.join(map(str, sorted(counts)))}"
+            " samples. They must have the same number"
+        )
+    only = slice(int(sample), int(sample) + 1)
+    return {name: result.isel(sample=only) for name, result in by_sample.items()}
 
 
 def _draw_line(

@@ -7,6 +7,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import fft
 
+from stiction.base.arrays import Array
+from stiction.base.model import checked
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
@@ -24,8 +26,6 @@ from stiction.plot.style import (
     paper_style,
 )
 
-Array = NDArray[np.float64]
-
 SHOWN = 100
 """Repetitions, or simulated records, behind a band that contains 90 % of them."""
 LAGS = 2.5
@@ -34,6 +34,7 @@ PER_OCTAVE = 4
 """Bands of wavenumbers in an octave."""
 
 
+@checked
 def fit(field_fit: FieldFit) -> NDArray[Any]:
     """Draw a fitted random field beside the records.
 
@@ -199,6 +200,7 @@ def _band(axes: Axes, at: Any, rows: Any) -> None:
     axes.fill_between(at, low, high, color=color(1), alpha=0.25, linewidth=0.0)
 
 
+@checked
 def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
     """Draw measured peaks as steps on the predicted distribution.
 

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
+from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Count, FilePath, check
 from stiction.base.progress import Meter, Show
@@ -42,7 +43,6 @@ from stiction.plot.style import (
 )
 from stiction.problem.problem import Problem
 
-Array = NDArray[np.float64]
 Moving = list[tuple[Any, str, Any]]
 """Moving parts of a figure: an artist, the name of its data, and the data by frame."""
 
@@ -194,9 +194,14 @@ def events(
     for dataset in results.values():
         need(dataset, "event_moment", size, hint=hint)
     unit = next(iter(results.values()))["event_moment"].attrs["units"]
-    sizes = [dataset[size].values.ravel() for dataset in results.values()]
-    moments = [dataset["event_moment"].values.ravel() for dataset in results.values()]
-    drops = [dataset["event_area_stress_drop"].values.ravel() for dataset in results.values()]
+    sizes, moments, drops = (
+        [dataset[name].values.ravel() for dataset in results.values()]
+        for name in (size, "event_moment", "event_area_stress_drop")
+    )
+    known = np.concatenate(sizes)
+    known = known[np.isfinite(known)]
+    if not known.size:
+        raise InputError("result: has no events to draw, because none came to rest")
     figure = new_figure(PAGE, 2.8)
     with paper_style():
         left, right = figure.subplots(1, 2)
@@ -210,9 +215,7 @@ def events(
                 sizes[number], moments[number], ".", color=color(number), markersize=3.0,
                 label=name if len(results) > 1 else None,
             )  # fmt: skip
-        known = np.concatenate(sizes)
-        known = known[np.isfinite(known)]
-        if system.specimen is None and known.size:
+        if system.specimen is None:
             span = np.array([known.min(), known.max()])
             drop = float(np.nanmedian(np.concatenate(drops)))
             factor, stress_unit = unit_for("Pa", np.array([drop]))
@@ -224,16 +227,12 @@ def events(
             right.legend()
         if len(results) > 1:
             left.legend()
-        left.set(
-            xscale="log",
-            yscale="log",
-            xlabel=f"moment ({unit})",
-            ylabel="events per sample, at least as large",
-        )
+        left.set(xlabel=f"moment ({unit})", ylabel="events per sample, at least as large")
         text = "area (m²)" if plane else "length (m)"
-        right.set(xscale="log", yscale="log", xlabel=text, ylabel=f"moment ({unit})")
-        space_numbers(left)
-        space_numbers(right)
+        right.set(xlabel=text, ylabel=f"moment ({unit})")
+        for axes in (left, right):
+            axes.set(xscale="log", yscale="log")
+            space_numbers(axes)
     return np.array([left, right])
 
 

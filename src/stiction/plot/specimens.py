@@ -9,17 +9,24 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.inference.curves import Curves
-from stiction.plot.axes import FigureAxes, need, new_figure, on_axes, problem_of, with_unit
-from stiction.plot.fields import rows_of
+from stiction.plot.axes import (
+    FigureAxes,
+    named,
+    need,
+    new_figure,
+    on_axes,
+    problem_of,
+    with_unit,
+)
+from stiction.plot.fields import chosen_row, strength_of
 from stiction.plot.style import ACCENT, COLUMN, INK, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
 from stiction.problem.specimen import Pusher
-
-Array = NDArray[np.float64]
 
 
 def specimen(
@@ -61,6 +68,10 @@ def specimen(
     """
     check("problem", problem, Problem)
     blocks, interface = problem.blocks, problem.interface
+    rows = None if strength is None else strength_of(problem, strength)
+    if result is not None:
+        need(result, "critical_position", "critical_patch_length")
+    onset = chosen_row(rows, {} if result is None else {"onset": result}, sample).get("onset")
     figure = new_figure(1.35 * COLUMN, 1.5 * COLUMN)
     with paper_style():
         top, below = figure.subplots(2, sharex=True, height_ratios=(1.0, 1.2))
@@ -68,16 +79,14 @@ def specimen(
     _draw_blocks(top, problem, scale)
     top.set_ylabel(f"height ({unit})")
     x = interface.x * scale
-    if strength is not None:
-        tau_p = rows_of(interface, strength)[sample]
-        below.plot(x, tau_p / tau_p.mean(), color=QUIET, linewidth=0.7, label="strength")
+    if rows is not None:
+        tau_p = rows[sample]
+        below.plot(x, tau_p / np.nanmean(tau_p), color=QUIET, linewidth=0.7, label="strength")
     below.plot(x, blocks.shear, label="shear of the drive $q$", **series(0))
     below.plot(x, blocks.pressure, label="pressure $p$", **series(1))
-    if result is not None:
-        need(result, "critical_position", "critical_patch_length")
-        row = result.isel(sample=sample) if "sample" in result.dims else result
-        middle = float(row["critical_position"]) * scale
-        half = 0.5 * float(row["critical_patch_length"]) * scale
+    if onset is not None:
+        middle = float(onset["critical_position"].item()) * scale
+        half = 0.5 * float(onset["critical_patch_length"].item()) * scale
         for axes in (top, below):
             axes.axvspan(middle - half, middle + half, color=ACCENT, alpha=0.3, linewidth=0.0)
         below.plot([], [], color=ACCENT, alpha=0.3, linewidth=6.0, label="critical patch")
@@ -147,9 +156,8 @@ def force_travel(
     --------
     See `precursors`, which draws the events below this curve.
     """
-    results = [result] if isinstance(result, xr.Dataset) else list(result)
-    if not results:
-        raise InputError("result: is empty. Give one or more equilibrium paths")
+    results = [*named(result).values()]
+    measured = None if measured is None else check("measured", measured, Curves)
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
@@ -175,20 +183,12 @@ def force_travel(
                 places = start * length, high * factor
                 axes.plot(*places, "o", color=ACCENT, markersize=3.5, label="arrested events")
         for number, test in enumerate(measured or ()):
-            label = f"{len(measured or ())} tests" if number == 0 else None
-            axes.plot(
-                test.travel * length,
-                test.force * factor,
-                color=INK,
-                linewidth=0.5,
-                alpha=0.7,
-                label=label,
-            )
-            label = "measured precursors" if number == 0 else None
-            axes.plot(
-                test.drops.travel * length, test.drops.force * factor, "v", color=INK,
-                markersize=3.0, label=label,
-            )  # fmt: skip
+            labels = [f"{len(measured or ())} tests", "measured precursors"]
+            of_test, of_drops = labels if number == 0 else (None, None)
+            thin = {"color": INK, "linewidth": 0.5, "alpha": 0.7, "label": of_test}
+            axes.plot(test.travel * length, test.force * factor, **thin)
+            places = test.drops.travel * length, test.drops.force * factor
+            axes.plot(*places, "v", color=INK, markersize=3.0, label=of_drops)
         if axes.get_legend_handles_labels()[1][1:]:
             axes.legend()
         text = "force" if name == "force" else "mean stress"
@@ -321,14 +321,14 @@ def precursors(
     >>> st.plot.precursors(path)[1].get_ylabel()
     'position $x$ (mm)'
     """
-    results = [result] if isinstance(result, xr.Dataset) else list(result)
+    results = [*named(result).values()]
     interface = problem_of(results[0], problem).interface
     length, _ = unit_for("m", np.concatenate([curve_of(path)[0] for path in results]))
     scale, unit = unit_for("m", interface.lengths)
     figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
     with paper_style():
         above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
-        force_travel(results if len(results) > 1 else results[0], measured=measured, ax=above)
+        force_travel(results, measured=measured, ax=above)
         for path in results:
             start = path["event_start"].values * scale
             end = start + path["event_length"].values * scale
