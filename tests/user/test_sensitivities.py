@@ -7,7 +7,7 @@ import pytest
 import scipy.stats
 from joint import GIVEN, PROBLEM, RANDOM
 from refusals import refuses
-from setups import ensemble
+from setups import LOCAL, ensemble
 
 import stiction as st
 from stiction.random.equally_likely import drawn_from
@@ -68,6 +68,20 @@ def test_an_uncertain_pressure_is_one_more_factor(several):
     assert len(source.constants(0)) == 40
     # Each failing profile has the pressure of its sample.
     assert np.all(found.failing_profiles.critical_stress < demand)
+
+
+def test_a_coefficient_is_that_of_each_uncertain_pressure():
+    """In proportion to the pressure, so that its scatter does not matter."""
+    uncertain = st.uncertain(RANDOM, {PRESSURE: scipy.stats.lognorm(0.2, scale=5e6)})
+    given = GIVEN | {"friction_coefficient": 0.12, "target_cv": 0.1}
+    known = st.failure_probability(PROBLEM, RANDOM, **given)
+    found = st.failure_probability(PROBLEM, uncertain, **given)
+    error = 4.0 * np.hypot(known.cv, found.cv)
+    assert np.log(found.probability / known.probability) == pytest.approx(0.0, abs=error)
+    state = st.external.limit_state(PROBLEM, uncertain, GIVEN["method"])
+    draws = state.draws(0, 0, 3)
+    onset = st.onset(PROBLEM, {"strength": state.profiles(draws)["strength"]}, method=LOCAL)
+    np.testing.assert_allclose(onset.critical_stress, state(draws), rtol=1e-9)
 
 
 def test_a_study_has_uncertain_constants():

@@ -11,6 +11,7 @@ from itertools import chain, pairwise
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from stiction.base.arrays import Array
@@ -176,8 +177,23 @@ class Experiment:
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return the profiles (samples, *shape) of draws by name, in SI."""
+        parts = [(rows, part._profiles(draws[rows])) for rows, part in self._variants(draws)]
+        return _in_order(*zip(*parts, strict=True))
+
+    def _profiles(self, draws: Array) -> dict[str, Array]:
         profiles = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, profiles)
+
+    def _variants(self, draws: Array) -> Iterator[tuple[Any, Experiment]]:
+        """Yield rows of draws, and the experiment with the uncertain constants of these rows."""
+        constants = getattr(self.random, "constants", ())
+        if not constants:
+            yield slice(None), self
+            return
+        variant = self.random.variant(draws)
+        for number in np.unique(variant).tolist():
+            problem = with_values(self.problem, constants[number], "problem")
+            yield np.flatnonzero(variant == number), self._unchecked(problem=problem)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles (samples, *shape), given by name."""
@@ -193,26 +209,21 @@ class Experiment:
 
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
         """Return profiles and results of draws. Each draw uses the constants of its interface."""
-        constants = getattr(self.random, "constants", ())
-        if not constants:
-            profiles = self.profiles(draws)
-            return profiles, self.onset(profiles)
-        # Solve the samples with equal constants together, then restore their order.
-        variant = self.random.variant(draws)
-        parts, order = [], []
-        for number in np.unique(variant).tolist():
-            rows = np.flatnonzero(variant == number)
-            problem = with_values(self.problem, constants[number], "problem")
-            experiment = self._unchecked(problem=problem)
-            profiles = experiment.profiles(draws[rows])
-            parts.append((profiles, experiment.onset(profiles)))
-            order.append(rows)
-        places = np.argsort(np.concatenate(order))
-        profiles, values = (
-            {name: np.concatenate([g[name] for g in groups])[places] for name in groups[0]}
-            for groups in zip(*parts, strict=True)
-        )
-        return profiles, values
+        parts = []
+        for rows, part in self._variants(draws):
+            profiles = part._profiles(draws[rows])
+            parts.append((rows, profiles, part.onset(profiles)))
+        order, profiles_of_parts, values_of_parts = zip(*parts, strict=True)
+        return _in_order(order, profiles_of_parts), _in_order(order, values_of_parts)
+
+    def pressures(self, draws: Array, profiles: Mapping[str, Array]) -> Array:
+        """Return the mean normal pressure, Pa, of each sample."""
+        if "normal_pressure" in profiles:
+            return np.asarray(self.problem.interface.mean(profiles["normal_pressure"]))
+        pressures = np.empty(len(draws))
+        for rows, part in self._variants(draws):
+            pressures[rows] = part.pressure
+        return pressures
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method. The next call reuses the solver."""
@@ -240,6 +251,16 @@ class Experiment:
 
 
 _solver = lru_cache(maxsize=8)(prepared)
+
+
+def _in_order(
+    rows: Sequence[NDArray[np.int64]], parts: Sequence[dict[str, NDArray[Any]]]
+) -> dict[str, NDArray[Any]]:
+    """Return arrays by name in the order of samples, from parts that hold given rows."""
+    if len(parts) == 1:
+        return parts[0]
+    places = np.argsort(np.concatenate(rows))
+    return {name: np.concatenate([part[name] for part in parts])[places] for name in parts[0]}
 
 
 @model(kw_only=True)

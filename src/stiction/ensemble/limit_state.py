@@ -62,7 +62,9 @@ class LimitState:
     @property
     def _random_pressure(self) -> bool:
         """Whether stresses are divided by a pressure that differs between samples."""
-        return self.per_pressure and "normal_pressure" in self.experiment.random.varying
+        random = self.experiment.random
+        constants = bool(getattr(random, "constants", ()))
+        return self.per_pressure and (constants or "normal_pressure" in random.varying)
 
     def by(self, method: Any) -> Self:
         """Return the same limit state with a different method."""
@@ -122,8 +124,8 @@ class LimitState:
         profiles, values = self.experiment.solve(draws)
         stress: Array = values[self.event]
         if self._random_pressure:
-            pressure = self.experiment.problem.interface.mean(profiles["normal_pressure"])
-            stress = stress * self.experiment.pressure / pressure
+            pressures = self.experiment.pressures(draws, profiles)
+            stress = stress * self.experiment.pressure / pressures
         self.meter.advance(draws.shape[0])
         return stress
 
