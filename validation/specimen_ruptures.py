@@ -16,7 +16,8 @@ import time
 import numpy as np
 
 import stiction as st
-from stiction.methods.dynamics.specimens import RuptureProgram, front_speeds
+from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.dynamics.summary import front_speeds
 from stiction.methods.equilibrium.sample import Outcome, PathStatus, sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
 
@@ -85,9 +86,9 @@ def compared(
                 short = least.state.slip - event.waves.slip
                 added = (event.waves.slip - before.slip).max()
                 found["shorter"].append(float(short.max() > 1e-3 * added or not arrested))
-            speed = front_speeds(problem, rows.steepest_weakening_rate, event.waves.arrival)[
-                "median_rupture_speed"
-            ]
+            length = problem.nucleation_lengths(rows.steepest_weakening_rate)[0]
+            speeds = front_speeds(problem.interface, 0, event.waves.arrival, length)
+            speed = speeds["median_rupture_speed"]
             if np.isfinite(speed):
                 found["speed"].append(speed / problem.solid.rayleigh_wave_speed)
                 found["stress"].append(float(event.start.mean()))

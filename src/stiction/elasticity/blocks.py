@@ -163,13 +163,17 @@ def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> A
     """
     spacing, c = harmonics.length / nodes, 0.5 * np.pi / harmonics.height
     x, i = (np.arange(nodes) + 0.5) * spacing, np.arange(nodes)
+    # The direct kernel k (1 - k r) exp(-k r), minus its limit for large H. At r = 0 both are
+    # infinite, and their difference is c/12.
     r = spacing * np.arange(1, nodes)
     sums = harmonics.sums(r)
     along = np.append(c / 12.0, sums.first - r * sums.second + 0.5 / (c * r**2))
+    # The reflection at an end: a part that depends on x + s alone, and x s times another.
     r = spacing * np.arange(1, 2 * nodes)  # x + s
     sums = harmonics.sums(r)
     even = r * sums.second - sums.first - 0.5 / (c * r**2)
     odd = 6.0 / (c * r**4) - 2.0 * sums.third
+    # Nodes i and j have x + s = (i + j + 1) dx from the left end. The right end is its image.
     mirrored = i[:, None] + i
     end = even[mirrored] + np.outer(x, x) * odd[mirrored]
     kernel = along[np.abs(i[:, None] - i)] + end + end[::-1, ::-1]
@@ -183,8 +187,10 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
     spacing = top.harmonics.length / nodes
     on_interface = top.shear((np.arange(nodes) + 0.5) * spacing)
     tractions = top.solve(np.column_stack([np.ones(top.x.size), on_interface.T]))
+    # Tractions for a unit travel, and for the displacements of the top that slip causes.
     shear, *held = top.step * (on_interface @ tractions).T
     addition = 0.5 * spacing * np.array(held)
+    # At a given force the platen moves, which takes its share of the stress away.
     addition -= 0.5 * np.outer(shear, shear) / shear.sum()
     return 0.5 * (addition + addition.T), shear, float(top.step * tractions[:, 0].sum())
 
@@ -200,6 +206,7 @@ def _pushed(
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
     x = (np.arange(nodes) + 0.5) * length / nodes
+    # Single waves from the edges of the push in closed form, and the reflections.
     ends = harmonics.sums(x + 1j * low).plain - harmonics.sums(x + 1j * high).plain
     remainder = harmonics.raised - np.array([1.0, 1.0, 0.0, 0.0])
     waves = np.einsum("mxi,mi,m->x", harmonics.solutions(SLOPE, x), remainder, mean_sine)
@@ -253,6 +260,7 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
         top = GluedTop(harmonics, 1.0, kappa, RESOLUTION.step)
         wider = (3.0 - kappa) / 16.0 * (top.x - top.to_right)
         shifted, narrowed = top.solve(np.column_stack([np.ones(top.x.size), -wider])).T
+        # Remove the resultant: the platens are not loaded along the interface.
         traction = narrowed - narrowed.sum() / shifted.sum() * shifted
         pressure = (
             1.0 - top.step * top.normal((np.arange(nodes) + 0.5) * length / nodes) @ traction
@@ -277,7 +285,9 @@ def _anti_plane(
     spacing = length / nodes
     k = np.pi / length * np.arange(1, nodes)
     finite = k * (1.0 / np.tanh(k * height) if pushes is None else np.tanh(k * height))
+    # The lattice replaces |k|, and the finite height adds a smooth remainder.
     symbol = np.append(0.0, lattice_symbol(k * spacing) / spacing + finite - k)
+    # Cosines diagonalise K between two free ends.
     cosines = idct(np.eye(nodes), norm="ortho", axis=0)
     stiffness = (cosines * (0.5 * modulus * symbol)) @ cosines.T
     if pushes is None:
@@ -337,6 +347,7 @@ def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i
     both = entries[np.abs(i[:, None] - i)] + entries[mirrored + 1] + entries[::-1][mirrored]
+    # The mixed derivative over cells is the mixed difference of x s/(x + s)² at their edges.
     edge = np.arange(nodes + 1.0)
     share = np.outer(edge, edge) / np.maximum(np.add.outer(edge, edge), 1.0) ** 2
     rest = np.diff(np.diff(share, axis=0), axis=1) * (2.0 / np.pi)

@@ -78,6 +78,7 @@ class Driven:
 
 
 def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
+    # A Cholesky factor exists only if all eigenvalues of K - W are positive.
     block = matrix[begin:end, begin:end].copy()
     block.flat[:: end - begin + 1] -= W
     return bool(scipy.linalg.lapack.dpotrf(block, lower=1, overwrite_a=1)[1] > 0)
@@ -120,6 +121,8 @@ def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
 def _windows_at(blocks: Driven, weakening_rate: float) -> Windows:
     matrix = blocks.stiffness
     runs = shortest_runs(matrix, weakening_rate)
+    # The weights of a window must be positive. The lowest eigenvector has a single sign if K has
+    # no positive entry off its diagonal.
     modes = np.zeros((len(runs), max((end - begin for begin, end in runs), default=1)))
     for row, (begin, end) in zip(modes, runs, strict=True):
         _, vectors = scipy.linalg.eigh(
@@ -151,12 +154,14 @@ def driven(
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)
+    # Far from a pusher q falls to round-off, and a load profile must be positive.
     shear, floor = response.shear, MIN_SHEAR * response.shear.max()
     if np.abs(shear).min() < floor:
         shear = np.where(np.abs(shear) < floor, floor, shear)
         shear /= shear.mean()
     pressure = glued_pressure(length, nodes, height, kappa) if glued else np.ones(nodes)
     drive = response.drive_stiffness
+    # k/(k + C) without overflow for a rigid machine. Without a machine the load is dead.
     share = 1.0 / (1.0 + drive / machine) if machine > 0.0 else 0.0
     relief = 0.5 * share * drive / length
     stiffness = response.stiffness

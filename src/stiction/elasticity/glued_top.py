@@ -98,10 +98,12 @@ class GluedTop:
         sine = 2.0 * np.sin(np.pi * distance / count)
         np.fill_diagonal(sine, 2.0 * np.pi / period)
         constant = np.log((1.0 if harmonics.pressed else 4.0) * harmonics.height / np.pi)
+        # The sum of both logarithms is smooth. On the diagonal it has this limit.
         kernel += weight * np.log(sine)
         kernel[np.diag_indices(count)] = harmonics.height / np.pi + weight * (
             constant + np.log(2.0 * np.pi / period / self.stretch)
         )
+        # Put the logarithm back with the exact weights of its Fourier modes.
         modes = np.arange(1, count // 2 + 1)
         logarithm = np.fft.irfft(np.append(0.0, 0.5 * period / modes), count)
         matrix = self.step * kernel + weight * logarithm[distance]
@@ -111,6 +113,7 @@ class GluedTop:
             sums = harmonics.sums(across)
             kernel = 0.5 * (kappa * kappa + 1.0) * sums.inverse + kappa * across * sums.plain
             matrix += self.step * (kernel + 2.0 * np.outer(end, end) * sums.first)
+        # All further reflections, harmonic by harmonic.
         remainder = harmonics.reflected(
             1.0 / harmonics.k, self._traction, self.x, self._traction, self.x
         )
@@ -126,6 +129,7 @@ class GluedTop:
     def shear(self, x: Array) -> Array:
         """Return the shear stress at places on the interface due to unit t at a point, 1/m."""
         harmonics, kappa = self.harmonics, self.kappa
+        # The direct wave, single reflections at both ends, and the remainder.
         apart = np.abs(np.subtract.outer(x, self.x))
         sums = harmonics.sums_at_top(apart)
         stress = 0.5 * (kappa - 1.0) * sums.plain + apart * sums.first

@@ -93,6 +93,7 @@ class Harmonics:
                 [-decay, (1.0 - kl) * decay, unit, -unit],
             ]
         ).transpose(2, 0, 1)
+        # The same of the beam without ends, as combinations of the four solutions in s.
         endless = [
             [1.0, 1.0, 0.0, 0.0],
             [0.0, 1.0, 0.0, 0.0],
@@ -101,12 +102,14 @@ class Harmonics:
         ]
         single = np.kron(np.eye(2), [[1.0, 1.0], [1.0, 2.0]])  # one clamp without the other
         inverse = np.linalg.inv(clamps)
+        # All reflections but the single reflections, which have closed forms.
         self._remainder = single - inverse @ endless
         self.raised = inverse[:, :, 0]
         """Coefficients of the solution that is 1, without a slope, at the left clamp."""
 
     def sums(self, z: Array) -> Sums:
-        """Return the sums of k^j exp(-k z) over k, for z with a positive real part."""
+        """Step 2: return the sums of k^j exp(-k z) over k, for z with a positive real part."""
+        # Geometric series and their derivatives. `expm1` keeps the digits near z = 0.
         c = 0.5 * np.pi / self.height
         q, w = np.exp(-c * z), -np.expm1(-2.0 * c * z)
         coth, square = (2.0 - w) / w, 4.0 * q * q / (w * w)  # and 1/sinh²
@@ -146,7 +149,8 @@ class Harmonics:
     def reflected(
         self, weights: Array, along_x: Polynomial, x: Array, along_s: Polynomial, s: Array
     ) -> Array:
-        """Return the sum (x, s) of weights times 4 k³ P(d/dx) Q(d/ds) remainder over k."""
+        """Step 3: return the sum (x, s) of weights times 4 k³ P(d/dx) Q(d/ds) remainder over k."""
+        # The remainder couples the solutions in x with the solutions in s.
         left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
         total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))
         return total

@@ -69,11 +69,6 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     return column
 
 
-def circular_entries(column: Array) -> CircularEntries:
-    """Return K with a given first column, in the form that kernels need."""
-    return CircularEntries(column, np.ascontiguousarray(np.tile(column[1::2], 3)))
-
-
 @dataclass(frozen=True, eq=False)
 class Line:
     """Half-spaces that meet on a line of nodes, as a read-only `Elasticity`."""
@@ -100,7 +95,7 @@ class Line:
 def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
     """Return K and the windows of a line."""
     column = stiffness_column(nodes, half_spaces.lengths[0], half_spaces.moduli[0])
-    return Line(half_spaces, nodes, circular_entries(column))
+    return Line(half_spaces, nodes, CircularEntries(column, np.tile(column[1::2], 3)))
 
 
 @functools.lru_cache(maxsize=512)
@@ -117,6 +112,7 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
     else:
+        # Start from sqrt(x (w - x)), the shape of slip in a crack under uniform stress.
         # Inverse iteration converges fast, as the next eigenvalue is more than
         # twice as large.
         mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))

@@ -165,6 +165,7 @@ class ExponentialSum:
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
     """Return times on [0, T_MAX]. They are dense at first, with random phases on later scales."""
     rng = np.random.default_rng(seed)
+    # The kernel oscillates with periods of up to 2 pi, so scatter the times over a period.
     scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
     times = np.concatenate([np.linspace(0.0, 8.0, 8 * per_decade + 1), late.ravel(), [T_MAX]])
@@ -194,6 +195,7 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
     """Step 2: return the poles of a short model for sum w exp(s T), from balanced truncation."""
+    # Equal input and output vectors make both Gramians equal up to conjugation.
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)
@@ -216,6 +218,7 @@ class _Polish:
     def project(
         self, poles: Complex, emphasis: Floats
     ) -> tuple[Complex, Floats, Complex, Floats]:
+        # Re(w exp(s T)) is linear in the real and the imaginary part of w.
         modes = np.exp(np.multiply.outer(self.times, poles))
         basis = np.hstack([modes.real, -modes.imag]) * emphasis[:, None]
         q, r = np.linalg.qr(basis)
@@ -238,8 +241,10 @@ class _Polish:
             slope = modes * (self.times[:, None] * weights)
             decay = -np.exp(parameters[: weights.size])
             jacobian = np.hstack([slope.real * decay, -slope.imag]) * emphasis[:, None]
+            # Weights follow the poles, so only the part outside the span of the basis counts.
             jacobian -= q @ (q.T @ jacobian)
             normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
+            # Raise the damping until the step lowers the cost.
             for _ in range(8):
                 lifted = normal + damping * np.diag(np.diag(normal) + 1e-30)
                 trial = parameters + np.clip(np.linalg.solve(lifted, gradient), -1.0, 1.0)
@@ -262,6 +267,7 @@ def _acceptable(poles: Complex, weights: Complex) -> bool:
     """Step 5: return whether weights are small, poles decay, and no two terms nearly cancel."""
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
+    # Two close poles with large weights of opposite signs would cancel.
     gap = np.abs(poles[:, None] - poles[None, :]) / np.abs(poles)[:, None]
     near = (gap < 1e-3) & ~np.eye(poles.size, dtype=bool)
     return not np.any(near & (np.abs(weights)[:, None] > 1.0))

@@ -142,6 +142,7 @@ def make_operator(symbol: Array, W: Array | float, shape: tuple[int, ...]) -> Op
     """Return the operator for a symbol and a weakening rate (Pa/m), a number or an array."""
     W = np.broadcast_to(np.asarray(W, dtype=np.float64), shape).flatten()
     typical = float(W[W > 0.0].mean()) if (W > 0.0).any() else float(symbol.max())
+    # The preconditioner stays positive even where K - W is not.
     flat = symbol.flatten()
     spectrum, no_field = np.empty(flat.size, dtype=np.complex128), np.empty(0)
     z, direction, image = np.empty((3, W.size))
@@ -277,6 +278,7 @@ def solve_inside(
         beta = r_z / r_z_before if r_z_before > 0.0 else 0.0
         r_z_before = r_z
         for i in range(direction.size):
+            # The first direction is z alone, whatever a former solution left there.
             former = beta * direction[i] if beta > 0.0 else 0.0
             direction[i] = z[i] + former if inside[i] else 0.0
         product(operator, direction, image)
@@ -361,6 +363,7 @@ def lowest_eigenvector(
                 break
             set_scaled(basis[k], 1.0 / norm, basis[k])
             set_scaled(images[k], 1.0 / norm, images[k])
+        # The residual lies in the space already: round-off is reached.
         if count < 2:
             break
         # 3.
@@ -376,7 +379,7 @@ def lowest_eigenvector(
         scale = 1.0 / np.sqrt(inner(basis[2], basis[2]))
         set_scaled(basis[2], scale, basis[2])
         set_scaled(images[2], scale, images[2])
-        count = 3
+        count = 3  # from now on there is a last direction
     total = 0.0
     for i in range(nodes):
         total += basis[0, i]

@@ -9,8 +9,8 @@ is zero except at some nodes. numba compiles a kernel for each type of entries
 the overload for the type of entries. If a type has no overload, the compilation of a kernel
 raises an error.
 
-Algorithm
----------
+Algorithm: our own
+------------------
 `apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so
 even nodes act only on odd nodes, and vice versa.
 
@@ -85,6 +85,7 @@ def add_four(
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values
+    # Views of equal length, so that the compiler vectorises the loop.
     a = strip[p0 : p0 + half]
     b = strip[p1 : p1 + half]
     c = strip[p2 : p2 + half]
@@ -129,6 +130,7 @@ def apply_circular(
                 add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
                 n_waiting = 0
                 z0 = z1 = z2 = z3 = 0.0
+        # The last group may be short. Its missing nodes have no slip.
         if n_waiting > 0:
             add_four(target, strip, (p0, p1, p2, p3), (z0, z1, z2, z3))
     # 3.
@@ -153,6 +155,7 @@ def _apply_rows(
     for q in range(target.shape[0]):
         target[q] = 0.0
     for first in range(ZERO, count, 4):
+        # A short last group adds the first row with the factor zero.
         p0 = p1 = p2 = p3 = ZERO
         z0 = z1 = z2 = z3 = 0.0
         for t in range(first, min(first + 4, count)):
@@ -171,6 +174,7 @@ def _apply_rows_outside(
     product: Array,
 ) -> None:
     """Write K times a field at the nodes that do not slip, run by run."""
+    # Runs of nodes at rest alternate with runs of slipping nodes, which are skipped.
     end = ZERO
     while end < entries.n_nodes:
         start = end
@@ -182,6 +186,7 @@ def _apply_rows_outside(
 
 def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> Any:
     """Return the function that numba compiles for a type of entries, or raise an error."""
+    # numba's type of a named tuple knows the class of the tuple.
     kind = getattr(entries, "instance_class", None)
     if kind is CircularEntries:
         return circular

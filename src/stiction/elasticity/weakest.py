@@ -7,8 +7,8 @@ nodes weaken at the rate W or faster. Then <s, y>/<p, y> bounds the load of the 
 instability from above. Here s is the strength minus initial stress (Pa), and p is the load
 profile. Find the lowest bound over all windows and all places.
 
-Algorithm
----------
+Algorithm: our own
+------------------
 1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
    weakening rate than any node has. Stop if a narrower window is unstable anywhere, because
    wider windows give a looser bound.
@@ -42,6 +42,7 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 @jit_inside
 def _count_fast(W: Array, threshold: float, length: Array) -> None:
     """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
+    # Twice around the circle from the end, so that runs across the first node are complete.
     n = W.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -138,6 +139,7 @@ def window_bound(
     p_y = 0.0
     for i in range(n):
         p_y += y[i] * profile[i]
+    # Scale y, so that <s, y> alone is the bound.
     for i in range(n):
         y[i] /= p_y
     return best

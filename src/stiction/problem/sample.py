@@ -119,8 +119,8 @@ class Sample(Result, _Profiles):
     @property
     def steepest_weakening_rate(self) -> float:
         """Largest weakening rate, Pa/m, among nodes that may break."""
-        rates = self.weakening_rate
-        return steepest_weakening_rate(self.strength, self.residual_strength, rates)
+        W = self.weakening_rate
+        return steepest_weakening_rate(self.strength, self.residual_strength, W)
 
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at loads tau_0 with shape (samples,)."""

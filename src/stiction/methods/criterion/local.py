@@ -137,15 +137,15 @@ class LocalCriterion:
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
         """Return why no length of patches is the same in all samples, or `None`."""
-        rate = problem.uniform_weakening_rate
+        W = problem.uniform_weakening_rate
         if not problem.friction.linear:
             return "strength does not fall linearly with slip"
-        if rate is None or varying & set(SCALES):
+        if W is None or varying & set(SCALES):
             return "the weakening rate is not uniform"
         try:
             if problem.specimen is None:
-                windows_of(problem, rate)
-            elif not problem.blocks.windows(rate, rate).starts.size:
+                windows_of(problem, W)
+            elif not problem.blocks.windows(W, W).starts.size:
                 return "no part of the specimen becomes unstable by itself"
         except InputError:
             return "a critical patch does not fit on the interface"

@@ -121,9 +121,12 @@ def check_finite(run: Run, state: RuptureState, reason: int) -> None:
     """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
     if reason == Reason.NOT_FINITE:
         now = state.now
-        node = int(now["non_finite_node"])
+        # In an implicit step only the attempt was non-finite, and all nodes have values.
+        places = [
+            f" {run.medium.interface.describe_node(node)} (node {node}),"
+            for node in np.flatnonzero(~np.isfinite(state.slip_rate))[:1]
+        ]
         raise FloatingPointError(
-            f"the slip rate became non-finite at t = {now['time']:.9g} s, "
-            f"{run.medium.interface.describe_node(node)} (node {node}), tau_0 = "
-            f"{now['load']:.6g} Pa, after {state.steps} steps. The last finite state is kept"
+            f"the slip rate became non-finite at t = {now['time']:.9g} s,{''.join(places)} tau_0 ="
+            f" {now['load']:.6g} Pa, after {state.steps} steps. The last finite state is kept"
         )

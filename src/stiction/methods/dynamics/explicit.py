@@ -160,17 +160,13 @@ def explicit_steps(
         forward(grid.transform, state.slip_rate, slip_rate_hat)
         _transfer(grid, slip_hat, state.memory_sum, tables)
         _predict(state, setting, tables, load, impedance)
-        # 2. Correct.
+        # 2. Correct. The transform is linear, so average the transforms of both rates.
         forward(grid.transform, tables.predicted, tables.shared)
         for q in range(slip_rate_hat.size):
             slip_rate_hat[q] = 0.5 * (slip_rate_hat[q] + tables.shared[q])
         _transfer(grid, slip_hat, state.memory_sum, tables)
         work, total = _correct(state, setting, tables, load, impedance)
         if not np.isfinite(total):
-            for i in range(n):
-                if not np.isfinite(state.slip_rate[i]):
-                    now.non_finite_node = i
-                    break
             now.time = time
             reason = Reason.NOT_FINITE
             break

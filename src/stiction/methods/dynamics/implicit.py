@@ -289,7 +289,6 @@ def implicit_steps(
         if solved:
             largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
         if not np.isfinite(total):
-            now.non_finite_node = 0
             reason = Reason.NOT_FINITE
             break
         too_much = largest > 2.0 * thresholds.slip_step

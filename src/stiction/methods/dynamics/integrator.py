@@ -126,7 +126,7 @@ class Run:
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
-        """Return the state at rest, or in equilibrium with a slip, with an empty memory.
+        """Phase 1: return the state at rest, or in equilibrium with a slip, with an empty memory.
 
         If any stress exceeds the strength by more than round-off, explicit steps come
         first.
@@ -237,6 +237,7 @@ class Run:
         """
         taken = 0
         while taken < count:
+            # 2. and 3. A compiled loop takes steps of one type, until it returns a reason.
             rest_of_record = StepRecord(*(rows[taken:] for rows in record))
             steps = self._explicit if state.explicit else self._implicit
             steps_taken, reason = steps(state, count - taken, rest_of_record)
@@ -245,6 +246,7 @@ class Run:
             rests = bool(now["event_calm"] or (reason == Reason.ALL_SLID and held))
             if rests or now["event_begun"]:
                 self._follow_event(state, rests)
+            # 2. to 4. The other type of steps takes over, or the run ends.
             if reason == Reason.TO_EXPLICIT:
                 self._to_explicit(state)
             elif reason == Reason.TO_IMPLICIT:
@@ -263,6 +265,7 @@ class Run:
         now, slip, load, work = state.now, state.maximum_slip, "maximum_load", "maximum_work"
         if rests:
             slip, load, work = state.slip, "load", "work"
+        # A sliding interface can be calm, too. Its event has not come to rest.
         thresholds = self.setting.thresholds
         slides = rests and now["all_broken"] and not thresholds.held
         slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
@@ -275,6 +278,7 @@ class Run:
             event["slip"] = state.event_slip, slip
             self.events.append(event)
         now["fast"], now["event_open"] = 0, now["event_begun"]
+        # The next event may begin from the present state of rest.
         if rests and now["maximum_time"] == now["time"]:
             now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
         for name in ("time", "load", "work"):
@@ -307,11 +311,13 @@ class Run:
         return self.tables
 
     def _to_explicit(self, state: RuptureState) -> None:
+        """Phase 2: let explicit steps take over."""
         tables = self._explicit_tables()
         to_explicit(self.medium.grid, state, tables.step, tables.table, state.memory_sum)
         state.now["calm_steps"], state.now["calm_slip_rate"] = 0, state.slip_rate.max()
 
     def _to_implicit(self, state: RuptureState) -> None:
+        """Phase 3: let implicit steps take over."""
         to_implicit(self.medium.grid, state, self.medium.step)
         state.past[:] = state.slip_rate
         state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step

@@ -83,6 +83,7 @@ def phi(z: Spectrum) -> Spectrum:
     """Return (exp(z) - 1)/z, also for small z."""
     small = np.abs(z) < 1e-3
     series = 1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)))
+    # `np.where` computes both branches, so the quotient must not divide by zero.
     safe = np.where(small, 1.0, z)
     return np.where(small, series, np.expm1(safe) / safe)
 
@@ -93,10 +94,12 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
         entry = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
         copy, multiplicity = np.zeros_like(entry), 1
     else:
+        # Row r and row n - r have opposite kx, and share an entry as two copies.
         row = np.arange(half[0])
         folded = np.minimum(row, half[0] - row)
         entry = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
         copy, multiplicity = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
+    # Copies of a block follow each other, and each has a real and an imaginary row.
     offset = (entry // ENTRIES * multiplicity + copy) * (2 * ENTRIES) + entry % ENTRIES
     return entry, offset, multiplicity
 
@@ -146,6 +149,7 @@ def step_table(grid: Grid, step: float) -> tuple[Floats, Floats]:
         z = np.multiply.outer(grid.poles, grid.frequency[entries] * step)
         share = np.where(in_plane, grid.mode_two[entries], 1.0 - grid.mode_two[entries])
         decay, gain, weights = np.exp(z), step * phi(z), grid.weights[:, None] * share
+        # The weights of (3) are those of psi, times B because y = psi/B.
         product = weights * decay * gain
         rows = (decay.real, decay.imag, product.real, product.imag)
         for row, values in enumerate(rows):
@@ -196,15 +200,20 @@ def advance_memory(
                 c[j] = 0.0
             for p in range(pairs):
                 o = p * FOUR_ROWS
+                # (3) for 64 modes at once. Complex numbers are pairs of real ones in rows
+                # of constant length, so that the compiler vectorises the loop.
                 for j in range(ENTRIES):
+                    # E and w E B of the pair, which both signals share.
                     er, ei = e[o + j], e[o + ENTRIES + j]
                     cr, ci = e[o + TWO_ROWS + j], e[o + THREE_ROWS + j]
+                    # The real part of the slip rate.
                     yr, yi = y[o + j], y[o + ENTRIES + j]
                     ar = er * yr - ei * yi + v[j]
                     ai = er * yi + ei * yr
                     y[o + j] = ar
                     y[o + ENTRIES + j] = ai
                     c[j] += cr * ar - ci * ai
+                    # Its imaginary part.
                     yr, yi = y[o + TWO_ROWS + j], y[o + THREE_ROWS + j]
                     ar = er * yr - ei * yi + v[ENTRIES + j]
                     ai = er * yi + ei * yr
@@ -220,6 +229,7 @@ def to_explicit(
     _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
+    # The next explicit step needs the sum in (3), which only explicit steps update.
     y = state.memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
     for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
         real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
@@ -238,6 +248,7 @@ def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> N
     count = blocks(grid.frequency.size)
     y = memory.reshape(count, grid.multiplicity, grid.poles.size, 4, ENTRIES)
     for block in range(count):
+        # The last block is padded, and the padding has no B.
         frequency = grid.frequency[block * ENTRIES : (block + 1) * ENTRIES]
         factor = step * phi(np.multiply.outer(grid.poles, frequency * step))
         rows = y[block, ..., : frequency.size]
@@ -316,6 +327,7 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
                 ratio = (decay - 1.0) * per_z
                 gain = step * ratio
                 ramp_gain = step * step * ((ratio - 1.0) * per_z - 0.5 * ratio)
+            # Entry j lies in column j % 64 of block j // 64.
             o = ((j // ENTRIES) * pairs + p) * FOUR_ROWS + j % ENTRIES
             table[o], table[o + ENTRIES] = decay.real, decay.imag
             table[o + TWO_ROWS], table[o + THREE_ROWS] = gain.real, gain.imag
@@ -338,6 +350,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
             y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             e = tables.table[(block // multiplicity * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             out = sums[0 if p < split else 1]
+            # The product w E is computed on the way, and not stored.
             wr, wi = grid.weights[p].real, grid.weights[p].imag
             for j in range(ENTRIES):
                 cr, ci = wr * e[j] - wi * e[ENTRIES + j], wr * e[ENTRIES + j] + wi * e[j]
@@ -374,6 +387,7 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
             entry = block // multiplicity * pairs + p
             e = tables.table[entry * FOUR_ROWS :][:FOUR_ROWS]
             r = tables.ramp[entry * TWO_ROWS :][:TWO_ROWS]
+            # (4) for 64 modes at once, first for the real signal.
             for j in range(ENTRIES):
                 er, ei, br, bi = e[j], e[ENTRIES + j], e[TWO_ROWS + j], e[THREE_ROWS + j]
                 rr, ri = r[j], r[ENTRIES + j]
@@ -396,6 +410,7 @@ def grown_memory(
     """
     total = np.zeros(slip_rate_hat.size, dtype=np.complex128)
     slip_rate, entry, pairs = slip_rate_hat[1:], grid.entry[1:], grid.poles.size
+    # Place of each mode in the memory of the first pair: its block, and its column.
     first = grid.offset[1:] // TWO_ROWS * pairs * FOUR_ROWS + grid.offset[1:] % ENTRIES
     for p in range(pairs):
         share = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]

@@ -16,7 +16,8 @@ interface and up to five times as much above.
 Elements (`_elements`)
 ----------------------
 Elements are bilinear. An element with the sides a and b has mean strains and two
-hourglass modes. Exact integration gives the energy of the means as a b (s . e)/2,
+hourglass modes (D. P. Flanagan and T. Belytschko, International Journal for Numerical Methods in
+Engineering 17, 1981). Exact integration gives the energy of the means as a b (s . e)/2,
 and the energy of an hourglass mode as (c_11 b/a + G a/b)/24 times the square of
 u_00 - u_10 - u_01 + u_11, and likewise for v. In mode III there is only u. Then
 c_11 is G, and the other coefficients are zero.
@@ -25,7 +26,7 @@ Algorithm (`make_mesh`)
 -----------------------
 1. Place the rows. Compute elements, masses and the stencils that move nodes.
 2. Condense the static response: eliminate the rows from the top downwards
-   (`condensed`).
+   (`condensed`; R. J. Guyan, AIAA Journal 3, 1965).
 3. Correct the static response: the K of the closed form minus the K of the mesh
    acts on the slip of the interface.
 4. Find the stable step for mesh, viscosity and correction together (`_limit`).
@@ -176,15 +177,18 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     def times(stiffness: Any, left: Array, right: Array) -> Array:
         return np.multiply.outer(stiffness * np.ones_like(b), np.multiply.outer(left, right))
 
+    # Energy of u alone: stretching along x, shear by du/dy, and the hourglass mode.
     elements = times(c11 * b / a, along[0], along[0]) + times(shear * a / b, up[0], up[0])
     elements += times((c11 * b / a + shear * a / b) / 12.0, twist[0], twist[0])
     stretched = 0.0
     if not anti:
+        # The same of v, and the products of strains of u and v.
         c12 = c11 - 2.0 * shear
         elements += times(c11 * a / b, up[1], up[1]) + times(shear * b / a, along[1], along[1])
         elements += times((c11 * a / b + shear * b / a) / 12.0, twist[1], twist[1])
         for left, right, stiffness in ((along[0], up[1], c12), (up[0], along[1], shear)):
             elements += times(stiffness, left, right) + times(stiffness, right, left)
+        # Modulus of a strip that stretches along y while s_xx vanishes.
         stretched = c11 - c12**2 / c11
     strips = 0.5 * a / b[:, None] * np.array([shear if anti else 0.0, stretched])
     return elements, strips
@@ -205,6 +209,8 @@ def _stencils(elements: Array, strips: Array) -> Array:
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
         for up in (0, 1):
             for axis in (0, 1):
+                # The stiffness gives the force that holds a node. The force on the node is
+                # its negative.
                 same, cross = element[up, axis, :, :, axis], element[up, axis, :, :, 1 - axis]
                 end = same[0, :, 0].copy()
                 end += strip[axis] * np.where(np.arange(2) == up, 1.0, -1.0)
@@ -247,12 +253,14 @@ def _limit(
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
     """Return the stiffness of an element row, for u and v at the lower and then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
+    # Elements share nodes with their neighbours. Both matrices select the nodes of a side.
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))
     for i, to_column in enumerate(columns):
         for j, from_column in enumerate(columns):
             corner = mesh.elements[layer][:, :, i, :, :, j].reshape(4, 4)
             stiffness += sp.kron(corner, to_column @ from_column.T)
+    # The strips at both ends stretch between the rows.
     ends = sp.csr_matrix((np.ones(2), ([0, nodes - 1],) * 2), shape=(nodes, nodes))
     strips = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag(mesh.strips[layer]))
     return (stiffness + sp.kron(strips, ends)).tocsr()
@@ -268,6 +276,7 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     half = np.eye(nodes, nodes // 2)
     with one_blas_thread():
         for sign in (1.0, -1.0):
+            # If u is even about the middle, v is odd, and vice versa.
             folds = [(half + one * half[::-1]) / np.sqrt(2.0) for one in (sign, -sign)]
             above, below, moved = _condensed(mesh, folds)
             static += folds[0] @ above @ folds[0].T
@@ -302,6 +311,7 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
         condensed_part = between.T @ (between.T @ inverse).T
         return -condensed_part, -(between.T @ moved), float(force @ moved)
 
+    # `above` is the stiffness of all rows above, condensed to the nodes of this row.
     for row in range(mesh.heights.size - 1, 0, -1):
         layer = (fold.T @ layer_matrix(mesh, row - 1, nodes) @ fold).tocsc()
         up = slice(2 * size, 2 * size + kept.shape[0])

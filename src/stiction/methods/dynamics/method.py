@@ -37,8 +37,6 @@ ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 _EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
 
-Start = Literal["equilibrium", "rest"]
-Stop = Literal["sliding", "onset", "rest", "time"]
 _UNKNOWN_AT_ONSET = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
     "arrested_events", "rupture_speed", "median_rupture_speed",
@@ -219,8 +217,8 @@ class Rupture:
     load_step: ShareUpToOne = 1e-3
     implicit: Flag = True
     arrival: ShareUpToOne = 0.5
-    start: Start = "equilibrium"
-    stop: Stop = "sliding"
+    start: Literal["equilibrium", "rest"] = "equilibrium"
+    stop: Literal["sliding", "onset", "rest", "time"] = "sliding"
     max_steps: Count = 5_000_000
     events: Number = 0
     type: Literal["rupture"] = "rupture"
@@ -360,6 +358,7 @@ def make_run(
     """Return the run for a sample. It records every step at the nodes `stations`."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
+    # Unbreakable nodes have an infinite strength, and an infinite residual slip.
     friction, finite = medium.problem.friction, np.isfinite(strength)
     with np.errstate(over="ignore"):
         residual_slip = friction.reach * friction.critical_slip_of(
@@ -377,6 +376,7 @@ def make_run(
     load = method.load
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
+    # Implicit steps end at these times, because a step across a peak would cut it off.
     rising = np.sign(np.diff(load.values))
     setting = Setting(
         law=friction.parameters,
@@ -417,9 +417,11 @@ def _thresholds(
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()
+    # An interface that slides and is unloaded later may still come to rest.
     stress = load.values[-1] * nodes.profile + nodes.initial  # at the end of the samples
     unloaded = load.values[-1] < load.values[-2] or stress.mean() < nodes.residual.mean()
     rests_later = method.stop == "rest" and unloaded and not held
+    # The longest wave crosses the interface in 2 pi/(|k| c_s).
     frequency = medium.grid.frequency
     crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
     typical = float(np.median((nodes.peak - nodes.residual)[finite]))

@@ -181,6 +181,7 @@ class Save:
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m. Give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
+            # The nearest node. On a periodic interface the end is the first node.
             nodes = x / interface.spacings
             index = tuple(np.round(nodes).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
@@ -203,6 +204,7 @@ class Recorder:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
         self._saved = repr([save.fields, save.stations])  # part of the digest of a folder
+        # Steps write to these rows. `take_steps` copies the rows that were filled.
         rows, stations = save.every, len(save.stations)
         self._record = StepRecord(
             np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
@@ -239,6 +241,7 @@ class Recorder:
             "seismic_moment": moment_of(medium.problem, state.slip),
             "moment_rate": moment_of(medium.problem, state.slip_rate),
         }
+        # Energies are quadratic and overflow first.
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
             frame |= energy_balance(run, state)
         fields = {
@@ -293,7 +296,8 @@ class Recorder:
         read_checkpoint(checkpoint, self.run, state, self._saved)
         if (folder / _SUMMARY).exists():
             return True
-        # Frames after the checkpoint will be computed again.
+        # Frames after the checkpoint will be computed again. They come from a run that was
+        # killed between the two files.
         for path in folder.glob(_FRAME_FILES):
             if int(path.stem.removeprefix("frames-")) > state.steps:
                 path.unlink()
@@ -330,6 +334,7 @@ def _digest(run: Run, saved: str) -> str:
     """Return the SHA-256 of all that a run depends on besides its state."""
     medium, setting = run.medium, run.setting
     numbers = medium.grid[1:]  # all but the transform, which follows from the interface
+    # A law of others has no text that identifies it, so compare its values.
     slips = np.linspace(0.0, 5.0, 101)  # at which laws are compared, in units of d_c
     law = np.concatenate([medium.problem.friction.fraction(slips), *map(np.ravel, setting.law)])
     texts = [medium.interface, float(medium.step), saved, DIAGNOSTICS]

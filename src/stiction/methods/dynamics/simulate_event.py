@@ -21,10 +21,9 @@ from stiction.methods.dynamics.save import FIELDS, OVER_NODES, SCALARS, TIME, Sa
 from stiction.methods.dynamics.specimens import (
     DynamicEvent,
     RuptureProgram,
-    front_speeds,
     refuse_overstress,
 )
-from stiction.methods.dynamics.summary import SPEEDS, rate_spectrum
+from stiction.methods.dynamics.summary import SPEEDS, front_speeds, rate_spectrum
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
 from stiction.methods.equilibrium.sample import (
     PathStatus,
@@ -84,6 +83,7 @@ def simulate_event(
     sample = sample_of(rows, program.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
         path = follow_to_sliding(program, sample)  # 1.
+        # Arrested events began at `before`. The path ends with the sliding event, if any.
         states = [event.before for event in path.events]
         states += [path.last] if path.last.status == PathStatus.UNSTABLE else []
         meter.advance(len(states))
@@ -141,6 +141,7 @@ class EventRecord:
         fields = {
             "slip": waves.slip.copy(),
             "slip_rate": waves.slip_rate.copy(),
+            # Before the first step the waves have no stress yet.
             "shear_stress": (waves.stress if self.frames else self.event.start) + initial,
             "strength": pieces.strength - pieces.weakening_rate * waves.slip + initial,
         }
@@ -174,10 +175,12 @@ class EventRecord:
         lag = mesh.viscous_time + 0.5 * mesh.step
         # w holds displacement and viscous time times rate, at the end of the step.
         w = np.hstack([waves.u, waves.v]).astype(float) - lag * velocities
+        # Twice the energy of a block, for both blocks.
         strain = 0.0
         for row, matrix in enumerate(self._layers):
             corners = np.concatenate([w[row], w[row + 1]])
             strain += float(corners @ (matrix @ corners))
+        # Slip in the middle of the step. The correction of K stores energy, too.
         added = waves.slip - self._begun - 0.5 * mesh.step * waves.slip_rate
         strain += 0.5 * mesh.spacing * float(added @ (mesh.correction @ added))
         speed = now["speed"]
@@ -198,6 +201,8 @@ class EventRecord:
         """Return the event's frames, pictures of the block, and all events on the path."""
         problem, interface, event = self.problem, self.problem.interface, self.event
         arrival = event.waves.arrival
+        length = problem.nucleation_lengths(self.rows.steepest_weakening_rate)[0]
+        # If the front arrived nowhere, the event began where slip grew fastest.
         first = int(event.before.direction.argmax())
         if np.isfinite(arrival).any():
             first = int(np.nanargmin(arrival))
@@ -212,7 +217,7 @@ class EventRecord:
             "critical_load": event.before.load,
             "critical_position": interface.x[first],
             "onset_time": arrival[first],
-            **front_speeds(problem, self.rows.steepest_weakening_rate, arrival),
+            **front_speeds(interface, 0, arrival, length),
         }
         of_events = event_variables(interface, inertia=True)
         values |= event_table(problem, self.rows, 0, path.all_events, of_events)

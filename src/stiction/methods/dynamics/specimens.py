@@ -7,8 +7,8 @@ A specimen is loaded slowly. Its slip follows the equilibria of
 blocks (`waves`), until all is at rest or the whole interface slides. Then the
 path continues from the final state of the waves.
 
-Algorithm of an event
----------------------
+Algorithm of an event: our own
+------------------------------
 1. Begin at the static state that becomes unstable. Raise the drive slightly,
    because it continues to rise, and let slip grow slightly along the unstable
    direction (`begin`).
@@ -33,7 +33,7 @@ from stiction.base.errors import InputError
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.mesh import Mesh, make_mesh
 from stiction.methods.dynamics.state import UNSTABLE_STRESS
-from stiction.methods.dynamics.summary import SPEEDS, front_speed
+from stiction.methods.dynamics.summary import SPEEDS, front_speeds
 from stiction.methods.dynamics.waves import Waves, block_at_rest, wave_steps
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
@@ -67,6 +67,7 @@ CHECKS_PER_WINDOW = 8
 
 def refusals(method: Any, problem: Problem) -> list[str]:
     """Return the reasons why a rupture cannot run on the specimen of a problem."""
+    # An option with its default value was not asked for.
     usual = type(method)()
     reasons = [
         f"{name}: leave it out, it has no effect on a specimen, which is loaded slowly"
@@ -150,6 +151,7 @@ def begin(
     """
     fall = (sample.excess - sample.residual)[np.isfinite(sample.excess)]
     load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
+    # Scale the unstable direction by the node that grows fastest.
     z = before.direction
     fastest = int(np.argmax(z))
     growth = INITIAL_GROWTH * sample.critical[fastest] / max(float(z[fastest]), 1e-300)
@@ -198,7 +200,8 @@ class RuptureProgram(DenseProgram):
         slip = event.waves.slip
         stiff: Array = self.problem.blocks.stiffness @ slip
         outcome = Outcome.SLIDING
-        if not event.slides:  # 3.
+        # 3. Slip that is still under way comes to rest without inertia.
+        if not event.slides:
             elastic, true = self._workspaces
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop, self.ends)
             outcome = jump(slip_state, unstable.load, np.inf, true)
@@ -230,7 +233,8 @@ class RuptureSolver(OnsetSolver):
     ) -> dict[str, Any]:
         speeds = dict.fromkeys(SPEEDS, np.nan)
         if path.arrival is not None:
-            speeds = front_speeds(self.problem, rows.steepest_weakening_rate, path.arrival)
+            length = self.problem.nucleation_lengths(rows.steepest_weakening_rate)[0]
+            speeds = front_speeds(self.problem.interface, 0, path.arrival, length)
         return super()._values(rows, row, sample, path) | speeds
 
 
@@ -238,11 +242,3 @@ def refuse_overstress(rows: Sample) -> None:
     """Raise an `InputError` for stress above the strength, which only half-spaces accept."""
     if np.any(rows.strength < rows.initial_stress):
         raise InputError("initial_stress: on specimens, it must not be above the strength")
-
-
-def front_speeds(problem: Problem, weakening_rate: float, arrival: Array) -> dict[str, float]:
-    """Return the largest and the median speed of a front, m/s."""
-    nucleation = problem.nucleation_lengths(weakening_rate)[0]
-    return {
-        name: front_speed(name, problem.interface, 0, arrival, nucleation) for name in SPEEDS
-    }

@@ -88,7 +88,6 @@ DIAGNOSTICS = np.dtype(
         ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
         ("top_node", "i8"),
         ("weakened_nodes", "i8"),  # number of nodes at the residual strength
-        ("non_finite_node", "i8"),  # after Reason.NOT_FINITE, the first such node
         # The last maximum of the mean stress of all nodes.
         ("maximum_stress", "f8"),
         ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time

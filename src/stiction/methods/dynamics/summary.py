@@ -1,4 +1,13 @@
-"""Scalars of a run: loads, moment, energies and rupture speeds."""
+"""Scalars of a run: loads, moment, energies and rupture speeds.
+
+1. The critical load carries the critical stress statically (`_critical_load`).
+2. The work of the load is dissipated by friction, stored as strain energy or radiated. The first
+   two follow from the slip alone, so the radiated energy is the difference (`_energies`).
+3. The front arrives at a node when the node has lost a share of its strength. The distance of two
+   nodes on a line over the difference of their arrival times is an apparent speed
+   (`rupture_speed`). Each speed is a mean over a window of two or half a nucleation length.
+4. The spectrum is the Fourier integral of the moment rate of one event (`rate_spectrum`).
+"""
 
 from typing import Any
 
@@ -73,6 +82,7 @@ def rate_spectrum(
     """
     frequencies = np.empty(0)
     if time.size > 2:
+        # Waves shorter than a few spacings and changes within a step are not resolved.
         spacing = max(problem.interface.spacings)
         resolved = problem.solid.shear_wave_speed / (NODES_IN_SHORTEST_WAVE * spacing)
         steps = np.diff(time)
@@ -103,6 +113,7 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
+    # Unbreakable nodes have infinite strength and dissipate no energy.
     drop = np.where(np.isfinite(nodes.peak), nodes.peak - nodes.residual, 0.0)
     fracture = friction.dissipated(slip, drop, nodes.weakening_rate)
     share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
@@ -121,6 +132,7 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
     """Return the events in a run so far, with the variables that only inertia provides."""
     interface, events = run.medium.interface, []
     for record in run.events:
+        # The state before the event, and the state after it.
         states, radiated = [], []
         for slip, load, work in zip(
             record["slip"], record["load"], record["work"], strict=True
@@ -137,16 +149,17 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
     return events
 
 
-def _axis_speeds(run: Run, state: RuptureState, name: str) -> list[float]:
-    """Return the speed of the front, m/s, along each axis on the line through the onset."""
+def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
+    """Return the speeds of the front, m/s, along each axis on the line through the onset."""
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     arrival = state.arrival.reshape(interface.shape)
     began = np.unravel_index(int(state.now["onset_node"]), interface.shape)
-    speeds = []
+    speeds: dict[str, list[float]] = {name: [] for name in SPEEDS}
     for axis, length in enumerate(nucleation):
         through: Any = (*began[:axis], slice(None), *began[axis + 1 :])
-        speeds.append(front_speed(name, interface, axis, arrival[through], length))
+        for name, speed in front_speeds(interface, axis, arrival[through], length).items():
+            speeds[name].append(speed)
     return speeds
 
 
@@ -154,7 +167,9 @@ def _critical_load(run: Run, now: Any) -> float:
     """Return the load, Pa, that carries the critical stress. NaN if the start was overstressed."""
     nodes, margin = run.setting.nodes, 1e-6 * now["scale"]
     stress = float(now["onset_stress"])
+    # Without slip the mean stress is tau_0 <p> + <tau_i>.
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
+    # An overstressed start breaks at once. No static load carries its stress.
     began = now["start_load"] * nodes.profile + nodes.initial
     overstressed = bool(np.any(began - nodes.peak > margin))
     return load if not overstressed or load > now["start_load"] + margin else np.nan
@@ -181,33 +196,38 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
         "stress_drop": critical - kinetic,
         "seismic_moment": moment_of(run.medium.problem, state.slip),
         "arrested_events": int(now["arrested_events"]),
-        "median_rupture_speed": _axis_speeds(run, state, "median_rupture_speed"),
+        **_speeds(run, state),
         **{name: energies[name] for name in ("radiated_energy", "fracture_energy")},
         **{name: float(now[name]) for name in ("start_load", "start_error")},
         **{name: int(now[name]) for name in ("implicit_steps", "explicit_steps")},
     }
-    if not interface.is_plane:
-        values["rupture_speed"] = _axis_speeds(run, state, "rupture_speed")
-    for name in {"critical_position", "rupture_speed", "median_rupture_speed"} & values.keys():
+    for name in ("critical_position", *SPEEDS):
         # A number on a line, and on a plane a number along x and a number along y.
         along = np.where(unstable, values[name], np.nan)
         values[name] = along if interface.is_plane else along[0]
+    if interface.is_plane:
+        del values["rupture_speed"]  # see `scalars`
     return values
 
 
-def front_speed(
-    name: str, interface: Interface, axis: int, arrival: Floats, nucleation: float
-) -> float:
-    """Return the speed of a front, m/s, along a line of nodes, named as in `SPEEDS`, or NaN."""
-    lengths, statistic = SPEED_SPANS[name]
-    spacing = interface.spacings[axis]
-    window = max(lengths * nucleation, 8.0 * spacing)
-    window = min(window, 0.25 * interface.lengths[axis])
-    if interface.is_free:  # fronts do not pass from one end to the other
-        arrival = np.append(arrival, np.full(round(window / spacing), np.nan))
-    speeds = rupture_speed(arrival, spacing, window)
-    speeds = speeds[np.isfinite(speeds)]
-    return float(statistic(speeds)) if speeds.size else np.nan
+def front_speeds(
+    interface: Interface, axis: int, arrival: Floats, nucleation: float
+) -> dict[str, float]:
+    """Return the speeds of a front along a line of nodes, m/s, or NaN, by the names of `SPEEDS`.
+
+    `arrival` (s) holds the times along this axis, and `nucleation` is the nucleation length (m).
+    """
+    spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
+    front = {}
+    for name, (lengths, statistic) in SPEED_SPANS.items():
+        window = min(max(lengths * nucleation, 8.0 * spacing), longest)
+        times = arrival
+        if interface.is_free:  # fronts do not pass from one end to the other
+            times = np.append(arrival, np.full(round(window / spacing), np.nan))
+        speeds = rupture_speed(times, spacing, window)
+        speeds = speeds[np.isfinite(speeds)]
+        front[name] = float(statistic(speeds)) if speeds.size else np.nan
+    return front
 
 
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:

@@ -10,7 +10,8 @@ change.
 
 Algorithm (`wave_steps`)
 ------------------------
-Leapfrog with steps of size h: velocities are known in the middle of a step, displacements at its
+Leapfrog, with friction at split nodes (D. J. Andrews, Bulletin of the Seismological Society of
+America 89, 1999). Velocities are known in the middle of a step of size h, displacements at its
 end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step
 processes the rows:
 
@@ -109,6 +110,7 @@ def _force(
     the row above. y0, y1 and y2 are the other components.
     """
     n = force.shape[0]
+    # Coefficients in registers: of both neighbours, of the node, and of the other component.
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
     d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
     g, h, k = stencil[2, 0], stencil[2, 1], stencil[2, 2]
@@ -118,6 +120,7 @@ def _force(
             + (d * x0[i + 1] + e * x1[i + 1] + f * x2[i + 1])
             + (g * (y0[i + 2] - y0[i]) + h * (y1[i + 2] - y1[i]) + k * (y2[i + 2] - y2[i]))
         )
+    # The end nodes have a single neighbour, and a strip beyond them.
     for i, inner, sign in ((0, 1, np.float32(1.0)), (n - 1, n - 2, np.float32(-1.0))):
         from_x = a * x0[inner] + b * x1[inner] + c * x2[inner]
         from_x += stencil[3, 0] * x0[i] + stencil[3, 1] * x1[i] + stencil[3, 2] * x2[i]
@@ -132,6 +135,7 @@ def _move(w: Any, velocity: Any, force: Any, keep: Any, gain: Any, step: Any, la
     for i in range(w.shape[0]):
         before = velocity[i]
         after = keep * before + gain * force[i]
+        # w = u + theta u' grows by h u' and by theta times the change of u'.
         w[i] += (step + lag) * after - lag * before
         velocity[i] = after
 
@@ -155,14 +159,17 @@ def _slide(
         # In double precision, since slip adds up many small increments.
         before = np.float64(velocities[i])
         strength = strength_at(sample, slip, i)
+        # The velocity without friction, and with friction at the strength of the node.
         free = keep * before + gain * (force[i] + dx * (start[i] - waves.corrected[i]))
         after = free - gain * dx * strength
         if after > 0.0:
             waves.stress[i] = strength
         else:
+            # The node sticks. Its stress is the friction that just stops it.
             after = 0.0
             waves.stress[i] = free / (gain * dx)
         added = 2.0 * step * after  # both blocks move
+        # Slip grows evenly within the step, so interpolate the time of arrival.
         if slip[i] < front[i] <= slip[i] + added:
             waves.arrival[i] = now.time + step * (front[i] - slip[i]) / added
         slip[i] += added
@@ -201,6 +208,7 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
     mass = force.shape[0] * mesh.mass[top]
     # The spring acts at the mean travel of the step, which keeps stiff machines
     # stable.
+    # All nodes of the top and the platen move as a single mass.
     inert = (mass + mesh.drive_mass) / step + 0.5 * mesh.stiffness * step
     lost = 0.5 * mesh.attenuation * mass
     total -= mesh.stiffness * now.travel
@@ -222,6 +230,7 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     nodes.
     """
     now, step, last = waves.totals[0], mesh.step, waves.u.shape[1] - 1
+    # The pusher moves as the mean of the pushed nodes, weighted by their shares of the force.
     mobility = speed = 0.0
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):
@@ -231,6 +240,7 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     if mesh.stiffness == np.inf:  # the force that stops the pushed nodes
         force = -speed / mobility
     else:
+        # Semi-implicit: F = -k X - a (v + g F - v_before), solved for F.
         a = 0.5 * mesh.stiffness * step + mesh.drive_mass / step
         force = -(mesh.stiffness * now.travel + a * (speed - before)) / (1.0 + a * mobility)
     now.speed = speed + mobility * force
@@ -270,6 +280,7 @@ def wave_steps(
         # Forces on row j and motion of row j - 1 alternate, so that two rows of
         # forces suffice.
         for j in range(rows + 1):
+            # 1. Forces on row j.
             if j < rows:  # stencils are zero beyond the interface and the top
                 low, up, stencil = max(j - 1, 0), min(j + 1, last), mesh.stencils[j]
                 _force(stencil[0], u[low], u[j], u[up], v[low], v[j], v[up], along[j % 2])
@@ -278,6 +289,7 @@ def wave_steps(
             i = j - 1
             if i < 0:
                 continue
+            # 2. to 4. Move row j - 1. The forces on row j have used it already.
             force, gain = along[i % 2], np.float32(gains[i])  # the row above has felt this row
             if i == 0:
                 never = _slide(sample, start, front, mesh, waves, force, keep, gains[0])
