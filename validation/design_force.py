@@ -92,7 +92,7 @@ def campaign(truth, seed, method):
         (both.grid, both.likelihood),
         (tests.grid, tests.likelihood),
     ):
-        designs.append(tables.quantile(grid, PROMISED))
+        designs.append([tables.quantile(grid, probability) for probability in PROMISED])
         draws = grid.described(grid.draws(4000, np.random.default_rng(0)))
         for name, right in (("strength.mean", 1e6), ("between.strength", SCATTER)):
             low, high = np.quantile(draws[name], [0.05, 0.95])

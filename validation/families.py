@@ -22,7 +22,7 @@ from decisions import LOCAL, PROBLEM, TARGET, strength
 
 import stiction as st
 from stiction.inference import bootstrap
-from stiction.inference.estimate import FitSetting, compare, windowed
+from stiction.inference.estimate import FitSetting, ranking, windowed
 from stiction.inference.marginal_fit import family_of
 from stiction.inference.records import records_of
 from stiction.inference.whittle import SpectrumFamily
@@ -58,7 +58,7 @@ def score(name, lengths, seed):
         )
         for one, own in families.items()
     ]
-    found = compare(settings, rows)[1].items()
+    found = ranking(settings, rows)[1].items()
     return max((own.score for label, own in found if label.startswith(name)), default=-np.inf)
 
 

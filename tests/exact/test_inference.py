@@ -8,7 +8,7 @@ import scipy.stats
 from setups import EXACT, LOCAL, turns
 
 import stiction as st
-from stiction.inference.density import log_likelihoods, tabulate
+from stiction.inference.density import densities_of, log_likelihoods
 from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
     Simulation,
@@ -135,7 +135,7 @@ def test_where_scaling_does_not_hold_it_is_not_used(name):
 
 
 def log_densities_at(samples, points, error=0.0, bound=-np.inf):
-    found, out = tabulate(samples[None, :], np.array([bound])), np.empty((1, points.size))
+    found, out = densities_of(samples[None, :], np.array([bound])), np.empty((1, points.size))
     nodes, weights, same = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1)), [[0.0], [1.0]]
     of_v = found.between(nodes, weights)
     log_likelihoods(found.table, nodes, weights, of_v, np.array(same), error, points, out)

@@ -239,7 +239,7 @@ def test_what_mean_and_trend_take_is_given_back():
     centre = np.eye(len(total)) - 1.0 / len(total)
     share = np.sum((centre @ keep) * (keep @ total).T) / len(total)
     assert 0.5 < share < 0.85
-    wider = found.marginal.cv / found.own.cv
+    wider = found.marginal.cv / found.of_values.cv
     assert wider == pytest.approx(share**-0.5, rel=1e-6)
     assert found.parameters["standard_deviation"] == pytest.approx(0.2e6, rel=0.12)
 

@@ -82,6 +82,7 @@ def test_files_of_testing_machines(tmp_path):
         assert all(is_machine(curve, 0.0) for curve in curves)
     frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine(), "F2 (N)": machine()})
     over_time = st.read_curve(frame)
+    refuses("test: line ... goes back", lambda: st.read_curve(pd.concat([frame, frame])))
     assert (over_time[0].travel_unit, over_time[0].peak_travel) == ("s", pytest.approx(6.0))
     assert is_machine(st.read_curve(frame, speed=1e-4, force=2)[0], 0.0)
     with pytest.warns(st.AccuracyWarning, match="negative"):

@@ -11,8 +11,6 @@ import xarray as xr
 from setups import LOCAL
 
 import stiction as st
-from stiction.ensemble.experiment import Experiment
-from stiction.inference.infer import UNFINISHED
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
@@ -61,40 +59,6 @@ def test_predicted_campaigns_have_as_many_independent_tests_as_the_measured_one(
         assert own.mean() == pytest.approx(one.mean(), abs=0.1 * one.std())
         within = np.sqrt(own.var(axis=1, ddof=1).mean())
         assert within == pytest.approx(one.std(), rel=0.1)
-
-
-FIELDS = [st.paper.strength(PROBLEM, correlation_ratio=ratio) for ratio in (0.5, 0.6, 0.8)]
-
-
-@pytest.mark.parametrize(
-    "given",
-    [{"random": FIELDS, "prior": None}, {"prior": {"correlation_length": (H_N, 2.0 * H_N)}}],
-)
-def test_what_an_interrupted_call_has_simulated_is_taken_up(given, monkeypatch):
-    solve, solved = Experiment.results, []
-
-    def results(self, first, count):
-        if len(solved) == last:
-            raise stop
-        solved.append(first)
-        return solve(self, first, count)
-
-    monkeypatch.setattr(Experiment, "results", results)
-    stop, last = KeyboardInterrupt, -1
-    whole = infer(**given, workers=1)
-    total, last = len(solved), len(solved) + 2
-    with pytest.raises(KeyboardInterrupt):
-        infer(**given, workers=1)
-    last = -1
-    found = infer(**given, workers=1)
-    assert len(solved) == 2 * total  # nothing twice
-    np.testing.assert_array_equal(found.u, whole.u)
-    infer(**given, workers=1)
-    assert len(solved) == 3 * total  # what is complete is not kept
-    stop, last = MemoryError, len(solved) + 2
-    with pytest.raises(MemoryError):
-        infer(**given, workers=1)
-    assert not UNFINISHED  # nor what ended in an error
 
 
 def test_doubts_are_named_where_the_caller_stands():

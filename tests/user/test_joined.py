@@ -9,7 +9,6 @@ from refusals import refuses
 from setups import make_problem
 
 import stiction as st
-from stiction.inference import joined as joining
 from stiction.inference.specimens import PRIOR_SCALE
 from stiction.random.equally_likely import as_random, origin
 from stiction.reliability.answer import unseen_batch
@@ -79,7 +78,7 @@ def test_five_strengths_give_what_proportion_gives(monkeypatch):
     """The longer way, on a problem where both are possible; onsets by samples of the same draws."""
     given = LOCAL | {"samples": 200}
     short = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
-    monkeypatch.setattr(joining, "scales_with_strength", lambda *_: False)
+    monkeypatch.setattr("stiction.inference.specimens.scales_with_strength", lambda *_: False)
     long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
     assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
     for name in ("strength.mean", "between.strength"):

@@ -66,7 +66,7 @@ def test_the_estimate_is_told_the_threads_of_the_call(workers, prior, monkeypatc
         raise RuntimeError
 
     monkeypatch.setattr(likelihoods, "warn_if_long", stop)
-    monkeypatch.setattr("stiction.inference.joined.warn_if_long", stop)
+    monkeypatch.setattr("stiction.inference.specimens.warn_if_long", stop)
     options = {"prior": prior, "method": st.Equilibrium(), "workers": workers}
     with pytest.raises(RuntimeError):
         st.infer(PROBLEM, FIELD, PEAKS, progress=False, **options)

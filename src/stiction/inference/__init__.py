@@ -5,6 +5,6 @@ Profiles: begin with `fit` and `estimate`. Then read `records` and `window`
 (errors) and `between` (specimens).
 
 Peaks: begin with `infer`. Then read `prior`, `likelihood` with `scaling` and `density`,
-`grid` and `posterior`. `specimens` and `joined` combine profiles and peaks. `agreement`
-tests a prediction, and `design` and `widths` plan tests.
+`grid` and `posterior`. `specimens` combines profiles and peaks. `agreement` tests a
+prediction, and `design` plans tests. `peaks` and `curves` read the files of tests.
 """

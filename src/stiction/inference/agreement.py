@@ -207,15 +207,16 @@ def agreement(
         if load_cell_error:
             raise InputError("load_cell_error: the posterior has its own. Leave it out")
         return _with_posterior(prediction, measured, replicates, rng)
-    values = _values(prediction, measured)
-    factor = 1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit)
-    values = values + factor * load_cell_error * rng.standard_normal(values.size)
+    values = _predicted_peaks(prediction, measured)
+    values = values + factor_of(unit, peaks) * load_cell_error * rng.standard_normal(
+        values.size
+    )
     measured.refuse_far([values])
     # 1. to 3.
     distances = _permuted(measured.values[0], values, replicates, rng)
     at = np.unique(np.concatenate([measured.values[0], values]))
     share = np.searchsorted(np.sort(values), at, side="right") / values.size
-    result = _summary(measured, distances, (Predicted(at, share),))
+    result = _agreement(measured, distances, (Predicted(at, share),))
     if isinstance(peaks, Curves) and "event" in prediction.dims:
         precursors = _precursors(prediction, peaks)
         for name, pair in precursors.items():
@@ -251,14 +252,15 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array
     for row in np.flatnonzero(np.isfinite(peaks)):
         force = np.stack([high[row], low[row]], axis=1).ravel()
         force = np.append(force[np.isfinite(force)], peaks[row])
-        # The peak is the force at the onset, or at an earlier event.
+        # The peak is the force at the onset, or at an earlier event. Between an event and the
+        # next event the force rises, so the two forces of each event give the turning points.
         predicted.append(summary_of(force, threshold))
     measured = [summary_of(curve.force, threshold) for curve in curves]
     pairs = zip(np.transpose(measured), np.transpose(predicted), strict=True)
     return dict(zip(PRECURSORS, pairs, strict=True))
 
 
-def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
+def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
     name = measured.variable
     if name not in prediction:
         raise InputError(
@@ -267,9 +269,8 @@ def _values(prediction: xr.Dataset, measured: Peaks) -> Array:
         )
     if prediction[name].ndim != 1 or len(measured.values) > 1:
         raise InputError(
-            f"prediction: must be for a single kind of specimen, got {name} over"
-            f" {', '.join(map(str, prediction[name].dims))} for {len(measured.values)} kinds."
-            " Choose a step of a sweep with isel, and compare kinds in separate calls"
+            "prediction: must be for a single kind of specimen. Choose a step of a sweep with isel,"
+            " and compare kinds in separate calls"
         )
     values = np.asarray(prediction[name].values, dtype=np.float64)
     if missing := int(np.isnan(values).sum()):
@@ -316,30 +317,33 @@ def _with_posterior(
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])
+    # All kinds of a campaign share the draw, because they share the unknown parameters.
     u = posterior.u[rng.choice(len(posterior.u), POSTERIOR_POINTS)]
     chosen = rng.integers(POSTERIOR_POINTS, size=replicates)
     distances, predicted = np.zeros((replicates + 1, 2)), []
     for kind, peaks in zip(kinds, measured.values, strict=True):
         # 4.
-        at, shares = _law(posterior, kind, u, peaks)
+        at, shares = _peaks_at(posterior, kind, u, peaks)
         # 5.
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
         law = Predicted(at, shares.mean(axis=0))
+        # Values of the mean distribution are uniform if the peaks come from it.
         squares, most = _distances(np.interp(np.sort([peaks, *drawn]), *law))
         distances[:, 0] += squares
         distances[:, 1] = np.maximum(distances[:, 1], most)
         predicted.append(law)
-    return _summary(measured, distances, tuple(predicted))
+    return _agreement(measured, distances, tuple(predicted))
 
 
-def _law(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
+def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
     """Return peaks (points, LAW_VALUES) at parameters u, and the share of peaks up to each."""
     ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
     margin = RANGE_MARGIN * (high - low)
     at = np.linspace(max(low - margin, 0.5 * low), high + margin, LAW_VALUES)
     density = np.exp(posterior.likelihood.of([at], [kind]).parts(u))
+    # The distribution is the integral of the density, by the trapezoidal rule.
     between = 0.5 * (density[:, 1:] + density[:, :-1])
     share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)
     return at, share / np.maximum(share[:, -1:], 1e-300)
@@ -356,11 +360,12 @@ def _distances(share: Array) -> tuple[Array, Array]:
 
 def _p_values(distances: Array) -> list[float]:
     """Return the share of rows with distances that are at least the distances in the first row."""
+    # Equal distances may differ by round-off.
     as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
     return ((1 + as_far) / len(distances)).tolist()
 
 
-def _summary(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
+def _agreement(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
     """Return the agreement from distances (1 + replicates, 2). Measured distances come first."""
     observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")

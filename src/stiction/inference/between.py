@@ -50,10 +50,12 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     if levels.size < 2:
         return list(rows)
     logarithms = np.log(levels)
+    # Records of a uniform field have no variance of their own.
     weight = 1.0 / np.maximum(within, 1e-300)
     away = logarithms - weight @ logarithms / weight.sum()
     excess = max(float(weight @ away**2) / (levels.size - 1), 1e-300)
     wanted = np.exp(away / math.sqrt(excess))
+    # The mean over all records stays.
     factors = wanted / wanted.mean() * levels.mean() / levels
     return [row * factor for row, factor in zip(rows, factors, strict=True)]
 
@@ -75,6 +77,7 @@ def scatter_between(logarithms: Array, within: Array) -> float:
 
     For a single record the estimate is 0.
     """
+    # Q falls as s rises.
     freedom = logarithms.size - 1
     if _q(logarithms, within, 0.0) <= freedom:
         return 0.0

@@ -41,9 +41,9 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import in_threads
-from stiction.inference.estimate import NAMES, Estimate, estimate
+from stiction.inference.estimate import NAMES, BestFit, estimate
 from stiction.inference.marginal_fit import Family, beta_of
-from stiction.inference.whittle import RANGES, origin
+from stiction.inference.whittle import RANGES, offset
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
@@ -57,11 +57,11 @@ MIN_WIDTH = 1e-3
 """Least width of an interval, over its upper end. A narrower one is replaced by the whole range."""
 
 
-class Repetitions(NamedTuple):
+class Refits(NamedTuple):
     """A field, and fits to records simulated from it."""
 
-    truth: Estimate
-    fits: list[Estimate]
+    truth: BestFit
+    fits: list[BestFit]
 
 
 class NotRepeated(InputError):
@@ -76,21 +76,23 @@ class NotRepeated(InputError):
 
 
 def bootstrapped(
-    fitted: Estimate,
+    fitted: BestFit,
     count: int,
     confidence: float,
     seed: int,
     progress: Show,
-    further: Sequence[tuple[Estimate, int]] = (),
-) -> tuple[list[Repetitions], list[Repetitions]]:
+    further: Sequence[tuple[BestFit, int]] = (),
+) -> tuple[list[Refits], list[Refits]]:
     """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
 
     The second list holds fits from `further` estimates, with other numbers of
     repetitions. Records to which the family cannot be fitted are left out.
     """
 
-    def repeat(truth: Estimate, count: int = count) -> Repetitions:
-        def refit(number: int) -> Estimate | None:
+    def repeat(truth: BestFit, count: int = count) -> Refits:
+        def refit(number: int) -> BestFit | None:
+            # The same random numbers for each field, so that differences between fields are
+            # not due to chance.
             rng = np.random.default_rng([seed, number])
             try:
                 again = estimate(truth.simulate(rng), truth.setting, truth)
@@ -104,8 +106,9 @@ def bootstrapped(
         fits = [result for result in results if result is not None]
         if len(fits) < MIN_REPETITIONS:
             raise NotRepeated(truth.setting.marginal, len(fits), count)
-        return Repetitions(truth, fits)
+        return Refits(truth, fits)
 
+    # A fixed correlation length has no ends from which to repeat.
     ends = "correlation_length" in fitted.setting.spectrum.free
     total = (3 if ends else 1) * count + sum(number for _, number in further)
     with Meter("fit_field", total, progress) as meter:
@@ -115,7 +118,7 @@ def bootstrapped(
         return repeated, [repeat(*other) for other in further]
 
 
-def at_ends(around: Repetitions, confidence: float) -> list[Estimate]:
+def at_ends(around: Refits, confidence: float) -> list[BestFit]:
     """Return the field with its correlation length at both ends of a first interval (step 5)."""
     fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
@@ -147,7 +150,7 @@ class Scale(NamedTuple):
             return value**2
         if self.linear:
             return value
-        away = SIDES[name] * (value - values["mean"]) if name in SIDES else value - origin(name)
+        away = SIDES[name] * (value - values["mean"]) if name in SIDES else value - offset(name)
         return math.log(max(away, 1e-300))
 
     def back(self, at: float, values: Mapping[str, float]) -> float:
@@ -158,9 +161,9 @@ class Scale(NamedTuple):
         if self.linear:
             return at
         away = math.exp(at)
-        return values["mean"] + SIDES[name] * away if name in SIDES else origin(name) + away
+        return values["mean"] + SIDES[name] * away if name in SIDES else offset(name) + away
 
-    def of(self, fitted: Estimate) -> tuple[float, float]:
+    def of(self, fitted: BestFit) -> tuple[float, float]:
         """Return an estimate on this scale, and the width of step 3."""
         if self.name == "noise":
             return fitted.noise
@@ -169,7 +172,7 @@ class Scale(NamedTuple):
             width *= fitted.parameters["standard_deviation"]
         return self.to(fitted.parameters), width
 
-    def less(self, fitted: Estimate, repeated: Repetitions) -> Array:
+    def less(self, fitted: BestFit, repeated: Refits) -> Array:
         """Return the estimate minus the error of each repetition (steps 3 and 7)."""
         at, width = self.of(fitted)
         true = self.to(repeated.truth.parameters)
@@ -177,14 +180,14 @@ class Scale(NamedTuple):
         return at - width * (refitted[:, 0] - true) / refitted[:, 1]
 
 
-def scale_of(name: str, repeated: Sequence[Repetitions]) -> Scale:
+def scale_of(name: str, repeated: Sequence[Refits]) -> Scale:
     """Return the scale of a parameter. It is linear if an estimate is negative."""
     least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
     return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
 
 def intervals(
-    repeated: Sequence[Repetitions], confidence: float, values: Array
+    repeated: Sequence[Refits], confidence: float, values: Array
 ) -> dict[str, tuple[float, float]]:
     """Return the interval of each parameter (steps 2 to 6). `values` are measured, with noise."""
     around, *moved = repeated
@@ -193,10 +196,13 @@ def intervals(
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
+        # 2.
         scale = scale_of(name, repeated)
+        # 5. The noise hardly depends on the correlation length.
         shorter, longer = moved if moved and name != "noise" else (around, around)
         if np.cov([scale.of(one)[0] for one in around.fits], lengths)[0, 1] < 0.0:
             shorter, longer = longer, shorter
+        # 3. and 4.
         low, high = (
             float(np.quantile(scale.less(fitted, repetitions), share, method="weibull"))
             for repetitions, share in ((shorter, tail), (longer, 1.0 - tail))
@@ -212,6 +218,7 @@ def intervals(
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
+        # If clipping leaves almost no interval, the data say nothing about the parameter.
         least = MIN_WIDTH * high if np.isfinite(ends).all() else 0.0
         if high - low <= least:
             low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
@@ -219,12 +226,14 @@ def intervals(
     return result
 
 
-def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[float, float]]:
+def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[float, float]]:
     """Return limits for parameters. Bounds of the marginal must lie outside all values."""
     estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
+    # Noise may move values beyond the bounds, which lie outside the shrunken values.
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
+    # Positive values have no negative bound.
     below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least
     above = most, math.inf
     limits = {
@@ -236,12 +245,12 @@ def limits_of(fitted: Estimate, values: Array, noise: float) -> dict[str, tuple[
     loc, extent = estimated.get("marginal.loc"), estimated.get("marginal.scale")
     if loc in (bottom, top):  # otherwise loc is not a bound, such as a mean
         limits["marginal.loc"] = below if loc == bottom else above
-    if extent is not None and math.isclose(extent, top - bottom):
+    if extent is not None and math.isclose(extent, top - bottom):  # a range, not a deviation
         limits["marginal.scale"] = (most - least, math.inf)
     return limits
 
 
-def likely(repeated: Repetitions, measured: Array, quantity: str) -> list[RandomField]:
+def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField]:
     """Return fields as likely as the estimate, one for each repetition (step 7)."""
     fitted = repeated.truth
     field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)

@@ -26,7 +26,7 @@ Steps:
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -35,11 +35,11 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
-from stiction.base.model import Number, Positive, checked, describe, real_array
+from stiction.base.model import Number, Positive, checked, describe
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, in_words, is_in
+from stiction.base.units import in_words, is_in
 from stiction.problem.profiles.files import EXCEL, TEXT, read_table
-from stiction.problem.profiles.labels import column_of, with_stated_unit
+from stiction.problem.profiles.labels import column_of, in_si, unit_of, with_stated_unit
 from stiction.problem.profiles.reading import Missing
 from stiction.problem.profiles.tables import Options, table_of_frame
 
@@ -235,11 +235,12 @@ def read_curve(
     tests: list[Curve] = []
     for name, table in _tables(source, options):
         with prefixed(name):
-            columns = _columns(table, force, travel, unit, travel_unit, speed)
-            for label, chosen in _tests_of(table, columns):
-                with prefixed(f"test {label}" if label else ""):
-                    full = f"{Path(name).stem}, test {label}" if label else Path(name).stem
-                    tests.append(_curve(full, columns, chosen, noise))
+            readings = _readings(table, force, travel, unit, travel_unit, speed)
+            spans = [*_tests_of(table, readings)]
+        for label, rows in spans:
+            number = f", test {label}" * bool(label)
+            with prefixed(name + number):
+                tests.append(_curve(Path(name).stem + number, readings, rows, noise))
     if len({(curve.unit, curve.travel_unit) for curve in tests}) > 1:
         raise InputError(
             "source: units of force or travel differ between tests. Read them in separate calls"
@@ -252,7 +253,7 @@ def read_curve(
     return Curves(tuple(tests))
 
 
-class Columns(NamedTuple):
+class Readings(NamedTuple):
     """Readings from a file in SI, with units and line numbers."""
 
     travel: Array
@@ -268,14 +269,11 @@ def _tables(source: Any, options: Any) -> Iterator[tuple[str, Any]]:
         path = Path(source)
         files = [path]
         if path.is_dir():
-            files = sorted(
-                file for file in path.iterdir()
-                if file.suffix.lower() in (*TEXT, EXCEL) and not file.name.startswith((".", "~"))
-            )  # fmt: skip
+            endings = (*TEXT, EXCEL)
+            files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in endings]
+            files = [file for file in files if not file.name.startswith((".", "~"))]
             if not files:
-                raise InputError(
-                    f"{path}: has no file that ends in {', '.join((*TEXT, EXCEL))}"
-                )
+                raise InputError(f"{path}: has no file that ends in {', '.join(endings)}")
         for file in files:
             with prefixed(str(file)):
                 table = read_table(file, options)
@@ -283,106 +281,100 @@ def _tables(source: Any, options: Any) -> Iterator[tuple[str, Any]]:
     elif hasattr(source, "columns") and hasattr(source, "to_xarray"):
         yield "test", table_of_frame(source)
     elif isinstance(source, tuple | list) and len(source) == 2:
-        yield "test", source
+        yield "test", _table_of_arrays(*source)
     else:
         raise InputError(
             f"source: must be a path, a DataFrame or (travel, force). Got {describe(source)}"
         )
 
 
-def _columns(
+def _table_of_arrays(travel: Any, force: Any) -> Any:
+    """Return arrays of travel and force as a table, with the units that they state."""
+    import xarray as xr
+
+    columns = {}
+    for name, given, units in (("travel", travel, TRAVEL_UNITS), ("force", force, FORCE_UNITS)):
+        values, unit = with_stated_unit(given, units)
+        columns[name] = "row", np.asarray(values), {"units": unit or ""}
+    try:
+        return xr.Dataset(columns)
+    except ValueError as error:
+        raise InputError(f"travel and force must be of equal length: {error}") from None
+
+
+def _readings(
     table: Any,
     force: int | str | None,
     travel: int | str | None,
     unit: str | None,
     travel_unit: str | None,
     speed: float | None,
-) -> Columns:
+) -> Readings:
     """Return force and travel from a table, in SI."""
-    if isinstance(table, tuple | list):
-        (at, at_unit), (values, value_unit) = (
-            with_stated_unit(column, units)
-            for column, units in zip(table, (TRAVEL_UNITS, FORCE_UNITS), strict=True)
-        )
-        lines = np.arange(np.size(at))
-    else:
-        column = column_of(table, FORCE, FORCE_UNITS, force)
-        along = column_of(table, TRAVEL, ("m",), travel)
-        along = column_of(table, TIME, ("s",)) if along is None else along
-        if column is None or along is None:
-            missing = "force" if column is None else "travel or time"
-            names = ", ".join(map(repr, table.data_vars))
-            raise InputError(
-                f"no column is clearly the {missing}. Choose force= and travel= among {names}"
-            )
-        if texts := [c.attrs["text"] for c in (along, column) if c.attrs.get("text")]:
-            raise InputError(texts)
-        at, values = along.values, column.values
-        at_unit, value_unit = along.attrs.get("units"), column.attrs.get("units")
-        lines = table.attrs.get("lines", np.arange(at.size))
-    at, at_si = _in_si(at, at_unit, travel_unit, TRAVEL_UNITS, "travel")
-    values, si = _in_si(values, value_unit, unit, FORCE_UNITS, "force")
-    if at.shape != values.shape or at.ndim != 1:
+    column = column_of(table, FORCE, FORCE_UNITS, force)
+    along = column_of(table, TRAVEL, ("m",), travel)
+    along = column_of(table, TIME, ("s",)) if along is None else along
+    if column is None or along is None:
+        missing = "force" if column is None else "travel or time"
+        names = ", ".join(map(repr, table.data_vars))
         raise InputError(
-            "travel and force must be 1-d arrays of equal length, got shapes"
-            f" {at.shape} and {values.shape}"
+            f"no column is clearly the {missing}. Choose force= and travel= among {names}"
         )
+    if texts := [c.attrs["text"] for c in (along, column) if c.attrs.get("text")]:
+        raise InputError(texts)
+    at, at_si = column_in_si(along, "travel", travel_unit, TRAVEL_UNITS, "travel_unit")
+    values, si = column_in_si(column, "force", unit, FORCE_UNITS, "unit")
     if at_si == "s" and speed is not None:
         at, at_si = at * speed, "m"
-    return Columns(at, values, si, at_si, np.asarray(lines))
+    lines = np.asarray(table.attrs.get("lines", np.arange(at.size)))
+    return Readings(at, values, si, at_si, lines)
 
 
-def _in_si(
-    values: Any, stated: str | None, given: str | None, units: tuple[str, ...], quantity: str
+def column_in_si(
+    column: Any, quantity: str, given: str | None, units: Iterable[str], option: str = ""
 ) -> tuple[Array, str]:
-    """Return values in SI and their SI unit. The source or the caller states the original unit."""
-    option = "unit" if quantity == "force" else "travel_unit"
-    if stated and given and stated != given:
-        raise InputError(f"{option}: is {given!r}, but the source states {stated!r}")
-    name = stated or given
-    if name is None:
+    """Return a column in SI and its SI unit. The source or the caller states the original unit."""
+    name = given or unit_of(column)
+    if not name:
+        way = f", or pass {option}=" * bool(option)
         raise InputError(
-            f"the unit of the {quantity} is not stated. Pass {option}=, such as 'mm' or 'N'"
+            f"the unit of the {quantity} is not stated. Write it into the heading{way}"
         )
-    si = next((si for si in units if is_in(name, si)), None)
-    if si is None:
-        raise InputError(
-            f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
-        )
-    try:
-        return real_array(values) * factor_to(si, name), si
-    except TypeError as error:
-        raise InputError(f"{quantity}: must be numbers; {error}") from None
+    for si in units:
+        if is_in(name, si):
+            return in_si(column, quantity, si, given), si
+    raise InputError(
+        f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
+    )
 
 
-def _tests_of(table: Any, columns: Columns) -> Iterator[tuple[str, Any]]:
+def _tests_of(table: Any, readings: Readings) -> Iterator[tuple[str, Any]]:
     """Yield the label of each test in a table, and a mask of its rows."""
-    number = None if isinstance(table, tuple | list) else column_of(table, TEST)
+    number = column_of(table, TEST)
     if number is not None and np.isfinite(number.values).all():
         for label in dict.fromkeys(number.values.tolist()):
             yield f"{label:g}", number.values == label
         return
-    blocks = np.zeros(columns.travel.size)
-    if not isinstance(table, tuple | list) and "blocks" in table.attrs:
-        blocks = np.asarray(table.attrs["blocks"])
+    blocks = np.asarray(table.attrs.get("blocks", np.zeros(readings.travel.size)))
     # A new test begins after an empty line only if the travel goes back there.
-    restarts = np.diff(columns.travel, prepend=0.0) < 0
+    restarts = np.diff(readings.travel, prepend=0.0) < 0
     begins = (np.diff(blocks, prepend=blocks[:1]) > 0) & restarts
     block = np.cumsum(begins)
     for label in range(int(block[-1]) + 1):
         yield f"{label + 1}" if block[-1] else "", block == label
 
 
-def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> Curve:
+def _curve(name: str, readings: Readings, rows: Array, noise: float | None) -> Curve:
     """Return the curve of one test (steps 1 to 4)."""
-    travel, force, lines = columns.travel[chosen], columns.force[chosen], columns.lines[chosen]
-    known = np.isfinite(travel) & np.isfinite(force)
+    travel, force, lines = readings.travel[rows], readings.force[rows], readings.lines[rows]
+    known = np.isfinite(travel) & np.isfinite(force)  # machines miss single readings
     if not known.all():
         warn_accuracy(f"{name}: {int((~known).sum())} of {known.size} readings are missing")
         travel, force, lines = travel[known], force[known], lines[known]
     if force.size < MIN_READINGS:
         raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
-    allowed = 0.0 if columns.travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
+    # Time never goes back. A position may tremble, but a new cycle is another test.
+    allowed = 0.0 if readings.travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
     back = np.flatnonzero(np.maximum.accumulate(travel) - travel > allowed)
     if back.size:
         raise InputError(
@@ -403,10 +395,11 @@ def _curve(name: str, columns: Columns, chosen: Array, noise: float | None) -> C
     threshold = max(white_range, MIN_DROP_SHARE * force[top])
     # 3. and 4.
     starts, ends = turning_points(force, threshold)
+    # The plateau begins where the drop at the peak ends, and is empty without such a drop.
     after = force[ends[starts == top].min(initial=force.size) :]
     starts, ends = starts[starts < top], ends[starts < top]
     return Curve(
-        name, travel, force, columns.unit, columns.travel_unit, noise, threshold,
+        name, travel, force, readings.unit, readings.travel_unit, noise, threshold,
         peak=float(force[top]),
         peak_travel=float(travel[top]),
         drops=Drops(travel[starts], force[starts], force[starts] - force[ends]),
@@ -439,6 +432,7 @@ def noise_of(force: Array) -> float:
 
 def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:
     """Return the readings at which drops begin and end (step 3)."""
+    # `high` and `low` are the extreme readings since the last turning point.
     starts, ends = [], []
     high = low = 0
     falling = False
@@ -454,6 +448,6 @@ def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:
         elif value < force[high] - threshold:
             starts.append(high)
             falling, low = True, place
-    if falling:
+    if falling:  # the record ends during a drop
         ends.append(low)
     return np.array(starts, dtype=np.int64), np.array(ends, dtype=np.int64)

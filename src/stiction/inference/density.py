@@ -97,7 +97,7 @@ def to_v(onsets: Array, bound: Array) -> Array:
     return np.log(np.maximum(above, 1e-9 * above.mean(axis=1, keepdims=True)))
 
 
-def tabulate(onsets: Array, bound: Array) -> Densities:
+def densities_of(onsets: Array, bound: Array) -> Densities:
     """Return densities of onsets (nodes, samples) that cannot lie below `bound` (nodes,)."""
     if not np.isfinite(bound).all():
         bound = onsets.mean(axis=1) - BOUND_DEVIATIONS * onsets.std(axis=1).max()
@@ -150,6 +150,7 @@ def _with_error(
     bound, mean, spread = of_v
     low, high = y - ERRORS * error - bound, max(y, bound) + ERRORS * error - bound
     low, high = math.log(low) if low > 0.0 else -np.inf, math.log(high)
+    # Only onsets that both the error and the density allow contribute.
     first, last = max(low, mean - SPREADS * spread), min(high, mean + SPREADS * spread)
     if first >= last:  # the error reaches only onsets far out in the tail
         first, last = max(low, high - 2.0 * SPREADS * spread), high
@@ -160,6 +161,7 @@ def _with_error(
         v = first + (k + 0.5) * step
         away = (y - bound - math.exp(v)) / error
         value = _interpolated(table, near, share, (v - mean) / spread) - 0.5 * away * away
+        # Sum exponentials relative to the largest, so that they neither overflow nor vanish.
         if value > top:
             total = total * math.exp(top - value) + 1.0
             top = value

@@ -1,15 +1,19 @@
-"""Designs of tests: the expected information, before any test is made.
+"""Designs of tests: what further tests will tell, before any test is made.
 
-Problem. Parameters theta have a prior. Compute how much information about each
-parameter a design, such as ten tests, is expected to give. It is the mean over
-campaigns of the divergence of the posterior from the prior,
+Problem. Two questions are answered. With a prior of parameters theta: how much
+information about each parameter will a design, such as ten tests, give? It is the mean
+over campaigns of the divergence of the posterior from the prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
-Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, defined this
-information. It is computed by nested Monte Carlo.
+After measurements, with a fit or a posterior: how wide will the intervals of mean and
+scatter be after further tests, and how large the design stress?
 
-Steps, for each design and each simulated campaign:
+Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, defined this
+information. It is computed by nested Monte Carlo. The expected widths are means over the
+same kind of campaigns.
+
+Steps for the information, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
 2. Draw the peaks from the simulated onsets that also give the likelihood.
@@ -18,10 +22,20 @@ Steps, for each design and each simulated campaign:
    a coarse grid, make the box smaller around the true parameters.
 4. Compute the divergence of each marginal posterior. I is the mean over campaigns.
 
-`stiction.inference.widths` answers the same question for a fit or a posterior.
+Steps for the widths, for each design and each simulated campaign:
+
+5. Draw true values (field, family, s and mean) from the posterior given the present
+   measurements.
+6. Draw further peaks, and levels of further profiles, with these values.
+7. Compute the posterior given all measurements (`stiction.inference.specimens`).
+8. Compute the width of the 90 % interval for each parameter, and the design stress
+   from the predictive distribution. The result holds their means over campaigns.
+
+Departure. Steps 5 to 8 keep only the `MAX_FIELDS` fields with the largest mass.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -34,10 +48,20 @@ from stiction.base.model import Count, Names, Number, Progress, check, checked, 
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.inference.grid import grid_of
+from stiction.inference.infer import profiles_of
 from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
-from stiction.inference.peaks import factor_of
+from stiction.inference.peaks import Peaks, factor_of, si_of
+from stiction.inference.posterior import SpecimenPosterior
 from stiction.inference.prior import make_prior
-from stiction.inference.widths import expected_widths
+from stiction.inference.specimens import (
+    MEAN_KEY,
+    SCATTER_KEY,
+    FactorGrid,
+    Tables,
+    factor_of_family,
+    grid_of_profiles,
+    tables_of,
+)
 from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
@@ -48,6 +72,10 @@ CAMPAIGN_GRID_POINTS = 8_000
 """Points of the grid of each posterior."""
 MIN_BOX_WIDTH = 1e-12
 """Width of a box, as a share of the prior, below which rounding hides the posterior."""
+MAX_FIELDS = 12
+"""Fields within a specimen that represent all of them."""
+WIDTH_DRAWS = 2_000
+"""Draws of a posterior for an interval."""
 USUAL_DESIGNS = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
     f"{n} profiles": {"profiles": n} for n in (2, 5, 10)
 }
@@ -137,31 +165,25 @@ def design_of_tests(
     True
     """
     error = load_cell_error * factor_of(unit)
-    if prior is None:
-        with Meter("design of tests", show=progress) as meter:
-            simulation = Simulation(method, samples, seed, workers, meter)
-            return expected_widths(
-                problem, random, USUAL_DESIGNS if designs is None else designs, simulation,
-                probability, error, unit, repetitions,
-            )  # fmt: skip
-    parameters = make_prior(problem, random, prior)
-    designs = designs or {}
-    variable = variable_of(*parameters.at(parameters.middle), unit)
-    plans = _plans(designs, parameters.names)
-    lengths = list(dict.fromkeys(length for tests, _ in plans for length in tests))
     with Meter("design of tests", show=progress) as meter:
         simulation = Simulation(method, samples, seed, workers, meter)
+        if prior is None:
+            further = _further(USUAL_DESIGNS if designs is None else designs)
+            tables = _present(problem, random, simulation, unit, error)
+            return _widths(tables, further, probability, repetitions, simulation)
+        parameters = make_prior(problem, random, prior)
+        variable = variable_of(*parameters.at(parameters.middle), unit)
+        plans = _plans(designs or {}, parameters.names)
+        lengths = list(dict.fromkeys(length for tests, _ in plans.values() for length in tests))
         simulated = make_likelihood(
             parameters, simulation, lengths=lengths, error=error, variable=variable
         )
         meter.stage("simulated campaigns", repetitions * len(plans))
         rows = []
-        for tests, free in plans:
-            kinds = [lengths.index(length) for length in tests]
-            likelihood = simulated.of((), kinds)
-            rows.append(
-                _expected(likelihood, list(tests.values()), free, repetitions, seed, meter)
-            )
+        for tests, free in plans.values():
+            likelihood = simulated.of((), [lengths.index(length) for length in tests])
+            counts = list(tests.values())
+            rows.append(_information(likelihood, counts, free, repetitions, seed, meter))
     dims = ("design", "parameter")
     variables = {
         "information": Variable("1", "expected information about a parameter, nats", dims),
@@ -169,43 +191,54 @@ def design_of_tests(
     }
     values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
     coordinates = {
-        "design": (np.array(list(designs)), Variable("", "design of tests", ("design",))),
+        "design": (np.array(list(plans)), Variable("", "design of tests", ("design",))),
         "parameter": (np.array(parameters.names), Variable("", "parameter", ("parameter",))),
     }
     return to_dataset(values, variables, coordinates, {"repetitions": repetitions})
 
 
+def _as_table(
+    name: str, design: Any, keys: tuple[str, str], problems: list[str]
+) -> dict[str, Any]:
+    """Return a design as a table with some of the keys, and add unknown keys to `problems`.
+
+    A number, or a mapping of lengths, states the tests.
+    """
+    is_table = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
+    table = dict(design) if is_table else {"tests": design}
+    problems += [
+        unknown_name(f"designs: {name}", str(key), keys) for key in table if key not in keys
+    ]
+    return table
+
+
 def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
-) -> list[tuple[dict[float | None, int], list[int]]]:
+) -> dict[str, tuple[dict[float | None, int], list[int]]]:
     """Return the numbers of tests by length (m), and the positions of the unknown parameters."""
     problems = [] if designs else ["designs: must not be empty"]
-    plans = []
+    plans = {}
     for name, design in designs.items():
-        # A table has names as keys, numbers of tests by length have lengths.
-        named = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
-        table: Any = design if named else {"tests": design}
-        given = table.get("tests", {})
+        table = _as_table(name, design, ("tests", "known"), problems)
+        given: Any = table.get("tests")
         tests = dict(given) if isinstance(given, Mapping) else {None: given}
         known = check("known", table.get("known", ()), Names)
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             problems.append(
                 f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
             )
-        for path, keys, valid in (
-            (f"designs: {name}", table, ("tests", "known")),
-            (f"designs: {name}: known", known, names),
-        ):
-            problems += [unknown_name(path, str(k), valid) for k in keys if k not in valid]
+        path = f"designs: {name}: known"
+        problems += [unknown_name(path, key, names) for key in known if key not in names]
         if set(known) >= set(names):
-            problems.append(f"designs: {name}: known: every parameter would be known")
-        plans.append((tests, [i for i, own in enumerate(names) if own not in known]))
+            problems.append(f"{path}: every parameter would be known")
+        free = [place for place, parameter in enumerate(names) if parameter not in known]
+        plans[name] = tests, free
     if problems:
         raise InputError(problems)
     return plans
 
 
-def _expected(
+def _information(
     simulated: Likelihood,
     tests: list[int],
     free: list[int],
@@ -231,7 +264,8 @@ def _expected(
             u[:, free] = v
             return of(u)
 
-        # 3.
+        # 3. Many precise tests leave a posterior that is narrower than a cell, and then no
+        # point of the grid has a likelihood above zero.
         grid = grid_of(given, box, CAMPAIGN_GRID_POINTS)
         while grid is None and np.ptp(box, axis=0).min() > MIN_BOX_WIDTH:
             box = 0.75 * truth[free] + 0.25 * box
@@ -242,3 +276,111 @@ def _expected(
         meter.advance()
     finite = gains[np.isfinite(gains).any(axis=1)]
     return np.stack([finite.mean(axis=0), finite.std(axis=0) / np.sqrt(len(finite))])
+
+
+def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
+    """Return the numbers of further tests and profiles. The first design is the present."""
+    problems: list[str] = []
+    plans = {"now": (0, 0)}
+    for name, design in designs.items():
+        table = _as_table(name, design, ("tests", "profiles"), problems)
+        plans[name] = table.get("tests", 0), table.get("profiles", 0)
+        if not all(is_whole(number, 0) for number in plans[name]) or not any(plans[name]):
+            problems.append(
+                f"designs: {name}: tests and profiles must be whole numbers, at least one of"
+                " them >= 1"
+            )
+    if problems:
+        raise InputError(problems)
+    return plans
+
+
+def _present(
+    problem: Problem, random: Any, simulation: Simulation, unit: str, error: float
+) -> Tables:
+    """Return the present measurements, for the fields with the largest posterior mass."""
+    if isinstance(random, SpecimenPosterior):
+        tables, mass = random.likelihood, random.grid.mass.sum(axis=(1, 2, 3))
+    else:
+        profiles = profiles_of(random, None, None, simulation.seed)
+        if not profiles.levels.size:
+            raise InputError("random: must be a fit or a posterior of `infer` without a prior")
+        no_peaks = Peaks((None,), (np.zeros(0),), si_of(unit))
+        tables = tables_of(problem, profiles, simulation, no_peaks, error)
+        mass = np.ones(len(profiles.fields))  # given the profiles, fields are equally likely
+    order = np.argsort(-mass, kind="stable")[:MAX_FIELDS]
+    profiles = tables.profiles
+    fields = tuple(profiles.fields[place] for place in order)
+    fewer = profiles._replace(fields=fields, within=profiles.within[order])
+    onsets = tuple(kind.of(order) for kind in tables.onsets)
+    return replace(tables, profiles=fewer, onsets=onsets)
+
+
+def _widths(
+    tables: Tables,
+    plans: dict[str, tuple[int, int]],
+    probability: float,
+    repetitions: int,
+    simulation: Simulation,
+) -> xr.Dataset:
+    """Return widths of intervals and design stresses after further measurements."""
+    if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
+        raise InputError(
+            "designs: profiles: need a fit. Further profiles are as long as its profiles"
+        )
+    _, now = grid_of_profiles(tables.profiles, tables)
+    rng = np.random.default_rng([simulation.seed, 8])
+    simulation.meter.stage("simulated campaigns", len(plans) * repetitions)
+    widths = np.empty((len(plans), repetitions, 2))
+    stresses = np.empty((len(plans), repetitions))
+    for row, (tests, levels) in enumerate(plans.values()):
+        for number in range(repetitions):
+            # 5.
+            truth = now.draws(1, rng)
+            # 6. and 7.
+            grid, both = _after(tables, truth, tests, levels, rng) if row else (now, tables)
+            # 8.
+            drawn = grid.described(grid.draws(WIDTH_DRAWS, rng))
+            ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
+            widths[row, number] = np.ptp(ends, axis=1)
+            stresses[row, number] = both.quantile(grid, probability)
+            simulation.meter.advance()
+    area = tables.onsets[0].area
+    low, high = np.quantile(stresses, [0.05, 0.95], axis=1) / area
+    both_dims, about = ("design", "parameter"), {"units": "Pa"}
+    return xr.Dataset(
+        {
+            "width": (both_dims, widths.mean(axis=1)),
+            "standard_error": (both_dims, widths.std(axis=1) / np.sqrt(repetitions)),
+            "design_stress": ("design", stresses.mean(axis=1) / area, about),
+            "design_low": ("design", low, about),
+            "design_high": ("design", high, about),
+        },
+        {"design": list(plans), "parameter": [MEAN_KEY, SCATTER_KEY]},
+        {"probability": probability, "repetitions": repetitions},
+    )
+
+
+def _after(
+    tables: Tables, truth: Array, tests: int, levels: int, rng: np.random.Generator
+) -> tuple[FactorGrid, Tables]:
+    """Return the posterior after further tests and profiles for a true draw (1, 4) (steps 6, 7)."""
+    profiles = tables.profiles
+    peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
+    field, family, cv, log_mean = truth[0]
+    law = factor_of_family(profiles.families[int(family)], float(cv)).distribution
+    # A further profile is as long as the present profiles, so its level scatters within the
+    # field as much as their levels do on average.
+    scanned = max(profiles.within.shape[1], 1)
+    within = profiles.within.sum(axis=1, keepdims=True) / scanned
+    within = within.repeat(levels, axis=1)
+    variance = within[int(field)]
+    errors = np.sqrt(variance) * rng.standard_normal(levels) - 0.5 * variance
+    new = profiles.reference * law.ppf(rng.random(levels)) * np.exp(log_mean + errors)
+    both = profiles._replace(
+        levels=np.concatenate([profiles.levels, new]),
+        within=np.concatenate([profiles.within, within], axis=1),
+    )
+    further = (np.concatenate([tables.peaks[0], np.maximum(peaks, 1e-9)]), *tables.peaks[1:])
+    updated = replace(tables, profiles=both, peaks=further)
+    return grid_of_profiles(both, updated)[1], updated

@@ -39,7 +39,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, collect_warnings, issue
 from stiction.inference.between import as_of_one, levels_of, scatter_between
-from stiction.inference.marginal_fit import Family, distance, mean_log_likelihood
+from stiction.inference.marginal_fit import Family, kolmogorov_distance, mean_log_likelihood
 from stiction.inference.records import Record
 from stiction.inference.whittle import (
     Model,
@@ -47,7 +47,7 @@ from stiction.inference.whittle import (
     SpectrumFamily,
     Whittle,
     hermite_shares,
-    observe,
+    periodograms_of,
 )
 from stiction.inference.window import RecordWindow
 from stiction.random.fields import RandomField
@@ -64,6 +64,8 @@ LEAST_LEFT = 0.2
 """Least share of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
 """Rounds of step 6. The error of the field's share falls to this share of itself in each round."""
+PER_OCTAVE = 3
+"""Bands of wavenumbers in an octave."""
 DRAWN = 5.0
 """Difference of scores above which no field of the lower family is drawn."""
 
@@ -79,12 +81,12 @@ class FitSetting:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class BestFit:
     """The result of one fit."""
 
     setting: FitSetting
     marginal: Any  # of the field
-    own: Any  # of the values, from which mean and trend have taken variance
+    of_values: Any  # marginal of the values, from which mean and trend have taken variance
     model: Model
     distance: float  # Kolmogorov's distance between values and marginal
     roughness: float  # mean square of log(periodogram/expectation), both averaged over bands
@@ -134,6 +136,7 @@ class Estimate:
         if not self.between:
             return rows
         variance = math.log1p(self.between**2)
+        # A log-normal factor with mean 1.
         scatter = math.sqrt(variance) * rng.standard_normal(len(rows)) - 0.5 * variance
         return [row * factor for row, factor in zip(rows, np.exp(scatter), strict=True)]
 
@@ -156,7 +159,7 @@ class Estimate:
         points, alike = 0.0, 0.0
         for window, count in Counter(self.setting.windows).items():
             rho = (1.0 - self.model.noise_share) * self.model.correlation(window)
-            rho.flat[0] = 1.0
+            rho.flat[0] = 1.0  # noise is part of a value
             points += count * float(window.measured.sum())
             alike += count * float(np.sum(window.pairs * rho**3))
         return points**2 / max(alike, points)
@@ -176,39 +179,30 @@ class Estimate:
 
 
 def estimate(
-    rows: Sequence[Array], setting: FitSetting, start: Estimate | None = None
-) -> Estimate:
-    """Fit measured values (points,) without trend for each record, from a start if given.
-
-    Fitted numbers do not cause warnings about units.
-    """
+    rows: Sequence[Array], setting: FitSetting, start: BestFit | None = None
+) -> BestFit:
+    """Fit measured values (points,) without trend for each record, from a start if given."""
     with collect_warnings() as caught:
-        result = _estimate_in_rounds(rows, setting, start)
+        if not setting.between:
+            fitted = _estimate(rows, setting, start)
+        else:
+            # 6. In the first round the scatter of means by the field alone is unknown.
+            fitted = start or _estimate(as_of_one(rows, np.zeros(len(rows))), setting, None)
+            for _ in range(ROUNDS):
+                fitted = _estimate(fitted.as_of_one(rows), setting, fitted)
+            between = scatter_between(np.log(levels_of(rows)), fitted.within)
+            fitted = replace(fitted, between=between)
     for warning in caught:
-        if warning.category is not UnitWarning:
+        if warning.category is not UnitWarning:  # users do not choose the unit of a fit
             issue(warning)
-    return result
+    return fitted
 
 
-def _estimate_in_rounds(
-    rows: Sequence[Array], setting: FitSetting, start: Estimate | None
-) -> Estimate:
-    """Fit records from one or several specimens (step 6)."""
-    if not setting.between:
-        return _estimate(rows, setting, start)
-    equal = as_of_one(rows, np.zeros(len(rows)))
-    fitted = start or _estimate(equal, setting, None)
-    for _ in range(ROUNDS):
-        fitted = _estimate(fitted.as_of_one(rows), setting, fitted)
-    between = scatter_between(np.log(levels_of(rows)), fitted.within)
-    return replace(fitted, between=between)
-
-
-def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None) -> Estimate:
+def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None) -> BestFit:
     """Fit records from one field (steps 1 to 3)."""
     family = setting.spectrum
     values = np.concatenate(rows)
-    observed = observe(rows, setting.windows)
+    observed = periodograms_of(rows, setting.windows)
     vector: Any = None
     marginal, noise = None, family.noise or 0.0
     if start is not None:
@@ -216,8 +210,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         marginal, noise = start.marginal, start.model.noise
     for _ in range(2):
         # 1.
-        marginal = of_values = setting.marginal.fit(values, noise, marginal)
-        # 2.
+        marginal = setting.marginal.fit(values, noise, marginal)
+        # 2. The coarse grid takes most of the time of a fit, and a repetition skips it.
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector, state = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = state[0]
@@ -233,12 +227,12 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: Estimate | None
         for _, measured, predicted in bands(group, model.expectation(group.window))
     ]
     # 3.
-    return Estimate(
+    return BestFit(
         setting=setting,
-        marginal=setting.marginal.widened(of_values, _left(setting.windows, model) ** -0.5),
-        own=of_values,
+        marginal=setting.marginal.widened(marginal, _left(setting.windows, model) ** -0.5),
+        of_values=marginal,
         model=model,
-        distance=distance(of_values, setting.marginal.quiet(values, model.noise)),
+        distance=kolmogorov_distance(marginal, setting.marginal.quiet(values, model.noise)),
         roughness=float(np.mean(np.square(ratios))),
         noise=likelihood.noise_variance(vector, state) if family.noise is None else (0.0, 0.0),
     )
@@ -259,13 +253,14 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     return max(1.0 - (taken + mean / points) / points, LEAST_LEFT)
 
 
-def bands(group: Observed, expected: Array, per_octave: int = 3) -> Array:
+def bands(group: Observed, expected: Array) -> Array:
     """Return band averages (bands, 3) of wavenumber (rad/m), periodogram and expectation."""
     weights = group.window.weights
     k = np.broadcast_to(np.sqrt(sum(v**2 for v in group.window.wave_vectors)), weights.shape)
     kept = weights > 0.0
     k = k[kept]
-    band = np.unique(np.round(per_octave * np.log2(k / k.min())), return_inverse=True)[1]
+    # Single ordinates scatter by their own size. Averages of a band hide this scatter.
+    band = np.unique(np.round(PER_OCTAVE * np.log2(k / k.min())), return_inverse=True)[1]
     sums = [np.bincount(band, weights=w) for w in (k, group.average[kept], expected[kept])]
     return np.transpose(sums) / np.bincount(band)[:, None]
 
@@ -303,15 +298,15 @@ def windowed(
     return tuple(windows), rows
 
 
-def compare(
+def ranking(
     settings: Sequence[FitSetting], rows: Sequence[Array]
-) -> tuple[list[Estimate], dict[str, Goodness], float]:
+) -> tuple[list[BestFit], dict[str, Goodness], float]:
     """Return estimates (best family first), their qualities, and the number of values (step 5).
 
     Families that cannot be fitted are left out. If all families fail, an `InputError`
     is raised.
     """
-    fitted: list[tuple[float, Estimate]] = []
+    fitted: list[tuple[float, BestFit]] = []
     problems: list[str] = []
     for setting in settings:
         try:
@@ -323,14 +318,16 @@ def compare(
             continue
         values = np.concatenate(estimated.as_of_one(rows))
         fitted.append(
-            (mean_log_likelihood(estimated.own, values, estimated.model.noise), estimated)
+            (mean_log_likelihood(estimated.of_values, values, estimated.model.noise), estimated)
         )
     if not fitted:
         raise InputError(problems)
+    # 4. and 5. All families share the number of independent values of the likeliest family.
     independent = max(fitted, key=lambda one: one[0])[1].independent
-    costs = np.array([len(one.setting.marginal.parameters(one.own)) for _, one in fitted])
+    costs = np.array([len(one.setting.marginal.parameters(one.of_values)) for _, one in fitted])
     scores = independent * np.array([mean for mean, _ in fitted]) - costs
     scores -= scores.max()
+    # Without the penalty of Akaike's criterion, and half a unit less for each parameter.
     weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
     weights /= weights.sum()
     best_first = np.argsort(-scores, kind="stable").tolist()

@@ -30,7 +30,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import cycle
+from itertools import chain, cycle
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -46,25 +46,25 @@ from stiction.inference.between import chance_of_scatter
 from stiction.inference.bootstrap import (
     MIN_REPETITIONS,
     NotRepeated,
-    Repetitions,
+    Refits,
     bootstrapped,
     intervals,
     likely,
 )
-from stiction.inference.estimate import Estimate, FitSetting, Goodness, compare, windowed
+from stiction.inference.estimate import BestFit, FitSetting, Goodness, ranking, windowed
 from stiction.inference.marginal_fit import Family, family_of
 from stiction.inference.records import records_of, refuse_uncorrelated
 from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
+    FactorGrid,
     FactorPrior,
-    Grid,
     Profiles,
     families_of,
     grid_of_profiles,
     of_mean,
 )
-from stiction.inference.whittle import SpectrumFamily, spectrum_of
+from stiction.inference.whittle import SpectrumFamily, spectrum_family
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.load import NotNegative
@@ -72,7 +72,7 @@ from stiction.random.equally_likely import UncertainSource, uncertain
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 
-MARGINALS = ("lognormal", "weibull", "gamma", "beta")
+USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths that a record must hold to constrain parameters well."""
 FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
@@ -98,7 +98,7 @@ def _families(given: Any) -> list[Family]:
     several = given if isinstance(given, list | tuple) else [given]
     if not several:
         raise InputError("must name a family")
-    return [family_of(one) for one in several]
+    return list(map(family_of, several))
 
 
 def _factors(given: Any) -> tuple[str, ...]:
@@ -107,7 +107,7 @@ def _factors(given: Any) -> tuple[str, ...]:
 
 DEFAULT_TOO = Field(validate_default=True)
 Marginals = Annotated[Any, BeforeValidator(_families), DEFAULT_TOO, "str | list"]
-Spectrum = Annotated[Any, BeforeValidator(spectrum_of), DEFAULT_TOO, "str | Spectrum"]
+Spectrum = Annotated[Any, BeforeValidator(spectrum_family), DEFAULT_TOO, "str | Spectrum"]
 Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO, "str | list"]
 
 
@@ -165,7 +165,7 @@ class FieldFit(Result):
     missing: tuple[int, int]
     quantity: str
     doubts: tuple[str, ...]
-    _repeated: Sequence[Repetitions]  # of the field, and of other families that may be drawn
+    _repeated: Sequence[Refits]  # of the field, and of other families that may be drawn
     _rows: Sequence[Array]
     _levels: Array
     _families: tuple[str, ...]  # of the factor between specimens; empty without a factor
@@ -177,7 +177,7 @@ class FieldFit(Result):
         return self._levels.size if self._families else 0
 
     @property
-    def _estimate(self) -> Estimate:
+    def _estimate(self) -> BestFit:
         return self._repeated[0].truth
 
     @property
@@ -193,7 +193,7 @@ class FieldFit(Result):
     @cached_property
     def _likely(self) -> list[list[RandomField]]:
         values = np.concatenate(self._rows)
-        return [likely(own, values, self.quantity) for own in self._repeated]
+        return [likely(repeated, values, self.quantity) for repeated in self._repeated]
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
@@ -233,10 +233,11 @@ class FieldFit(Result):
         chosen = self._chosen(count, seed)
         if not self._families:
             return [RandomInterface(strength=field) for field in chosen]
-        place = {own: number for number, own in enumerate(self._every)}
-        rng, numbers = np.random.default_rng([seed, 6]), [place[field] for field in chosen]
-        drawn = self._posterior.draws(count, rng, numbers)
-        return [self._posterior.interface(row) for row in drawn]
+        # The mean and the factor follow from the posterior given the chosen field.
+        numbers = {field: number for number, field in enumerate(self._every)}
+        rng = np.random.default_rng([seed, 6])
+        drawn = self._posterior.draws(count, rng, [numbers[field] for field in chosen])
+        return list(map(self._posterior.interface, drawn))
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields from all families in proportion to their weights (step 6)."""
@@ -246,19 +247,21 @@ class FieldFit(Result):
                 f" of `fit.repetitions` to st.RandomInterface(strength=..., {self.quantity}=...)"
             )
         rng = np.random.default_rng([seed, 5])
+        # Evenly spread places divide the draws between families more exactly than random places.
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
         places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
         family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
-        orders = [cycle(rng.permutation(len(own))) for own in self._likely]
+        # Each family runs through its fields in a random order, and repeats it if necessary.
+        orders = [cycle(rng.permutation(len(fields))) for fields in self._likely]
         return [self._likely[number][next(orders[number])] for number in family.tolist()]
 
     @cached_property
     def _every(self) -> list[RandomField]:
         """All likely fields, in the order in which the posterior numbers the fields."""
-        return list(dict.fromkeys(field for own in self._likely for field in own))
+        return list(dict.fromkeys(chain.from_iterable(self._likely)))
 
     @cached_property
-    def _posterior(self) -> Grid:
+    def _posterior(self) -> FactorGrid:
         """Posterior of mean and scatter between specimens, given the levels of the profiles."""
         return grid_of_profiles(self._with_levels(self._every))[0]
 
@@ -277,7 +280,9 @@ class FieldFit(Result):
         # correlation length.
         share = np.minimum(cvs**2 * lengths / ((deviation / mean) ** 2 * length), 1e3)
         within = np.minimum(np.outer(share, truth.within), np.log1p(cvs**2)[:, None])
-        if not self._families:  # all records are of one specimen
+        if not self._families:
+            # All records are of one specimen. Their weighted mean is a single level, whose
+            # variance is the variance of a weighted mean.
             weight = 1.0 / np.maximum(truth.within, 1e-300)
             levels = np.atleast_1d(weight @ levels / weight.sum())
             within = 1.0 / np.sum(1.0 / np.maximum(within, 1e-300), axis=1, keepdims=True)
@@ -319,7 +324,7 @@ def fit_field(
     profiles: Any,
     interface: Interface | None = None,
     *,
-    marginal: Marginals = MARGINALS,
+    marginal: Marginals = USUAL_FAMILIES,
     spectrum: Spectrum = "power_law",
     detrend: Literal[0, 1, 2, 3] = 0,
     noise: Flag | NotNegative = True,
@@ -448,6 +453,7 @@ def fit_field(
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
     # 1.
     records = records_of(profiles, interface, quantity)
+    points = sum(record.values.size for record in records)
     ratio = None if anisotropy is True else float(anisotropy or 1.0)
     if ratio != 1.0 and records[0].values.ndim == 1:
         raise InputError(
@@ -455,16 +461,19 @@ def fit_field(
         )
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
+    # A correlation length outside this range leaves no trace in a record.
     (name, fixed), deviation = spectrum, None if noise is True else float(noise)
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = windowed(records, detrend)
+    levels = np.array([row.mean() for row in rows])
     with prefixed("fit_field"):
         factor_prior = FactorPrior.of(prior)
     refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:
         # 2.
-        estimates, families, independent = compare(settings, rows)
+        estimates, families, independent = ranking(settings, rows)
+        # A family that is rarely drawn needs few repetitions.
         weights = [one.weight for one in families.values() if one.weight > 0.0]
         counts = [
             max(MIN_REPETITIONS, round(bootstrap * w / max(weights))) for w in weights[1:]
@@ -484,9 +493,8 @@ def fit_field(
                 f"{error}: the family is left out, because such records are far from it"
             )
     # 4. and 5.
-    points = sum(record.values.size for record in records)
     fit = FieldFit(
-        **_judged(repeated, rows, confidence, bootstrap, between, factor_prior),
+        **_judged(repeated, rows, levels, confidence, bootstrap, between, factor_prior),
         field=estimates[0].field(quantity),
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
@@ -496,7 +504,7 @@ def fit_field(
         quantity=quantity,
         _repeated=[repeated[0], *further],
         _rows=estimates[0].as_of_one(rows),
-        _levels=np.array([row.mean() for row in rows]),
+        _levels=levels,
         _families=between,
         _prior=factor_prior,
     )
@@ -509,8 +517,9 @@ def fit_field(
 
 
 def _judged(
-    repeated: Sequence[Repetitions],
+    repeated: Sequence[Refits],
     rows: Sequence[Array],
+    levels: Array,
     confidence: float,
     count: int,
     families: tuple[str, ...],
@@ -522,17 +531,17 @@ def _judged(
     ends = intervals(repeated, confidence, np.concatenate(fitted.as_of_one(rows)))
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, fitted, fits) for name, of in tests.items()}
-    levels = np.array([row.mean() for row in rows])
     if levels.size > 1 and not fitted.setting.between:
         p_values["level"] = chance_of_scatter(levels, fitted.of_means)
     doubts = _doubts(fitted, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     if fitted.setting.between:
-        field, mean = fitted.field("strength"), parameters["mean"]
-        interfaces = (RandomInterface(strength=field),)
-        profiles = Profiles(interfaces, mean, levels, fitted.within[None], families, prior)
-        grid, _ = grid_of_profiles(profiles)
+        # The bootstrap scales records as if all came from one specimen, so its means and
+        # scatter lack the scatter between specimens. The levels hold it.
+        interfaces = (RandomInterface(strength=fitted.field("strength")),)
+        mean, within = parameters["mean"], fitted.within[None]
+        grid, _ = grid_of_profiles(Profiles(interfaces, mean, levels, within, families, prior))
         draws = grid.described(grid.draws(INTERVAL_DRAWS, np.random.default_rng(0)))
         tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
         for name in {"mean", "marginal.mean"} & parameters.keys():
@@ -541,9 +550,8 @@ def _judged(
         low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], tails).tolist())
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
-                f"{len(rows)} specimen(s) leave the coefficient of variation between specimens at"
-                f" {low:.2g} to {high:.2g}, mostly by its prior, and it decides small"
-                f" probabilities. Measure at least {FEW_SPECIMENS}, or state it, as in"
+                f"{len(rows)} specimen(s) leave the scatter between specimens at {low:.2g} to"
+                f" {high:.2g}, mostly by its prior. Measure at least {FEW_SPECIMENS}, or state it:"
                 " RandomInterface(fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
             )
     return {
@@ -551,15 +559,16 @@ def _judged(
     }  # fmt: skip
 
 
-def _p_value(name: str, truth: Estimate, fits: Sequence[Estimate]) -> float:
+def _p_value(name: str, truth: BestFit, fits: Sequence[BestFit]) -> float:
     """Return the p-value of a distance of the data, given the distances of repetitions (step 5)."""
     repeats = np.log([getattr(fit, name) for fit in fits])
+    # The data and the mean of the repetitions both scatter.
     error = repeats.std(ddof=1) * math.sqrt(1.0 + 1.0 / repeats.size)
     away = (math.log(getattr(truth, name)) - repeats.mean()) / error
     return float(student.sf(away, repeats.size - 1))
 
 
-def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
+def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     """Return the reasons not to trust a fit."""
     doubts = []
     held, noise = fitted.lengths_held, fitted.model.noise
@@ -587,11 +596,12 @@ def _doubts(fitted: Estimate, p_values: Mapping[str, float]) -> list[str]:
     return doubts
 
 
-def _power_at_cutoff(fitted: Estimate, window: RecordWindow) -> float:
+def _power_at_cutoff(fitted: BestFit, window: RecordWindow) -> float:
     """Return the power of the field, relative to white noise, where it has fallen to a quarter."""
     model = fitted.model
     if model.noise_share <= 0.0:
         return math.inf
     power = model.variance * (1.0 - model.noise_share) * model.signal(window)
     power = power[window.weights > 0.0]
+    # The correlation length follows from the wavenumbers at which the power falls.
     return float(power[power >= 0.25 * power.max()].min())

@@ -8,8 +8,9 @@ Data Analysis (2013), section 10.1. The choice of the box is our own.
 
 Steps:
 
-1. If only the mean and the scatter between specimens are unknown, use
-   `stiction.inference.joined`.
+1. If only the mean and the scatter between specimens are unknown, use the grid of
+   `stiction.inference.specimens`. Compare the peaks with the prediction from the
+   profiles alone. The other steps are for parameters with a prior.
 2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
 3. If the method is expensive and the local criterion applies, first find the
    posterior by the local criterion. The box of this posterior, slightly widened, is
@@ -21,41 +22,56 @@ Steps:
 
 import itertools
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
+from scipy.stats import entropy
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, Progress, checked
-from stiction.base.progress import Meter, Show
+from stiction.base.progress import Meter
 from stiction.ensemble.pilot import compare, pilot_doubt
-from stiction.inference.curves import Curves
+from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
+from stiction.inference.fit import FieldFit
 from stiction.inference.grid import grid_of
-from stiction.inference.joined import join
 from stiction.inference.likelihood import (
     Likelihood,
     Simulation,
     bounds_of,
     experiments_at,
+    is_guided,
     make_likelihood,
     out_of_reach,
     variable_of,
 )
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
-from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior
-from stiction.inference.prior import Prior, make_prior
-from stiction.inference.specimens import MEAN_KEY, SCATTER_KEY
+from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, SpecimenPosterior
+from stiction.inference.prior import Prior, make_prior, refuse_conditioned
+from stiction.inference.specimens import (
+    MEAN_KEY,
+    SCATTER_KEY,
+    FactorGrid,
+    FactorPrior,
+    Profiles,
+    families_of,
+    grid_of_profiles,
+    tables_of,
+)
 from stiction.methods.criterion.local import LocalCriterion
-from stiction.methods.protocol import MethodObject, optional_member
+from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
-from stiction.random.equally_likely import AnyRandom
+from stiction.random.equally_likely import AnyRandom, Source, as_random
 from stiction.random.stresses import mean_in_stress
 
+LIKELY_FIELDS = 60
+"""Fields within a specimen that represent all likely fields."""
+LITTLE_INFORMATION = math.log(4.0 / 3.0)
+"""Information on the scatter, nats, below which its prior decides: a uniform range would shrink
+by less than a quarter."""
 TOLERABLE = 0.25
 """Monte Carlo error over the standard deviation of the posterior above which a note reports it."""
 NEVER = 1e-9
@@ -66,23 +82,8 @@ BOX_END_SHARE, HELD = 0.05, 1e-3
 """Share of the box at either end, and posterior mass there above which the box grows."""
 PRIOR_END, PILED = 0.02, 4.0
 """Share of a prior at either end, and multiple of this share above which the posterior piles up."""
-
-UNFINISHED: dict[Any, Array] = {}
-"""Onsets of an interrupted call. The next equal call takes them."""
-
-
-@contextmanager
-def _simulating(
-    method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
-) -> Iterator[Simulation]:
-    """Provide a simulation. It keeps its onsets after Ctrl-C, and discards them otherwise."""
-    with Meter("infer", show=progress) as meter:
-        try:
-            yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
-        except Exception:
-            UNFINISHED.clear()
-            raise
-        UNFINISHED.clear()
+OUTWARDS = np.array([[-1.0], [1.0]])
+"""Directions in which the lower and the upper corner of a box move when it grows."""
 
 
 @checked
@@ -185,9 +186,7 @@ def infer(
     the strength need no simulation (`stiction.inference.scaling`). At most four other
     parameters are simulated on a grid, with the same draws at all points, and
     interpolated. The posterior is summed on a grid. For more parameters, give
-    `log_likelihood` and `prior_transform` of the result to emcee or dynesty. After an
-    interruption with Ctrl-C, an identical call in the same session continues with the
-    finished onsets.
+    `log_likelihood` and `prior_transform` of the result to emcee or dynesty.
 
     Mean and scatter between specimens are integrated on a grid, with sixty fields
     within a specimen from the repetitions of the fit
@@ -221,7 +220,7 @@ def infer(
     True
     """
     measured = make_peaks(peaks, unit)
-    error = load_cell_error * (1.0 if isinstance(peaks, Peaks | Curves) else factor_of(unit))
+    error = load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
@@ -234,43 +233,53 @@ def infer(
             f"peaks: are of specimens of {length:g} m, but the problem is of {size:g} m. Pass the"
             " problem of the tests. The posterior serves other problems, too"
         )
-    # 1.
-    if not (prior and {*prior} - {MEAN_KEY, SCATTER_KEY}):
-        with _simulating(method, samples, seed, workers, progress) as simulation:
-            return join(
-                problem, random, measured, simulation, prior=prior, between=between, error=error
-            )
-    parameters = make_prior(problem, random, prior)
-    variable = variable_of(*parameters.at(parameters.middle), measured.unit)
-    (experiment,) = experiments_at(parameters, parameters.middle, method)
+    with Meter("infer", show=progress) as meter:
+        simulation = Simulation(method, samples, seed, workers, meter)
+        if prior and {*prior} - {MEAN_KEY, SCATTER_KEY}:
+            unknown = make_prior(problem, random, prior)
+            posterior = _of_parameters(unknown, simulation, measured, error)
+        else:
+            # 1.
+            profiles = profiles_of(random, prior, between, seed)
+            posterior = _of_specimens(problem, profiles, simulation, measured, error)
+    for text in posterior.notes:
+        warn_accuracy(text)
+    return posterior
+
+
+def _of_parameters(
+    prior: Prior, simulation: Simulation, measured: Peaks, error: float
+) -> Posterior:
+    """Return the posterior of the parameters in a prior (steps 2 to 5)."""
+    variable = variable_of(*prior.at(prior.middle), measured.unit)
+    (experiment,) = experiments_at(prior, prior.middle, simulation.method)
     experiment.problem.warn_of_units(
         mean_in_stress(experiment.problem, experiment.random, "strength")
     )
     # 2.
-    _check_reach(parameters, method, measured, error)
-    with _simulating(method, samples, seed, workers, progress) as simulation:
+    _check_reach(prior, simulation.method, measured, error)
 
-        def likelihood_of(simulation: Simulation, box: Array) -> Likelihood:
-            given: Any = {"lengths": measured.lengths, "error": error, "variable": variable}
-            return make_likelihood(parameters, simulation, box, **given).of(measured.values)
+    def likelihood_of(simulation: Simulation, box: Array) -> Likelihood:
+        given: Any = {"lengths": measured.lengths, "error": error, "variable": variable}
+        return make_likelihood(prior, simulation, box, **given).of(measured.values)
 
-        # 3.
-        whole = box = parameters.whole
-        approximate = optional_member(method, "exact_method") is not None
-        guide, varying = LocalCriterion(), experiment.random.varying
-        if not approximate and not guide.unfit_as_guide(experiment.problem, varying):
-            local = simulation._replace(method=guide, samples=None)
-            box = _first_box(likelihood_of(local, whole))
-        while True:
-            # 4. and 5.
-            likelihood = likelihood_of(simulation, box)
-            grid = grid_of(likelihood, box)
-            u = None if grid is None else grid.draws(POSTERIOR_DRAWS, seed)
-            wider = _grown(box, u)
-            if np.array_equal(wider, box):
-                break
-            box = wider
-    if np.all(likelihood.box == whole) and (refused := likelihood.refusals()):
+    # 3.
+    box = prior.whole
+    if is_guided(prior, simulation.method):
+        local = simulation._replace(method=LocalCriterion(), samples=None)
+        box = _first_box(likelihood_of(local, box))
+    while True:
+        # 4.
+        likelihood = likelihood_of(simulation, box)
+        grid = grid_of(likelihood, box)
+        u = None if grid is None else grid.draws(POSTERIOR_DRAWS, simulation.seed)
+        # 5.
+        wider = _grown(box, u)
+        if np.array_equal(wider, box):
+            break
+        box = wider
+    # In the whole prior, no further box can contain peaks that are out of reach.
+    if np.all(box == prior.whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
     if grid is None or u is None:
         raise InputError(
@@ -280,14 +289,14 @@ def infer(
     error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
         peaks=measured,
-        draws=dict(zip(parameters.names, parameters.theta(u).T, strict=True)),
-        information={name: grid.information(i) for i, name in enumerate(parameters.names)},
+        draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),
+        information={name: grid.information(i) for i, name in enumerate(prior.names)},
         log_evidence=grid.log_evidence,
         monte_carlo_error=error,
         notes=tuple(_notes(likelihood, error, u)),
         likelihood=likelihood,
         u=u,
-        seed=seed,
+        seed=simulation.seed,
     )
 
 
@@ -314,7 +323,7 @@ def _first_box(likelihood: Likelihood) -> Array:
     if grid is None:
         return likelihood.box
     room = np.maximum(WIDEN * np.diff(grid.box, axis=0), 1e-3)
-    return np.clip(grid.box + room * np.array([[-1.0], [1.0]]), 0.0, 1.0)
+    return np.clip(grid.box + room * OUTWARDS, 0.0, 1.0)
 
 
 def _grown(box: Array, u: Array | None) -> Array:
@@ -323,11 +332,11 @@ def _grown(box: Array, u: Array | None) -> Array:
     if u is not None:
         low, high = box[0] + BOX_END_SHARE * width, box[1] - BOX_END_SHARE * width
         touched = np.stack([np.mean(u < low, axis=0), np.mean(u > high, axis=0)]) > HELD
-    return np.clip(box + width * touched * np.array([[-1.0], [1.0]]), 0.0, 1.0)
+    return np.clip(box + width * touched * OUTWARDS, 0.0, 1.0)
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
-    """Return the limitations of the posterior, and issue them as warnings."""
+    """Return the limitations of the posterior."""
     prior = likelihood.prior
     notes = _piled_up(prior, u)
     middle = prior.theta(u.mean(axis=0, keepdims=True))
@@ -339,8 +348,6 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
             f"the means are uncertain by about {error:.0%} of their standard deviations because"
             " few samples were simulated at each point. Give more samples"
         )
-    for text in notes:
-        warn_accuracy(text)
     return notes
 
 
@@ -361,3 +368,93 @@ def _piled_up(prior: Prior, u: Array) -> list[str]:
         f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
         f" {PRIOR_END:.0%} of it. Check the unit of the peaks, and widen the prior if it is a guess"
     ]
+
+
+def _of_specimens(
+    problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
+) -> SpecimenPosterior:
+    """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
+    tables = tables_of(problem, profiles, simulation, measured, error)
+    known = profiles.levels.size > 0
+    if known:
+        mean = float(profiles.levels.mean() / profiles.reference)
+        measured.refuse_far([k.area * mean * k.ratios[:, 0].ravel() for k in tables.onsets])
+    by_profiles, grid = grid_of_profiles(profiles, tables)
+    tests, onsets = sum(map(np.size, measured.values)), tables.onsets[0].ratios[:, 0].size
+    common: dict[str, Any] = {
+        "problem": problem, "likelihood": tables, "seed": simulation.seed,
+        "by_profiles": by_profiles, "monte_carlo_error": math.sqrt(tests / onsets),
+    }  # fmt: skip
+    comparison = None
+    if known:
+        nothing = replace(measured, values=tuple(np.empty(0) for _ in measured.values))
+        alone = _result(by_profiles, nothing, **common)
+        comparison = agreement(alone, measured, seed=simulation.seed)
+    # Without profiles and with a prior of the mean that is flat in its logarithm, the prior
+    # has no density, and neither the evidence nor the information on the mean is defined.
+    proper = known or profiles.prior.mean is not None
+    return _result(
+        grid, measured, notes=tuple(_specimen_notes(grid, comparison)), agreement=comparison,
+        log_evidence=grid.log_evidence if proper else math.nan,
+        information=_information(grid, by_profiles, proper), **common,
+    )  # fmt: skip
+
+
+def _result(grid: FactorGrid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
+    u = grid.draws(POSTERIOR_DRAWS, np.random.default_rng(more["seed"]))
+    options: dict[str, Any] = {"information": {}, "log_evidence": math.nan, "notes": ()} | more
+    return SpecimenPosterior(peaks=peaks, draws=grid.described(u), u=u, grid=grid, **options)
+
+
+def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
+    """Return the profiles of a fit, or the fields of any other source, which has no levels."""
+    more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
+    more |= {} if families is None else {"families": families_of(families)}
+    if isinstance(random, FieldFit):
+        return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
+    if isinstance(random, Posterior):
+        raise InputError(
+            "random: is a posterior. Give its fit or interfaces, and all peaks together"
+        )
+    given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
+    likely = as_random(given)
+    if len(likely.factor_laws[0]) > 1:
+        raise InputError(
+            "random: holds draws of mean and scatter between specimens, as a stored fit does. Pass"
+            " the fit itself, or, for the fields within alone, [one.strength for one in random]"
+        )
+    members = likely.members
+    refuse_conditioned(members)
+    return Profiles.of_interfaces(members, **more)
+
+
+def _information(grid: FactorGrid, before: FactorGrid, proper: bool) -> dict[str, float]:
+    """Return the divergence, nats, of mean and scatter from their distribution without peaks."""
+    axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
+    return {
+        name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))
+        for name, of in axes.items()
+    }
+
+
+def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]:
+    """Return the reasons to doubt the posterior."""
+    notes, profiles = [], grid.profiles
+    if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
+        notes.append(
+            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Check units,"
+            " method and surfaces. Until then use the lower force, from peaks or profiles alone"
+        )
+    shares = grid.mass.sum(axis=(0, 1, 3))  # equal by the prior
+    usual = profiles.prior.scatter is FactorPrior().scatter
+    if usual and math.log(shares.size) - float(entropy(shares)) < LITTLE_INFORMATION:
+        notes.append(
+            "the measurements say little about the scatter between specimens, so its prior decides"
+            f" rare failures. Measure further specimens, or give prior={{'{SCATTER_KEY}': ...}}"
+        )
+    if profiles.levels.size == 1:
+        notes.append(
+            "the profiles come from one specimen, whose field within stands for all. Scan further"
+            " specimens. If the records are of different specimens, fit them with between=True"
+        )
+    return notes

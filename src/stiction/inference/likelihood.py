@@ -41,14 +41,13 @@ from stiction.base.progress import SILENT, Meter, duration
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
-from stiction.inference.density import ERRORS, Densities, log_likelihoods, tabulate
+from stiction.inference.density import ERRORS, Densities, densities_of, log_likelihoods
 from stiction.inference.peaks import VARIABLES, si_of
 from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import optional_member
 from stiction.problem.problem import Problem
-from stiction.random.dotted_keys import full_key
 from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
@@ -90,6 +89,7 @@ def make_axes(
         )
     axes = []
     for i, (first, last) in enumerate(prior.theta(box).T):
+        # A range over several factors needs nodes at equal ratios.
         log = last >= LOG * first > 0.0
         space: Any = np.geomspace if log else np.linspace
         nodes = space(first, last, along[len(simulated)])
@@ -111,9 +111,12 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
     index, weight = np.zeros((count, 1), dtype=np.int64), np.ones((count, 1))
     for i, values, scale in axes:
         at = np.interp(scale(theta[:, i]), scale(values), np.arange(values.size))
-        cell = np.minimum(at.astype(np.int64), values.size - 2)[:, None]
+        # Each axis doubles the number of corners.
+        last = values.size - 1
+        cell = np.minimum(at.astype(np.int64), max(last - 1, 0))[:, None]
         share = at[:, None] - cell
-        index = np.concatenate([index * values.size + cell + k for k in (0, 1)], axis=1)
+        ends = cell, np.minimum(cell + 1, last)
+        index = np.concatenate([index * values.size + end for end in ends], axis=1)
         weight = np.concatenate([weight * (1.0 - share), weight * share], axis=1)
     return index, weight
 
@@ -121,51 +124,51 @@ def corners(axes: Sequence[Axis], theta: Array) -> tuple[NDArray[np.int64], Arra
 def experiments_at(
     prior: Prior, thetas: Array, method: Any, length: float | None = None
 ) -> list[Experiment]:
-    """Return the experiments at points (points, parameters), for specimens with a given length, m.
-
-    The node spacing is the spacing of the problem.
-    """
+    """Return the experiments at points (points, parameters), for specimens with a given length."""
     experiments = []
     for theta in np.atleast_2d(thetas):
         problem, random = prior.at(theta)
         with prior.named(theta):
-            experiments.append(experiment_on(problem, random, method, length))
+            experiments.append(Experiment(of_length(problem, length), random, method))
     return experiments
 
 
-def experiment_on(
-    problem: Problem, random: Any, method: Any, length: float | None
-) -> Experiment:
-    """Return an experiment for specimens with a given length, m, or as in the problem if None."""
+def of_length(problem: Problem, length: float | None) -> Problem:
+    """Return the problem for specimens with a given length, m. None means its own length.
+
+    The node spacing is the spacing of the problem.
+    """
     interface = problem.interface
     if length is not None and interface.is_plane:
         raise InputError(
             "peaks: specimen lengths apply to lines only, but the interface is a plane"
         )
-    if length is not None and not np.isclose(length, interface.measure, rtol=1e-9):
-        if problem.load.pressing_force is not None:
-            raise InputError(
-                "peaks: on specimens of another length the same pressing force is another"
-                " pressure. Give Load(normal_pressure=...) in Pa"
-            )
-        nodes = 2 * max(4, round(0.5 * length / interface.spacing))
-        problem = replace(problem, interface=replace(interface, length=length, nodes=nodes))
-    return Experiment(problem, random, method)
+    if length is None or np.isclose(length, interface.measure, rtol=1e-9):
+        return problem
+    if problem.load.pressing_force is not None:
+        raise InputError(
+            "peaks: on specimens of another length the same pressing force is another pressure."
+            " Give Load(normal_pressure=...) in Pa"
+        )
+    nodes = 2 * max(4, round(0.5 * length / interface.spacing))
+    return replace(problem, interface=replace(interface, length=length, nodes=nodes))
 
 
 class Simulation(NamedTuple):
-    """Settings for the simulation of onsets.
-
-    `done` holds onsets from an interrupted call, by experiment and samples. New
-    onsets are added.
-    """
+    """Settings for the simulation of onsets."""
 
     method: Any
     samples: int | None  # at each node; by default as many as the method needs
     seed: int
     workers: int | None = None  # threads; all cores by default
     meter: Meter = SILENT
-    done: dict[Any, Array] | None = None
+
+
+def is_guided(prior: Prior, method: Any) -> bool:
+    """Return whether the method is expensive, and the local criterion can guide it."""
+    problem, random = prior.at(prior.middle)
+    is_local = optional_member(method, "exact_method") is not None
+    return not is_local and not LocalCriterion().unfit_as_guide(problem, random.varying)
 
 
 def simulate(
@@ -175,24 +178,20 @@ def simulate(
 
     Sample i has the same draws in each experiment (step 3).
     """
-    done = {} if simulation.done is None else simulation.done
     samples: Any = simulation.samples
     peaks = np.empty((len(experiments), samples))
+    seeded = [experiment.with_seed(simulation.seed) for experiment in experiments]
+    # Batches begin at blocks of draws, because a part of a block costs as much as the block.
     jobs = [
-        (number, start, count)
-        for number, experiment in enumerate(experiments)
-        for start, count in experiment.batches(
-            first, samples, max(SAMPLES_PER_BLOCK, experiment.batch)
-        )
+        (row, experiment, *span)
+        for row, experiment in zip(peaks, seeded, strict=True)
+        for span in experiment.batches(first, samples, max(SAMPLES_PER_BLOCK, experiment.batch))
     ]
 
-    def work(job: tuple[int, int, int]) -> None:
-        number, start, count = job
-        experiment = experiments[number].with_seed(simulation.seed)
-        key = experiment, start, count, variable
-        if key not in done:
-            done[key] = experiment.results(start, count)[variable]
-        peaks[number, start - first : start - first + count] = done[key]
+    def work(job: tuple[Array, Experiment, int, int]) -> None:
+        row, experiment, start, count = job
+        values = experiment.results(start, count)[variable]
+        row[start - first : start - first + count] = values
         simulation.meter.advance(count)
 
     in_threads(work, jobs, simulation.workers or usable_cores())
@@ -212,18 +211,13 @@ class Area(NamedTuple):
 
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
     """Return the area of specimens with a given length, m, or as in the problem if None."""
-
-    def areas(points: Array) -> list[Any]:
-        return [own.problem.area for own in experiments_at(prior, points, method, length)]
-
-    middle, sides = prior.middle, []
-    (area,) = areas(middle)
-    for i, name in enumerate(prior.names):
-        if full_key(name).startswith(("problem.interface.", "problem.specimen.")):
-            moved = np.where(np.arange(middle.size) == i, prior.ends[0], middle)
-            if areas(moved) != [area]:
-                sides.append(i)
-    return Area(float(area / np.prod(middle[sides])), sides)
+    middle = prior.middle
+    # One parameter after the other moves to its lower end, to see whether the area follows.
+    moved = np.where(np.eye(middle.size, dtype=np.bool_), prior.ends[0], middle)
+    experiments = experiments_at(prior, np.vstack([middle, moved]), method, length)
+    areas: list[Any] = [experiment.problem.area for experiment in experiments]
+    sides = [i for i, area in enumerate(areas[1:]) if area != areas[0]]
+    return Area(float(areas[0] / np.prod(middle[sides])), sides)
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
@@ -270,11 +264,11 @@ class Likelihood:
     def parts(self, u: Array) -> Array:
         """Return the log likelihood (points, tests) of each test at points u."""
         theta, parts = self.prior.theta(u), []
-        index, weight = corners(self.axes, theta)
+        near = corners(self.axes, theta)
         for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
-            of_v, scales = known.between(index, weight), self.scales(kind, theta)
+            of_v, scales = known.between(*near), self.scales(kind, theta)
             out = np.empty((u.shape[0], peaks.size))
-            log_likelihoods(known.table, index, weight, of_v, scales, self.error, peaks, out)
+            log_likelihoods(known.table, *near, of_v, scales, self.error, peaks, out)
             parts.append(out)
         return np.concatenate(parts, axis=1)
 
@@ -296,6 +290,8 @@ class Likelihood:
         shift, stretch = self.scales(kind, theta)
         known = self.densities[kind]
         index, weight = corners(self.axes, theta)
+        # A node in proportion to its weight, and one of its onsets. Bound, mean and spread are
+        # interpolated, as in the likelihood.
         corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
         node = index[np.arange(u.shape[0]), np.minimum(corner, index.shape[1] - 1)]
         sample = rng.integers(known.onsets.shape[1], size=u.shape[0])
@@ -311,6 +307,7 @@ class Likelihood:
         texts = []
         for kind, (known, peaks) in enumerate(zip(self.densities, self.peaks, strict=True)):
             shift, stretch = self.scales(kind, points)
+            # Further samples may lie a little beyond the simulated onsets.
             room = REACH_SPREADS * known.onsets.std(axis=1)
             lowest = np.maximum(known.onsets.min(axis=1) - room, known.bound)
             reach = np.stack([lowest, known.onsets.max(axis=1) + room])
@@ -333,9 +330,8 @@ def out_of_reach(
         for point in points[[reach[0].argmin(), reach[1].argmax()]]
     )
     return [
-        f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}. The prior can"
-        f" produce peaks from {low:g} ({lowest}) to {high:g} ({highest}). Widen the prior, state"
-        " the unit of the peaks (unit='kPa'), or leave out tests of another kind of specimen"
+        f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}. The prior can reach"
+        f" {low:g} ({lowest}) to {high:g} ({highest}). Widen it, or state the unit of the peaks"
     ]
 
 
@@ -365,25 +361,23 @@ def make_likelihood(
     thetas = nodes_of(axes, scaling.reference)
     count = simulation.samples or optional_member(method, "samples_at_point")
     simulation = simulation._replace(samples=count)
-    local = optional_member(method, "exact_method") is not None
-    problem, random = prior.at(prior.middle)
-    guided = not local and not LocalCriterion().unfit_as_guide(problem, random.varying)
+    guided = is_guided(prior, method)
     few = make_axes(prior, scaling, box, COARSE) if guided else axes
     coarse, weights = nodes_of(few, scaling.reference), corners(few, thetas)
     total = len(coarse) * len(lengths) * count
-    if not local:
-        warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, simulation.workers)
+    warn_if_long(experiments_at(prior, coarse[:1], method)[0], total, simulation.workers)
     meter.stage("simulated onsets", total)
     effective, densities = float(count), []
     for number, length in enumerate(lengths):
         experiments = experiments_at(prior, thetas, method, length)
+        # A grid that suits both ends of the box suits all points between.
         for end in (experiments[0], experiments[-1]):
             end.random.warn_if_inaccurate(end.problem.interface)
         # 3.
         at_coarse = experiments_at(prior, coarse, method, length)
         first = number * SPECIMEN
         onsets = simulate(at_coarse, simulation, first, variable)
-        # 4.
+        # 4. The first `count` samples by both methods are the same.
         if guided:
             by_local = [one.by(LocalCriterion()) for one in at_coarse]
             known = simulate(by_local, simulation._replace(meter=SILENT), first, variable)
@@ -402,7 +396,7 @@ def make_likelihood(
                 onsets = simulate(experiments, simulation, first, variable)
         # 5.
         bounds = [bounds_of(own, variable)[0] for own in experiments]
-        densities.append(tabulate(onsets, np.array(bounds)))
+        densities.append(densities_of(onsets, np.array(bounds)))
     areas = [area_of(prior, method, length) if forces else Area(1.0, []) for length in lengths]
     return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
 
@@ -425,6 +419,7 @@ def moved(
     result = np.empty_like(many)
     for row, values, nodes, share in zip(result, many, index, weight, strict=True):
         same = values[: few.shape[1]]
+        # The samples that both methods solved give the scale, so that their error cancels.
         z = (values - same.mean()) / same.std()
         shift = share @ np.stack(
             [np.interp(z, standardised[node], away[node]) for node in nodes]
@@ -444,9 +439,8 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
     seconds = samples * per_onset / (workers or usable_cores())
     if seconds > WARN_SECONDS:
         warn_user(
-            f"the likelihood takes about {duration(seconds)}: {samples:,} onsets by"
-            f" {experiment.method.label} of {duration(per_onset)} each. Take fewer samples or"
-            " unknown parameters, or LocalCriterion() if it applies",
+            f"the likelihood takes about {duration(seconds)}: {samples:,} onsets of"
+            f" {duration(per_onset)}. Take fewer samples or parameters, or LocalCriterion()",
             UserWarning,
         )
 

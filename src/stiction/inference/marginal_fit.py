@@ -68,30 +68,26 @@ def _positive(u: Array) -> Array:
     return np.maximum(u, 1e-300)
 
 
-KINDS: dict[str, tuple[Any, Callable[..., Array], Callable[..., Array]]] = {
+KINDS: dict[str, tuple[Callable[..., Array], Callable[..., Array]]] = {
     "lognormal": (
-        scipy.stats.lognorm,
         lambda u, s: ndtr(np.log(_positive(u)) / s),
         lambda u, s: -np.log(u) - math.log(s) - 0.5 * (np.log(u) / s) ** 2,
     ),
     "weibull": (
-        scipy.stats.weibull_min,
         lambda u, k: -np.expm1(-(_positive(u) ** k)),
         lambda u, k: math.log(k) + (k - 1.0) * np.log(u) - u**k,
     ),
     "gamma": (
-        scipy.stats.gamma,
         lambda u, a: gammainc(a, _positive(u)),
         lambda u, a: (a - 1.0) * np.log(u) - u - math.lgamma(a),
     ),
     "beta": (
-        scipy.stats.beta,
         lambda u, a, b: betainc(a, b, np.clip(u, 0.0, 1.0)),
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
 }
-"""Families that are fitted here: distribution of scipy, and distribution function and log
-density of (value - loc)/scale."""
+"""Families that are fitted here: distribution function and log density of (value - loc)/scale.
+The functions of scipy check their arguments, which takes longer than the functions themselves."""
 SCIPYS = {"normal": "norm"}
 """Names of scipy for our names of families."""
 
@@ -122,9 +118,11 @@ class Family:
         quiet = self.quiet(values, noise)
         if self.name not in KINDS:
             return self._by_scipy(quiet)
+        # 1. Without noise, values must lie within the bounds of the family.
         if noise**2 <= NEGLIGIBLE_NOISE * values.var():
             noise, values = 0.0, quiet
-        family, distribution, log_density = KINDS[self.name]
+        # 2.
+        distribution, log_density = KINDS[self.name]
         search_of = _beta if self.name == "beta" else _by_scale
         search = search_of(self, values, quiet, noise, start)
         limits = np.array(search.limits)
@@ -144,19 +142,24 @@ class Family:
             return float(counts @ logs), logs
 
         def derivatives(v: Array, logs: Array) -> tuple[Array, Array]:
+            # One-sided differences, away from the upper limits. The sum of the outer products
+            # of the scores of all values is Fisher's information on average.
             sides = np.where(v + MARGINAL_STEP <= limits[:, 1], MARGINAL_STEP, -MARGINAL_STEP)
             slopes = np.stack([(terms(v + s) - logs) / s.sum() for s in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
 
+        # 3.
         best, _ = climb(search.start, limits, value_of, derivatives, longest=0.5, settled=1e-4)
         parameters = search.parameters(best)
         if self.name == "beta":
             a, b, low, width = parameters
             return Beta(alpha=a, beta=b, low=low, high=low + width)
-        mean, variance = map(float, family.stats(*parameters))
-        return MARGINALS[self.name](mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
+        family: Any = MARGINALS[self.name]
+        mean, variance = map(float, family.scipy_family.stats(*parameters))
+        return family(mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
 
     def _by_scipy(self, values: Array) -> Any:
+        # 4.
         family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
         places = {"loc": "floc", "scale": "fscale"}
         fixed = {places.get(key, f"fix_{key}"): value for key, value in self.fixed.items()}
@@ -171,6 +174,7 @@ class Family:
         share = min(noise**2 / variance, MOST_NOISE)
         low, high = self.bounds
         margin = BOUND_MARGIN * float(np.ptp(values))
+        # Noise adds its variance, and the mean stays.
         values = mean + math.sqrt(1.0 - share) * (values - mean)
         values = np.where(values <= low, low + margin, values)
         return np.where(values >= high, high - margin, values)
@@ -197,6 +201,7 @@ class Family:
             return replace(marginal, cv=factor * marginal.cv)
         if "low" in moved and marginal.low >= 0.0:
             moved["low"] = max(moved["low"], 0.0)
+        # A fixed bound stays, so the shapes must follow from the moments.
         deviation = factor * float(marginal.distribution.std())
         return beta_of(
             mean, deviation, moved.get("low", marginal.low), moved.get("high", marginal.high)
@@ -212,9 +217,8 @@ class Family:
         low, high = self.bounds
         if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
-                f"marginal: {outside} of {values.size} values, from {values.min():.6g} to"
-                f" {values.max():.6g}, lie outside the bounds of {self.name!r}, {low:.6g} and"
-                f" {high:.6g}. Give others, {{'type': {self.name!r}, 'low': ...}}, or noise=True"
+                f"marginal: {outside} of {values.size} values lie outside the bounds of"
+                f" {self.name!r}, {low:.6g} and {high:.6g}. Give others, {{'low': ...}}, or noise=True"
             )
 
 
@@ -238,7 +242,7 @@ def multiplied(marginal: Any, factor: float) -> Any:
     return marginal_of(with_values(marginal, larger))
 
 
-def table_of(given: Any) -> dict[str, Any]:
+def family_table(given: Any) -> dict[str, Any]:
     """Return a name or a table as a table {type, ...}."""
     if isinstance(given, Mapping):
         return dict(given)
@@ -251,7 +255,7 @@ def table_of(given: Any) -> dict[str, Any]:
 
 def family_of(given: Any) -> Family:
     """Return the family for a name, or for a table with some parameters."""
-    fixed = table_of(given)
+    fixed = family_table(given)
     name = str(fixed.pop("type", None))
     if name in KINDS:
         known = ["low", "high"] if name == "beta" else ["low"]
@@ -296,10 +300,13 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
     if start is None:
         ends = ends_at(1.1 * room[name] for name in sides)
         start = beta_of(float(quiet.mean()), float(quiet.std()), **ends)
+    # A free bound needs a shape of at least 1, because the likelihood would grow without
+    # limit as the bound approaches a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
     first = [start.alpha, start.beta]
     for name, side in sides.items():
         first.append(max(side * (getattr(start, name) - mean) / unit, 1e-3))
+        # Noise may carry values beyond a bound.
         least = 0.5 if noise else room[name] / unit * (1.0 + 1e-9)
         most = (room[name] + WIDEST * float(np.ptp(values))) / unit
         if name == "low" and values.min() > 0.0:  # positive values have no negative bound
@@ -316,6 +323,7 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
+    # A noise that is narrow compared with a bin has no effect.
     parts, weight = 1, np.ones(1)
     if noise > 0.2 * width:
         parts = math.ceil(2.0 * width / noise)
@@ -345,7 +353,7 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     return float(counts @ np.log(expected) / values.size)
 
 
-def distance(marginal: Any, values: Array) -> float:
+def kolmogorov_distance(marginal: Any, values: Array) -> float:
     """Return Kolmogorov's distance, the largest difference between the distribution functions."""
     below = marginal.distribution.cdf(np.sort(values))
     steps = np.arange(values.size + 1) / values.size
@@ -376,6 +384,7 @@ def climb(
         free = np.flatnonzero(~held)
         information, score = information[np.ix_(free, free)], score[free]
         diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information) + 1e-300)
+        # More damping makes steps shorter and turns them towards the gradient.
         while damping < HIGHEST:
             step = np.zeros(at.size)
             step[free] = np.linalg.solve(information + damping * diagonal, score)

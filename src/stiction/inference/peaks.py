@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, RealArray, check, checked, describe, is_finite
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import factor_to, is_in, magnitude
-from stiction.inference.curves import Curves
+from stiction.inference.curves import Curves, column_in_si
 from stiction.problem.profiles.files import read_table
 from stiction.problem.profiles.labels import column_of, with_stated_unit, without_missing
 from stiction.problem.profiles.reading import Missing
@@ -31,15 +32,8 @@ VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coef
 """Variable of a method that each unit measures."""
 
 
-class _Peaks(NamedTuple):
-    """The fields of `Peaks`."""
-
-    lengths: tuple[float | None, ...]
-    values: tuple[Array, ...]
-    unit: str
-
-
-class Peaks(Result, _Peaks):
+@dataclass(frozen=True, eq=False, repr=False)
+class Peaks(Result):
     """Peaks of repeated tests, by the length of the specimens.
 
     Attributes
@@ -51,6 +45,10 @@ class Peaks(Result, _Peaks):
     unit : str
         "Pa", "N" for forces, or "1" for friction coefficients.
     """
+
+    lengths: tuple[float | None, ...]
+    values: tuple[Array, ...]
+    unit: str
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks that differ so much from predictions that their unit must be wrong."""
@@ -96,27 +94,21 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
         with prefixed("peaks"):
             return _of_table(table_of_frame(peaks), None, Options())
+    # Lengths may be quantities with a unit.
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
-    if curves := [given for given in groups.values() if isinstance(given, Curves)]:
-        unit = curves[0].unit
-        groups = {
-            length: given.peaks if isinstance(given, Curves) else given
-            for length, given in groups.items()
-        }
     groups = {magnitude(length, "m"): values for length, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
-            "peaks: for several specimens, map each length (m) to its peaks, such as"
-            f" {{0.1: [...], 0.2: [...]}}. Got the lengths {describe(list(groups))}"
+            "peaks: the keys of a mapping must be lengths (m), such as {0.1: [...], 0.2: [...]}."
+            f" Got {describe(list(groups))}"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
-    values = tuple(_values(given, unit) for given in groups.values())
+    values = tuple(_in_si(given, unit) for given in groups.values())
     different = np.unique(np.concatenate([np.zeros(0), *values])).size
     if different < MIN_PEAKS:
         raise InputError(
             f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Test more"
-            " specimens (st.design_of_tests says how many), or pass the fit of profiles alone to"
-            " st.design_stress"
+            " specimens, or pass the fit of profiles alone to st.design_stress"
         )
     return Peaks(lengths, values, si_of(unit))
 
@@ -126,17 +118,15 @@ def si_of(unit: str) -> str:
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
-def factor_of(unit: str) -> float:
-    """Return the factor that converts a unit of stress, force or friction coefficient to SI."""
-    try:
+def factor_of(unit: str, peaks: Any = None) -> float:
+    """Return the factor that converts a unit of peaks to SI. It is 1 if they are in SI already."""
+    if isinstance(peaks, Peaks | Curves):
+        return 1.0
+    with prefixed("unit"):
         return factor_to(si_of(unit), unit)
-    except InputError as error:
-        raise InputError(
-            f"unit: {error}. Give a stress, a force (N), or a friction coefficient (unit = '1')"
-        ) from None
 
 
-def _values(given: Any, unit: str) -> Array:
+def _in_si(given: Any, unit: str) -> Array:
     """Return peaks for one kind of specimen in SI. A unit that the values carry is used."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
@@ -145,9 +135,8 @@ def _values(given: Any, unit: str) -> Array:
     values: Array = check("peaks", numbers, RealArray)
     if values.ndim != 1:
         raise InputError(
-            "peaks: must be a list of numbers for a single kind of specimen, got"
-            f" {describe(given)}."
-            " For several, map each length (m) to its peaks: {0.1: [...], 0.2: [...]}"
+            "peaks: must be a list of numbers, or map each length (m) to its peaks, such as"
+            f" {{0.1: [...], 0.2: [...]}}. Got {describe(given)}"
         )
     bad = np.flatnonzero(~(values > 0.0) | np.isinf(values))
     if bad.size:
@@ -234,25 +223,18 @@ def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     if peak is None:
         names = ", ".join(map(str, table.data_vars))
         raise InputError(f"no column has a name like 'peak [MPa]'. The columns are {names}")
-    _refuse_curve(table, {column.name for column in (length, peak) if column is not None})
-    stated = peak.attrs.get("units", unit)
-    if stated is None or stated != (unit or stated):
-        raise InputError(
-            f"the unit of the peaks is {'not stated' if stated is None else stated}, and"
-            f" unit = {unit!r}. Write it into the heading, 'peak [MPa]', or give unit="
-        )
-    texts = [column.attrs["text"] for column in (length, peak) if column is not None]
-    if any(texts):
+    columns = [column for column in (length, peak) if column is not None]
+    _refuse_curve(table, {column.name for column in columns})
+    if any(texts := [column.attrs["text"] for column in columns]):
         raise InputError(filter(None, texts))
-    peak = without_missing(peak, options)
-    kept = ~np.isnan(peak.values) if options.missing is not None else slice(None)
+    values, si = column_in_si(without_missing(peak, options), "peak", unit, VARIABLES, "unit")
+    # A stated word or number marks a test without a peak. Any other NaN is a mistake.
+    kept = ~np.isnan(values) if options.missing is not None else np.ones(values.size, np.bool_)
     if length is None:
-        return make_peaks(peak.values[kept], stated)
-    if "units" not in length.attrs:
-        raise InputError("the unit of the length is not stated. Write 'length [mm]'")
-    lengths = length.values[kept] * factor_to("m", length.attrs["units"])
+        return make_peaks(values[kept], si)
+    lengths = column_in_si(length, "length", None, ("m",))[0][kept]
     if np.isnan(lengths).any():
         row = int(np.argmax(np.isnan(lengths)))
         raise InputError(f"length: missing in row {row}. Give the length of each specimen")
-    groups = {size: peak.values[kept][lengths == size] for size in np.unique(lengths)}
-    return make_peaks(groups, stated)
+    groups = {size: values[kept][lengths == size] for size in np.unique(lengths)}
+    return make_peaks(groups, si)

@@ -1,4 +1,8 @@
-"""The posterior: draws, intervals, information gain and accuracy."""
+"""Posteriors: draws, intervals, information gain and accuracy.
+
+`Posterior` holds parameters with a prior. `SpecimenPosterior` holds the mean, the scatter
+between specimens, and the field within a specimen.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +19,7 @@ from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
 from stiction.inference.peaks import Peaks
 from stiction.inference.prior import Prior
+from stiction.inference.specimens import FactorGrid
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
 from stiction.random.equally_likely import UncertainSource, uncertain
@@ -142,6 +147,7 @@ class Posterior(Result):
                 f"interfaces: {', '.join(of_problem)} belong to the problem, not to an interface."
                 " Take `at(draw)`, which returns a problem and an interface for each draw"
             )
+        # Each draw counts once, unless more interfaces than draws are wanted.
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return [self.at(int(draw))[1] for draw in draws]
@@ -250,3 +256,72 @@ class Posterior(Result):
 def _in_chains(values: Array) -> Array:
     """Divide draws (draws, ...) into chains (chains, draws, ...)."""
     return values.reshape(CHAINS, -1, *values.shape[1:])
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SpecimenPosterior(Posterior):
+    """Posterior of the mean, the scatter between specimens and the field within a specimen.
+
+    Attributes
+    ----------
+    families : dict of str to float
+        Posterior probability of each family for the factor between specimens.
+    agreement : Agreement or None
+        Agreement of the peaks with the prediction from the profiles alone. None
+        without profiles.
+    """
+
+    grid: FactorGrid = field(repr=False, compare=False)
+    by_profiles: FactorGrid = field(repr=False, compare=False)
+    agreement: Any = field(default=None, repr=False)
+
+    @property
+    def specimens(self) -> int:
+        """Number of specimens that were scanned or tested."""
+        return self.grid.profiles.levels.size + sum(map(len, self.peaks.values))
+
+    @property
+    def families(self) -> dict[str, float]:
+        """Posterior probability of each family for the factor between specimens."""
+        return self.grid.families
+
+    @cached_property
+    def before(self) -> dict[str, Array]:
+        """Draws from the posterior given the profiles alone, or from the prior without profiles."""
+        rng = np.random.default_rng([self.seed, 7])
+        return self.by_profiles.described(self.by_profiles.draws(POSTERIOR_DRAWS, rng))
+
+    def at(self, draw: int) -> tuple[Problem, RandomInterface]:
+        """Return the problem and the random interface at a draw."""
+        return self.problem, self.grid.interface(self.u[draw])
+
+    @checked
+    def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
+        """Return equally likely random interfaces. They are draws from the posterior.
+
+        Parameters
+        ----------
+        count : int
+            Number of interfaces. A longer list does not begin with a shorter list.
+        seed : int
+            Not negative.
+        """
+        drawn = self.grid.draws(count, np.random.default_rng([seed, 4]))
+        return [self.grid.interface(row) for row in drawn]
+
+    @property
+    def prior(self) -> Any:
+        """Raise an `InputError`, because fields within a specimen have no prior of parameters."""
+        raise InputError(
+            "prior: fields within a specimen have none. `prior_transform` and `log_likelihood` need"
+            " a posterior from st.infer with a prior of parameters"
+        )
+
+    def _summary(self) -> Summary:
+        summary = super()._summary()
+        shares = ", ".join(f"{name} {share:.0%}" for name, share in self.families.items())
+        notes = [*summary.notes, f"families of the factor between specimens: {shares}"]
+        if self.agreement is not None:
+            p = min(self.agreement.p_values.values())
+            notes.append(f"agreement of peaks and profiles: p = {p:.2g}")
+        return summary._replace(notes=notes)

@@ -63,6 +63,7 @@ class Prior:
         """Return the parameters at `u`, from inverse distribution functions."""
         result = np.empty_like(u)
         for i, distribution in enumerate(self.distributions.values()):
+            # An infinite end, or an end without density, cannot be simulated.
             low, high = _tails(distribution)
             result[:, i] = distribution.ppf(low + (high - low) * u[:, i])
         return result
@@ -134,6 +135,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     random = as_random_interface(random)
     refuse_conditioned([random])
     prior = Prior(problem, random, distributions)
+    # Parameters that are valid at all corners are valid between them.
     for corner in itertools.product(*prior.ends.T):
         prior.at(np.array(corner))
     return prior

@@ -11,10 +11,10 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
-from stiction.base.model import real_array
+from stiction.base.model import as_numbers
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import POSITIVE, is_labelled, labelled, simplified
+from stiction.problem.profiles.labels import check_positive, is_labelled, labelled, simplified
 from stiction.problem.profiles.placing import points_of
 
 MIN_RECORD_POINTS = 64
@@ -78,6 +78,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         values = np.where(measured, values, np.nan)  # filled values were not measured
     if not places:
         return _of_array(values, interface)
+    # Points in any order, and missing points, find their places on a regular grid.
     index, spacings = [], []
     for dim, at in places.items():
         spacing = _spacing(np.sort(at) if len(places) == 1 else np.unique(at), dim)
@@ -96,10 +97,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 
 def _of_array(values: Any, interface: Interface | None) -> list[Record]:
     """Return records from values (*shape) or (samples, *shape) at the nodes of an interface."""
-    try:
-        array = real_array(values)
-    except TypeError as error:
-        raise InputError(f"must be numbers or a DataArray; {error}") from None
+    array = as_numbers(values)
     if interface is None:
         raise InputError(
             "an array has no point spacing. Give the interface, or a DataArray over 'x' (m)"
@@ -146,19 +144,14 @@ def _checked(record: Record, quantity: str) -> Record:
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
-    if quantity in POSITIVE and (values <= 0.0).any():
-        entry = int(np.argmax(record.values.ravel() <= 0.0))
-        raise InputError(
-            f"{quantity} must be positive, but entry {entry} is {record.values.flat[entry]:.6g}."
-            " Make missing values NaN, or read the file with st.read_profile(..., missing=...)"
-        )
+    check_positive(record.values, quantity)
+    # The median absolute deviation of a normal sample is its deviation over 1.4826.
     aside = np.abs(values - np.median(values))
     far = aside > OUTLYING * 1.4826 * np.median(aside)
     if np.median(aside) > 0.0 and far.any():
         warn_accuracy(
             f"{int(far.sum())} of {values.size} values are outliers, such as"
-            f" {values[aside.argmax()]:.4g}. If they are errors of measurement, set them to NaN"
-            " to leave them out"
+            f" {values[aside.argmax()]:.4g}. Set errors of measurement to NaN to leave them out"
         )
     else:
         _doubt_jumps(record)
@@ -174,6 +167,7 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     ..., and pools records and directions.
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
+    # A short correlation length shows at few lags, and a long length at many.
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
     for window, row in zip(windows, rows, strict=True):
         products = window.products((row - row.mean()) / row.std())
@@ -185,9 +179,8 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     scores = np.cumsum(sums) / np.sqrt(np.maximum(np.cumsum(counts), 1.0))
     if scores[lags - 1].max() < CORRELATED:
         raise InputError(
-            f"profiles: neighbouring points, {max(windows[0].spacings):.4g} m apart, are not"
-            f" correlated: {sums[0] / counts[0]:.2g} +- {counts[0] ** -0.5:.2g}. Measure at a"
-            " smaller spacing or with less noise, or take the values as independent"
+            f"profiles: neighbouring points are not correlated: {sums[0] / counts[0]:.2g} +-"
+            f" {counts[0] ** -0.5:.2g}. Measure at a smaller spacing or with less noise"
         )
 
 
@@ -207,7 +200,6 @@ def _doubt_jumps(record: Record) -> None:
     if scale > 0.0 and far.any():
         entry = int(np.argmax(size))
         warn_accuracy(
-            f"{int(far.sum())} of {record.values.size} values differ from their neighbours by more"
-            f" than {JUMPING:g} times the usual difference, such as {middle.flat[entry]:.4g} beside"
-            f" {record.values[:-2].flat[entry]:.4g}. Make dropouts NaN to leave them out"
+            f"{int(far.sum())} of {record.values.size} values differ from their neighbours far more"
+            f" than usual, such as {middle.flat[entry]:.4g}. Make dropouts NaN to leave them out"
         )

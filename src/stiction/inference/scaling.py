@@ -43,6 +43,8 @@ from stiction.random.dotted_keys import full_key
 from stiction.random.marginals import affine_parameters
 
 MARGINAL = "random.strength.marginal."
+OF_AREA = ("problem.interface.", "problem.specimen.")
+"""Beginnings of keys that change the area."""
 PRESSURE = {"problem.load.normal_pressure", "problem.load.pressing_force"}
 SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean": (0, 1)}
 """Derivatives of location and scale of a marginal by its parameters, see `affine_parameters`."""
@@ -63,19 +65,14 @@ class Scaling(NamedTuple):
 
 def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     """Find the parameters of a prior that scale the onset. `variable` is the name of the peaks."""
-    middle = prior.middle
+    middle, changed = prior.middle, [full_key(name) for name in prior.names]
+    none = Scaling((), middle, np.zeros((0, 2)))
     problem, random = prior.at(middle)
-    none, changed = (
-        Scaling((), middle, np.zeros((0, 2))),
-        [full_key(name) for name in prior.names],
-    )
-    field = random.strength
+    field, pressure = random.strength, problem.normal_pressure
     if not scales_with_strength(problem, random, method) or PRESSURE & {*changed}:
         return none
-    of_area = any(
-        key.startswith(("problem.interface.", "problem.specimen.")) for key in changed
-    )
-    if of_area and problem.load.pressing_force is not None:
+    changes_area = any(key.startswith(OF_AREA) for key in changed)
+    if changes_area and problem.load.pressing_force is not None:
         return none  # the pressure changes with the area
     names, location, scale = affine_parameters(field.marginal)
     if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & {*changed}:
@@ -84,14 +81,17 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
         changed.index(MARGINAL + name): name for name in names if MARGINAL + name in changed
     }
     slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
-    pressure = problem.normal_pressure
+    # 6.
     varies = field.of is not None and np.ndim(pressure) > 0
     varies = varies or np.ptp(problem.load_profile) > 0.0
+    # 1. to 3.
     affine = optional_member(method, "scaling") == "affine" and not varies
     if not affine and (location or slopes[:, 0].any()):
         return none
+    # At the reference, location and scale must give shift 0 and stretch 1.
     slopes[:, 1] /= scale
     slopes[:, 0] -= location * slopes[:, 1]
+    # Onsets are stresses, or coefficients if the peaks are coefficients.
     mean = 1.0 if pressure is None else float(np.mean(pressure))
     slopes[:, 0] *= mean ** ((field.of is not None) - (variable == "friction_coefficient"))
     return Scaling(tuple(places), middle, slopes)

@@ -45,8 +45,24 @@ from scipy.special import logsumexp
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
-from stiction.inference.density import Densities, log_likelihoods
+from stiction.ensemble.batches import in_threads, usable_cores
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.limit_state import scales_with_strength
+from stiction.inference.density import Densities, densities_of, log_likelihoods
+from stiction.inference.likelihood import (
+    SPECIMEN,
+    Axis,
+    Simulation,
+    bounds_of,
+    corners,
+    of_length,
+    simulate,
+    variable_of,
+    warn_if_long,
+)
 from stiction.inference.marginal_fit import multiplied
+from stiction.inference.peaks import Peaks
+from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distributions_of
 from stiction.random.fields import RandomInterface
 from stiction.random.marginals import FACTOR_FAMILIES
@@ -60,6 +76,10 @@ LEAST_CV, MOST_CV = 2e-3, 0.9
 SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
 """Values of s and of log m on the grid, and means at which onsets are simulated if T(c)/c
 depends on c."""
+ONSETS, FEW_ONSETS = {"local_criterion": 200}, 100
+"""Simulated onsets of each field, by the local criterion and by other methods."""
+LOG_STRENGTH_MARGIN = 0.3
+"""Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
 LOG_MEAN_MARGIN = 1.0
 """Distance by which the first range of log m exceeds the range of x."""
 LOWEST, PREDICTED = 3.0, 1_000
@@ -165,20 +185,18 @@ class Onsets:
 
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
         """Return the log density (peaks, points) of each peak at x for a field."""
-        last = self.at.size - 1
-        place = np.interp(x, self.at, np.arange(last + 1))
-        first = np.minimum(place.astype(np.int64), max(last - 1, 0))
-        share = place - first
-        index = np.stack([first, np.minimum(first + 1, last)], axis=1)
-        weight = np.stack([1.0 - share, share], axis=1)
-        known, out = self.densities[field], np.empty((x.size, peaks.size))
+        known, near = (
+            self.densities[field],
+            corners([Axis(0, self.at, np.positive)], x[:, None]),
+        )
         scales = self.area * np.stack([np.zeros(x.size), np.exp(x)])
-        of_v = known.between(index, weight)
-        log_likelihoods(known.table, index, weight, of_v, scales, error, peaks, out)
+        of_v, out = known.between(*near), np.empty((x.size, peaks.size))
+        log_likelihoods(known.table, *near, of_v, scales, error, peaks, out)
         return out.T
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
         """Return the range of x to tabulate for these peaks, and the smallest deviation of x."""
+        # x = log y - log(T(c) over c/reference), by which fields and samples scatter.
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -189,6 +207,7 @@ class Onsets:
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
     """Return points x over all ranges, spaced by a quarter of the smallest deviation."""
     lows, highs, deviations = zip(*ranges, strict=True)
+    # A coarser grid would lose the narrowest likelihood between two points.
     low, high = min(lows), max(highs)
     count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))
     return np.linspace(low, high, count)
@@ -211,7 +230,7 @@ def masses(family: str, cv: float, means: Array, x: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class FactorGrid:
     """Posterior mass over field, family, s and log m, and the evidence."""
 
     profiles: Profiles
@@ -227,11 +246,12 @@ class Grid:
 
     def draws(self, count: int, rng: np.random.Generator, fields: Any = None) -> Array:
         """Draw field, family, s and log m, as (count, 4), also for given `fields`."""
-        # Draw number i is the same in a longer list.
+        # Two streams, so that draw number i is the same in a longer list.
         cells, (rng, mean_rng) = self.mass[0].size, rng.spawn(2)
         if fields is None:
             places = rng.choice(self.mass.size, count, p=self.mass.ravel())
         else:
+            # From the posterior of family, s and log m given the field.
             below = np.cumsum(self.mass.reshape(-1, cells), axis=1)
             shares = rng.random(count) * below[fields, -1]
             drawn = [np.searchsorted(below[f], p) for f, p in zip(fields, shares, strict=True)]
@@ -262,8 +282,11 @@ class Grid:
         }
 
 
-def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tuple[Grid, Grid]:
+def grid_of_profiles(
+    profiles: Profiles, tables: "Tables | None" = None
+) -> tuple[FactorGrid, FactorGrid]:
     """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
+    # The logarithm of a level lies below log(m b) by half its variance on average.
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -285,7 +308,9 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         )
         before = _products(kernel, of_levels)
         if profiles.prior.mean is not None:
+            # The density of log m is m times the density of m.
             before += profiles.prior.mean.logpdf(profiles.reference * np.exp(means)) + means
+        # 5. Given the profiles, each field has the same probability.
         before -= logsumexp(before, axis=by_field, keepdims=True) + math.log(len(before))
         after = before + _products(kernel, of_peaks)
         evidence = float(logsumexp(after))
@@ -295,6 +320,8 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
                 " Check their units, and leave out tests of another kind of specimen"
             )
         mass = np.exp(after - evidence)
+        # Both posteriors must fit on the grid. Without a prior of the mean and without
+        # profiles, the first posterior has no end.
         along = [mass.sum(axis=(0, 1, 2))]
         if levels.size or profiles.prior.mean is not None:
             along.append(np.exp(before).sum(axis=(0, 1, 2)))
@@ -303,8 +330,11 @@ def grid_of_profiles(profiles: Profiles, tables: "Tables | None" = None) -> tupl
         ).min(axis=0)
         if empty.sum() <= 0.1 * MEAN_CELLS:
             break
+        # One empty cell stays as a margin.
         box = box + np.ptp(box) / MEAN_CELLS * np.maximum(empty - 1, 0) * [1, -1]
-    return Grid(profiles, means, np.exp(before)), Grid(profiles, means, mass, evidence)
+    return FactorGrid(profiles, means, np.exp(before)), FactorGrid(
+        profiles, means, mass, evidence
+    )
 
 
 def _products(kernel: Array, tables: Array) -> Array:
@@ -316,6 +346,7 @@ def _products(kernel: Array, tables: Array) -> Array:
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
     for table in np.moveaxis(tables, 1, 0):
+        # The likelihood of a number may be far below the smallest number of the computer.
         top = table.max(axis=1, keepdims=True)
         total += np.log(np.maximum(np.exp(table - top) @ flat, 1e-300)) + top
     return total.reshape(-1, *kernel.shape[:-1])
@@ -331,10 +362,9 @@ class Tables:
     error: float  # standard deviation of the load cell
     peaks: tuple[Array, ...]
 
-    def of(self, peaks: Sequence[Array], kinds: Sequence[int] | None = None) -> Self:
-        """Return the tables for other peaks, and for all or some kinds of specimens."""
-        chosen = range(len(self.onsets)) if kinds is None else kinds
-        return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in chosen))
+    def of(self, peaks: Sequence[Array], kinds: Sequence[int]) -> Self:
+        """Return the tables for other peaks of some kinds of specimens."""
+        return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in kinds))
 
     def ranges(self) -> list[tuple[float, float, float]]:
         """Return the range of x to tabulate for each kind of peaks."""
@@ -352,9 +382,10 @@ class Tables:
 
     def parts(self, u: Array) -> Array:
         """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
+        # The density of a peak at a draw is the integral over x, as in step 3.
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
-        for family, cv, places in _laws(self.profiles, u):
+        for family, cv, places in _factor_groups(self.profiles, u):
             rows[places] = masses(family, cv, u[places, 3], x)
         densities = np.empty((len(u), sum(map(np.size, self.peaks))))
         for field in np.unique(u[:, 0].astype(np.int64)):
@@ -367,22 +398,24 @@ class Tables:
         """Draw a peak for a kind of specimen for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
+        # A further specimen has its own factor and one of the simulated onsets.
         x = u[:, 3].copy()
-        for family, cv, places in _laws(self.profiles, u):
+        for family, cv, places in _factor_groups(self.profiles, u):
             x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
         sample = rng.integers(known.ratios.shape[2], size=len(u))
         ratios = known.ratios[u[:, 0].astype(np.int64), :, sample]
         ratio = [np.interp(at, known.at, row) for at, row in zip(x, ratios, strict=True)]
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
 
-    def quantile(self, grid: Grid, probabilities: Array, kind: int = 0) -> Array:
-        """Return the quantiles of a further peak.
+    def quantile(self, grid: FactorGrid, probability: float) -> float:
+        """Return the peak of a further specimen, of the first kind, at a probability.
 
         The predictive distribution is the mean over field, onset and grid. No draws
         are needed.
         """
-        profiles, known = self.profiles, self.onsets[kind]
+        profiles, known = self.profiles, self.onsets[0]
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
+        # Probability that x of a further specimen lies below each point, for each field.
         below = np.zeros((len(profiles.fields), x.size))
         for family, name in enumerate(profiles.families):
             for cell, cv in enumerate(profiles.prior.cells()):
@@ -391,7 +424,7 @@ class Tables:
         # T(c) rises with c. Find the c at which it is t, for each field and sample.
         logs = np.log(known.area * known.ratios) + known.at[:, None]
 
-        def excess(log_peak: float, probability: float) -> float:
+        def excess(log_peak: float) -> float:
             at = log_peak - logs[:, 0]
             if known.at.size > 1:
                 at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
@@ -400,14 +433,75 @@ class Tables:
             return float(sum(shares)) / logs.shape[2] - probability
 
         low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
-        log_peaks = [brentq(excess, low, high, args=(p,), xtol=1e-6) for p in probabilities]
-        return np.exp(log_peaks)
+        return float(np.exp(brentq(excess, low, high, xtol=1e-6)))
 
 
-def _laws(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
+def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
     """Return family, s, and the places of the draws (draws, 4) with both."""
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
     return [
         (profiles.families[int(family)], float(cv), np.flatnonzero(group.ravel() == number))
         for number, (family, cv) in enumerate(pairs)
     ]
+
+
+def tables_of(
+    problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
+) -> Tables:
+    """Return the likelihood of peaks, from simulated onsets of each kind of specimen (step 1)."""
+    variable = variable_of(problem, profiles.fields[0], measured.unit)
+    kinds = [
+        _onsets(
+            of_length(problem, length), profiles, simulation, number, peaks, error, variable
+        )
+        for number, (length, peaks) in enumerate(
+            zip(measured.lengths, measured.values, strict=True)
+        )
+    ]
+    return Tables(profiles, simulation.method, tuple(kinds), error, measured.values)
+
+
+def _onsets(
+    problem: Problem,
+    profiles: Profiles,
+    simulation: Simulation,
+    kind: int,
+    peaks: Array,
+    error: float,
+    variable: str,
+) -> Onsets:
+    """Return the onsets of all fields for a kind of specimen. Its `peaks` need not be measured."""
+    method, meter, workers = simulation.method, simulation.meter, simulation.workers
+    samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
+    simulation = simulation._replace(samples=samples, workers=1)  # fields run in threads
+    forces = variable == "critical_force"
+    area = (problem.area or math.nan) if forces else 1.0
+    of = "critical_stress" if forces else variable
+
+    def onsets(place: int, at: Array) -> tuple[Array, Densities]:
+        """Return onsets (steps, samples) divided by c/reference, and their densities."""
+        strengths = np.exp(at)
+        fields = [of_mean(profiles.fields[place], c * profiles.reference) for c in strengths]
+        experiments = [Experiment(problem, field, method) for field in fields]
+        first = kind * SPECIMEN + place * samples
+        relative = simulate(experiments, simulation, first, of) / strengths[:, None]
+        if not np.isfinite(relative).all() or relative.min() <= 0.0:
+            raise InputError("method: some simulated specimens have no positive onset")
+        bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
+        return relative, densities_of(relative, np.maximum(bounds, 0.0))
+
+    at, fields = np.zeros(1), range(len(profiles.fields))
+    if not scales_with_strength(problem, profiles.fields[0], method):
+        # The onsets at the reference show over which strengths the peaks range.
+        ratios, known = onsets(0, at)
+        peaks = peaks if peaks.size else area * ratios.ravel()
+        low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
+        at = np.linspace(low - LOG_STRENGTH_MARGIN, high + LOG_STRENGTH_MARGIN, ONSET_MEANS)
+    total = len(fields) * at.size * samples
+    warn_if_long(Experiment(problem, profiles.fields[0], method), total, workers)
+    meter.stage("simulated onsets", total)
+    by_field = in_threads(lambda place: onsets(place, at), fields, workers or usable_cores())
+    # Standardised densities differ little between fields. Their mean has a smaller error.
+    table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
+    densities = tuple(known._replace(table=table) for _, known in by_field)
+    return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)

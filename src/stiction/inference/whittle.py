@@ -36,7 +36,7 @@ Departures. The map v, the noise and the floor are our own.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -46,7 +46,7 @@ from scipy.ndimage import uniform_filter
 
 from stiction.base.arrays import Array
 from stiction.base.kinds import from_table
-from stiction.inference.marginal_fit import climb, table_of
+from stiction.inference.marginal_fit import climb, family_table
 from stiction.inference.window import RecordWindow
 from stiction.random.mapping import hermite_coefficients
 from stiction.random.spectra import SPECTRA
@@ -99,7 +99,7 @@ class Observed(NamedTuple):
     floor: float
 
 
-def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Observed]:
+def periodograms_of(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Observed]:
     """Return the periodograms of measured values (points,) by geometry (step 1)."""
     powers: dict[RecordWindow, list[Array]] = {}
     for row, window in zip(rows, windows, strict=True):
@@ -107,6 +107,7 @@ def observe(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Obse
     observed = []
     for window, periodograms in powers.items():
         average = np.stack(periodograms).mean(axis=0)
+        # A single ordinate may be several times its expectation by chance.
         highest = uniform_filter(average, NEIGHBOURS, mode="nearest").max()
         observed.append(Observed(window, len(periodograms), average, FLOOR * float(highest)))
     return observed
@@ -152,14 +153,14 @@ class Model(NamedTuple):
         return self.variance * ((1.0 - share) * signal + share * window.white)
 
 
-def origin(name: str) -> float:
+def offset(name: str) -> float:
     """Return the origin for the logarithm of a parameter, so that its error is about normal."""
     return 0.5 if name.endswith("exponent") else 0.0
 
 
-def spectrum_of(given: Any) -> tuple[str, dict[str, float]]:
+def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name of a family of spectra and its fixed parameters, after checks."""
-    table = table_of(given)
+    table = family_table(given)
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
 
@@ -193,9 +194,10 @@ class SpectrumFamily:
     def model(self, vector: Array, shares: Array) -> Model:
         """Return the model for a vector of free parameters."""
         values = {
-            n: float(v) if n == "noise_share" else origin(n) + math.exp(v)
+            n: float(v) if n == "noise_share" else offset(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
         }
+        # A known noise has a share that depends on the variance of the values.
         variance = values.pop("variance")
         anisotropy = values.pop("anisotropy", self.anisotropy or 1.0)
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
@@ -210,7 +212,7 @@ class SpectrumFamily:
         """Return free parameters on the scale of the search."""
         pairs = zip(self.free, values, strict=True)
         return np.array(
-            [v if n == "noise_share" else math.log(v - origin(n)) for n, v in pairs]
+            [v if n == "noise_share" else math.log(v - offset(n)) for n, v in pairs]
         )
 
     def vector_of(self, model: Model) -> Array:
@@ -224,6 +226,7 @@ class SpectrumFamily:
 
     def at_end(self, model: Model) -> dict[str, float]:
         """Return the parameters of the spectrum that lie at an end of their range."""
+        # The scale of the search is logarithmic, so both ends count alike.
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
         pairs = zip(self.of(model).items(), near, strict=True)
@@ -252,19 +255,20 @@ class Whittle(NamedTuple):
         """Return the best point on a coarse grid of parameters (step 5)."""
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
-        windows = [one.window for one in self.observed]
-        power = sum(float(np.sum(one.window.weights * one.average)) for one in self.observed)
+        windows = [group.window for group in self.observed]
+
+        def total(powers: Iterable[Array]) -> float:
+            pairs = zip(windows, powers, strict=True)
+            return sum(float(np.sum(window.weights * power)) for window, power in pairs)
+
+        power = total(group.average for group in self.observed)
         best, most = np.zeros(0), -math.inf
-        signals, shape = [], None
         for values in itertools.product(*[tried[name] for name in self.family.free]):
             at = self.family.vector(values)
             model = self.family.model(at, self.shares)
-            if shape != (shape := (model.spectrum, model.anisotropy)):
-                signals = [model.signal(window) for window in windows]
-            pairs = list(zip(windows, signals, strict=True))
-            expected = [model.expectation(window, signal) for window, signal in pairs]
-            totals = zip(windows, expected, strict=True)
-            scale = power / sum(float(np.sum(window.weights * e)) for window, e in totals)
+            expected = [model.expectation(window) for window in windows]
+            # The variance needs no grid: the total power fixes it.
+            scale = power / total(expected)
             value = self.of([scale * e for e in expected])
             if value > most:
                 best, most = at, value
@@ -291,6 +295,7 @@ class Whittle(NamedTuple):
         moved = {}
         for i, name in enumerate(family.free):
             if name not in ("variance", "noise_share"):
+                # Only these parameters need a new signal, so their slopes are differences.
                 aside = at.copy()
                 aside[i] += LOG_STEP if at[i] + LOG_STEP <= limits[i, 1] else -LOG_STEP
                 moved[name] = family.model(aside, self.shares), aside[i] - at[i]
@@ -321,6 +326,7 @@ class Whittle(NamedTuple):
         the true error.
         """
         model, (_, information) = state[0], self.score(at, state)
+        # The noise variance is the product of two parameters, whose errors are correlated.
         slope = np.zeros(at.size)
         slope[self.family.free.index("variance")] = model.noise_share * model.variance
         slope[self.family.free.index("noise_share")] = model.variance

@@ -13,7 +13,7 @@ from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
 from stiction.inference.fit import FieldFit
-from stiction.inference.whittle import Observed, observe
+from stiction.inference.whittle import Observed, periodograms_of
 from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import (
     ACCENT,
@@ -54,8 +54,8 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
-    observed = observe(field_fit._rows, windows)
-    simulated = [observe(estimate.simulate(rng), windows) for _ in range(SHOWN)]
+    observed = periodograms_of(field_fit._rows, windows)
+    simulated = [periodograms_of(estimate.simulate(rng), windows) for _ in range(SHOWN)]
     figure = new_figure(PAGE, 5.4)
     with paper_style():
         panels: NDArray[Any] = figure.subplots(2, 2).ravel()
