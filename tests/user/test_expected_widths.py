@@ -31,6 +31,36 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
     assert found.design_stress[1] > found.design_stress[0]  # what is known better carries more
 
 
+def test_a_design_is_for_specimens_of_the_problem():
+    """Tests of two lengths in either order. By chance the designs of the lengths differ by 4 %."""
+    peaks = {0.025: 1e6 * np.array([0.83, 0.9, 0.87]), 0.05: 1e6 * np.array([0.8, 0.85, 0.77])}
+    numbers = {"repetitions": 10, "designs": {"few": 1}}
+    stresses = []
+    for lengths in ((0.025, 0.05), (0.05, 0.025)):
+        groups = {length: peaks[length] for length in lengths}
+        posterior = st.infer(PROBLEM, FIELD, groups, samples=200, **GIVEN)
+        found = st.design_of_tests(PROBLEM, posterior, **numbers, **GIVEN)
+        kinds = [posterior.likelihood.of(peaks.values(), [k, 1 - k]) for k in (0, 1)]
+        by_kind = dict(
+            zip(lengths, (k.quantile(posterior.grid, 1e-3) for k in kinds), strict=True)
+        )
+        assert abs(by_kind[0.025] / by_kind[0.05] - 1.0) > 0.02
+        assert found.design_stress[0] == pytest.approx(by_kind[0.05], rel=1e-3)
+        stresses.append(float(found.design_stress[0]))
+    assert stresses[0] == pytest.approx(stresses[1], rel=0.02)
+    longer = make_problem(64, 0.1, weakening_rate=0.25e12)
+    refuses(
+        "problem of the posterior",
+        lambda: st.design_of_tests(longer, posterior, **numbers, **GIVEN),
+    )
+    groups = {0.025: peaks[0.025], 0.0375: peaks[0.05]}
+    other = st.infer(PROBLEM, FIELD, groups, samples=200, **GIVEN)
+    refuses(
+        "no peaks are of specimens",
+        lambda: st.design_of_tests(PROBLEM, other, **numbers, **GIVEN),
+    )
+
+
 def test_a_fit_is_taken_and_what_is_refused():
     records = [
         factor * FIELD.sample(PROBLEM.interface, seed=k)[0]

@@ -91,9 +91,8 @@ class Curve(Result):
     drops : Drops
         Precursors: drops before the peak. The error of each size is about twice
         the noise.
-    plateau, plateau_deviation : float
-        Mean and standard deviation of the force after the drop at the peak. NaN
-        if the record ends there.
+    plateau : float
+        Mean force after the drop at the peak. NaN if the record ends there.
     """
 
     name: str
@@ -107,7 +106,6 @@ class Curve(Result):
     peak_travel: float
     drops: Drops
     plateau: float
-    plateau_deviation: float
 
     def __str__(self) -> str:
         count = self.drops.size.size
@@ -312,6 +310,7 @@ def _readings(
 ) -> Readings:
     """Return force and travel from a table, in SI."""
     column = column_of(table, FORCE, FORCE_UNITS, force)
+    # Travel is better than time, which a stop of the machine would stretch.
     along = column_of(table, TRAVEL, ("m",), travel)
     along = column_of(table, TIME, ("s",)) if along is None else along
     if column is None or along is None:
@@ -360,6 +359,7 @@ def _tests_of(table: Any, readings: Readings) -> Iterator[tuple[str, Any]]:
     restarts = np.diff(readings.travel, prepend=0.0) < 0
     begins = (np.diff(blocks, prepend=blocks[:1]) > 0) & restarts
     block = np.cumsum(begins)
+    # A single test has no number.
     for label in range(int(block[-1]) + 1):
         yield f"{label + 1}" if block[-1] else "", block == label
 
@@ -404,7 +404,6 @@ def _curve(name: str, readings: Readings, rows: Array, noise: float | None) -> C
         peak_travel=float(travel[top]),
         drops=Drops(travel[starts], force[starts], force[starts] - force[ends]),
         plateau=float(after.mean()) if after.size else math.nan,
-        plateau_deviation=float(after.std()) if after.size else math.nan,
     )  # fmt: skip
 
 
@@ -420,6 +419,7 @@ def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
 
 def noise_of(force: Array) -> float:
     """Return the standard deviation of a reading (step 1)."""
+    # The median of a normal |x| is its deviation over 1.4826.
     second = np.abs(force[:-2] - 2.0 * force[1:-1] + force[2:])
     steps = np.abs(np.diff(force))
     least = ROUND_OFF * float(np.abs(force).max())

@@ -222,7 +222,7 @@ def _plans(
         table = _as_table(name, design, ("tests", "known"), problems)
         given: Any = table.get("tests")
         tests = dict(given) if isinstance(given, Mapping) else {None: given}
-        known = check("known", table.get("known", ()), Names)
+        known = check("known", table.get("known", ()), Names)  # from other measurements
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             problems.append(
                 f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
@@ -298,9 +298,20 @@ def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
 def _present(
     problem: Problem, random: Any, simulation: Simulation, unit: str, error: float
 ) -> Tables:
-    """Return the present measurements, for the fields with the largest posterior mass."""
+    """Return the present measurements, for the fields with the largest posterior mass.
+
+    Specimens of the problem come first. Further tests and the design are for them.
+    """
     if isinstance(random, SpecimenPosterior):
-        tables, mass = random.likelihood, random.grid.mass.sum(axis=(1, 2, 3))
+        if problem != random.problem:
+            raise InputError("problem: must be the problem of the posterior")
+        size, tables = problem.interface.measure, random.likelihood
+        lengths = [size if length is None else length for length in random.peaks.lengths]
+        order = np.argsort(~np.isclose(lengths, size, rtol=1e-9), kind="stable")
+        if not np.isclose(lengths[order[0]], size, rtol=1e-9):
+            raise InputError(f"random: no peaks are of specimens of the problem, {size:g} m")
+        tables = tables.of([tables.peaks[kind] for kind in order], order)
+        mass = random.grid.mass.sum(axis=(1, 2, 3))
     else:
         profiles = profiles_of(random, None, None, simulation.seed)
         if not profiles.levels.size:
@@ -308,6 +319,7 @@ def _present(
         no_peaks = Peaks((None,), (np.zeros(0),), si_of(unit))
         tables = tables_of(problem, profiles, simulation, no_peaks, error)
         mass = np.ones(len(profiles.fields))  # given the profiles, fields are equally likely
+    # Each campaign needs a posterior, whose cost grows with the number of fields.
     order = np.argsort(-mass, kind="stable")[:MAX_FIELDS]
     profiles = tables.profiles
     fields = tuple(profiles.fields[place] for place in order)
@@ -345,6 +357,7 @@ def _widths(
             widths[row, number] = np.ptp(ends, axis=1)
             stresses[row, number] = both.quantile(grid, probability)
             simulation.meter.advance()
+    # Peaks may be forces, and a design is a stress.
     area = tables.onsets[0].area
     low, high = np.quantile(stresses, [0.05, 0.95], axis=1) / area
     both_dims, about = ("design", "parameter"), {"units": "Pa"}

@@ -226,6 +226,8 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
             " standard deviation in the unit of the peaks"
         )
+    # Tests of a single length must be tests of the problem. A posterior from several lengths
+    # holds for any problem.
     (length, *others), size = measured.lengths, problem.interface.measure
     several = bool(others) or problem.interface.is_plane
     if not (several or length is None or math.isclose(length, size)):
@@ -286,14 +288,14 @@ def _of_parameters(
             "peaks: no point of the prior can produce all of them. Widen it, or give"
             " load_cell_error="
         )
-    error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
+    relative_error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
         peaks=measured,
         draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),
         information={name: grid.information(i) for i, name in enumerate(prior.names)},
         log_evidence=grid.log_evidence,
-        monte_carlo_error=error,
-        notes=tuple(_notes(likelihood, error, u)),
+        monte_carlo_error=relative_error,
+        notes=tuple(_notes(likelihood, relative_error, u)),
         likelihood=likelihood,
         u=u,
         seed=simulation.seed,
@@ -328,6 +330,7 @@ def _first_box(likelihood: Likelihood) -> Array:
 
 def _grown(box: Array, u: Array | None) -> Array:
     """Return the box, widened at the ends that draws (draws, parameters) reach (step 5)."""
+    # A box without any likelihood grows on all sides.
     width, touched = np.ptp(box, axis=0), np.ones(box.shape, dtype=np.bool_)
     if u is not None:
         low, high = box[0] + BOX_END_SHARE * width, box[1] - BOX_END_SHARE * width
@@ -339,6 +342,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     """Return the limitations of the posterior."""
     prior = likelihood.prior
     notes = _piled_up(prior, u)
+    # The local criterion may be inaccurate where the posterior lies, not in all of the prior.
     middle = prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(prior, middle, likelihood.method)
     if text := pilot_doubt(experiment, compare([experiment])):
@@ -387,6 +391,7 @@ def _of_specimens(
     }  # fmt: skip
     comparison = None
     if known:
+        # The prediction must not know the peaks with which it is compared.
         nothing = replace(measured, values=tuple(np.empty(0) for _ in measured.values))
         alone = _result(by_profiles, nothing, **common)
         comparison = agreement(alone, measured, seed=simulation.seed)
@@ -416,6 +421,7 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
         raise InputError(
             "random: is a posterior. Give its fit or interfaces, and all peaks together"
         )
+    # A list of interfaces, or draws from any source.
     given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random
     likely = as_random(given)
     if len(likely.factor_laws[0]) > 1:
@@ -445,7 +451,8 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
             f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Check units,"
             " method and surfaces. Until then use the lower force, from peaks or profiles alone"
         )
-    shares = grid.mass.sum(axis=(0, 1, 3))  # equal by the prior
+    # The cells of s have equal prior probability. A prior that the user states is meant.
+    shares = grid.mass.sum(axis=(0, 1, 3))
     usual = profiles.prior.scatter is FactorPrior().scatter
     if usual and math.log(shares.size) - float(entropy(shares)) < LITTLE_INFORMATION:
         notes.append(

@@ -67,13 +67,11 @@ REACH_SPREADS = 2.0
 
 
 class Axis(NamedTuple):
-    """Nodes of one simulated parameter."""
+    """Nodes of one simulated parameter. Interpolation is linear in `scale` of the parameter."""
 
     parameter: int  # place in the prior
     values: Array  # rising
-    scale: Callable[
-        [Array], Array
-    ]  # function of the parameter in which interpolation is linear
+    scale: Callable[[Array], Array]
 
 
 def make_axes(

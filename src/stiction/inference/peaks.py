@@ -1,4 +1,10 @@
-"""Measured peaks, validated and in SI units, with one array for each kind of specimen."""
+"""Measured peaks, validated and in SI units, with one array for each kind of specimen.
+
+`make_peaks` is the door for all kinds of input: numbers with or without a unit, mappings
+from specimen lengths to numbers, tables of pandas, and curves. `read_peaks` reads a file.
+A wrong unit would change a result by a factor of a thousand, so a unit that contradicts
+another unit is refused, and so are peaks that are far from the predictions.
+"""
 
 from __future__ import annotations
 

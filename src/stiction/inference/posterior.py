@@ -225,6 +225,7 @@ class Posterior(Result):
             "posterior_predictive": {name: _in_chains(self._campaigns())},
             "observed_data": {name: measured},
         }
+        # ArviZ compares models by the likelihood of single tests.
         of: Any = {"coords": {"test": np.arange(measured.size)}, "dims": {name: ["test"]}}
         if "InferenceData" in vars(arviz):  # before its version 1
             return arviz.from_dict(**groups, **of)
@@ -232,6 +233,7 @@ class Posterior(Result):
 
     def _campaigns(self) -> Array:
         """For each draw, draw a campaign with the measured number of tests, as (draws, tests)."""
+        # All tests of a campaign share the parameters of their draw.
         parts = [
             self.likelihood.predicted(kind, np.repeat(self.u, peaks.size, axis=0), self.seed)
             for kind, peaks in enumerate(self.peaks.values)

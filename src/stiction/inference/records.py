@@ -1,7 +1,21 @@
 """Records: measured values with gaps, at equal distances on a line or a plane.
 
-The test for white noise in `refuse_uncorrelated` follows Box and Pierce (1970),
-Journal of the American Statistical Association 65, 1509.
+Problem. Profiles come as arrays, labelled data or lists of points. Some have gaps,
+rounded coordinates, outliers or dropouts. Return values on a regular grid, and refuse
+records from which no spectrum can be estimated.
+
+Source. The test for white noise follows Box and Pierce (1970), Journal of the American
+Statistical Association 65, 1509, with a sum in place of a sum of squares.
+
+Steps:
+
+1. Find the spacing of the points: a common divisor of the distances between neighbours,
+   which the printed digits may have rounded.
+2. Place the values on a regular grid. Missing points, and values that were filled, are
+   NaN.
+3. Refuse short, constant and infinite records. Warn about outliers, which are far from
+   the median, and about dropouts, which are far from both neighbours.
+4. Refuse records of white noise (`refuse_uncorrelated`).
 """
 
 from collections.abc import Sequence
@@ -78,7 +92,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         values = np.where(measured, values, np.nan)  # filled values were not measured
     if not places:
         return _of_array(values, interface)
-    # Points in any order, and missing points, find their places on a regular grid.
+    # 1. and 2. Points in any order, and missing points, find their places on a grid.
     index, spacings = [], []
     for dim, at in places.items():
         spacing = _spacing(np.sort(at) if len(places) == 1 else np.unique(at), dim)
@@ -110,7 +124,7 @@ def _of_array(values: Any, interface: Interface | None) -> list[Record]:
 
 
 def _spacing(x: Array, name: str) -> float:
-    """Return the distance (m) between equidistant points in order, or raise an error."""
+    """Return the distance (m) between equidistant points in order, or raise an error (step 1)."""
     if not np.all(np.isfinite(x)) or x.size < 2:
         raise InputError(f"{name}: must be finite and have more than one point")
     steps = np.diff(x)
@@ -132,7 +146,7 @@ def _spacing(x: Array, name: str) -> float:
 
 
 def _checked(record: Record, quantity: str) -> Record:
-    """Refuse a record that cannot be fitted, and warn about outliers."""
+    """Refuse a record that cannot be fitted, and warn about outliers (step 3)."""
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
@@ -163,8 +177,7 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
 
     Take the sum of products v_i v_(i+j) over all lags j up to k, divided by the
     variance. For white noise it has mean 0, and a variance equal to the number of
-    products. (Box and Pierce, 1970, sum squares instead.) The test takes k = 1, 2, 4,
-    ..., and pools records and directions.
+    products. The test takes k = 1, 2, 4, ..., and pools records and directions (step 4).
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     # A short correlation length shows at few lags, and a long length at many.
@@ -185,7 +198,7 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
 
 
 def _doubt_jumps(record: Record) -> None:
-    """Warn about values that differ from both neighbours much more than usual.
+    """Warn about values that differ from both neighbours much more than usual (step 3).
 
     A dropout in a smooth record is far from its neighbours, but may be near the median.
     """
