@@ -68,7 +68,7 @@ def three_properties(**more):
     )
 
 
-@calls("correlations of many samples, tests/exact/test_random_interface.py")
+@calls("correlations of many samples, tests/exact/test_fields.py")
 def three_correlated_properties_with_factors_between_specimens():
     between = {
         "strength": st.Lognormal(mean=1.0, cv=0.12),

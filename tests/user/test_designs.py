@@ -1,0 +1,338 @@
+"""Designs: factors between specimens, what moves a design, uncertain constants, and its page."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.stats
+from joint import FIELD, GIVEN, PROBLEM, RANDOM
+from refusals import refuses
+from scipy.stats import norm
+from setups import EXACT, LOCAL, ensemble
+
+import stiction as st
+from stiction.cli.commands import app
+from stiction.random.equally_likely import drawn_from
+
+FACTOR = st.Lognormal(mean=1.0, cv=0.1)
+PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
+STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), of=None)
+SLIP = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
+
+
+@pytest.mark.parametrize(
+    ("problem", "name", "strength", "method"),
+    [
+        (PROBLEM, "normal_pressure", FIELD, LOCAL),
+        (PRESSED, "pressing_force", FIELD, EXACT),
+        (SLIP, "critical_slip", STRENGTH, EXACT),
+        (PROBLEM, "residual_strength", STRENGTH, EXACT),
+    ],
+)
+def test_a_factor_multiplies_a_constant_of_the_problem(problem, name, strength, method):
+    """Sample by sample the onset is that of a problem with the constant times the factor."""
+    random = st.RandomInterface(strength=strength, between={name: FACTOR})
+    interface = problem.interface
+    found = ensemble(problem, random, 12, method=method, seed=3)
+    factors = next(
+        v for k, v in random.profiles(interface, samples=12, seed=3).items() if k[0] == "b"
+    )
+    profiles = strength.sample(interface, samples=12, seed=3)
+    table, key = {
+        "normal_pressure": ("load", "normal_pressure"),
+        "pressing_force": ("load", "pressing_force"),
+        "critical_slip": ("friction", "critical_slip"),
+        "residual_strength": ("friction", "residual_ratio"),
+    }[name]
+    part = getattr(problem, table)
+    for number in range(12):
+        value = getattr(part, key) * factors[number, 0]
+        changed = dataclasses.replace(
+            problem, **{table: dataclasses.replace(part, **{key: value})}
+        )
+        of = {"friction_coefficient": profiles[number]} if strength.of else profiles[number]
+        exact = st.onset(changed, of, method=method)
+        assert float(found.critical_stress[number]) == pytest.approx(
+            float(exact.critical_stress[0]), rel=1e-9
+        )
+    assert np.std(factors[:, 0]) > 0.03
+
+
+def test_a_design_has_the_scatter_of_the_pressing_force():
+    """With coefficients it is one more factor of the strength; both are counted."""
+    random = st.RandomInterface(
+        strength=FIELD, between={"strength": FACTOR, "pressing_force": FACTOR}
+    )
+    both = st.RandomInterface(
+        strength=FIELD, between={"strength": st.Lognormal(mean=1.0, cv=np.sqrt(1.01**2 - 1.0))}
+    )
+    designs = [
+        st.design_stress(PRESSED, given, probability=1e-2, **GIVEN) for given in (random, both)
+    ]
+    assert "specimens of each sample" in designs[0].reason
+    lows, highs = zip(*(design.interval for design in designs), strict=True)
+    assert max(lows) < min(highs) < 1.03 * max(lows)  # the intervals overlap
+    found = st.failure_probability(PRESSED, random, friction_coefficient=0.14, **GIVEN)
+    alone = st.RandomInterface(strength=FIELD, between={"strength": FACTOR})
+    exact = st.failure_probability(PRESSED, alone, friction_coefficient=0.14, **GIVEN)
+    error = 3.0 * np.hypot(found.cv, exact.cv)
+    assert np.log(found.probability / exact.probability) == pytest.approx(0.0, abs=error)
+
+
+def test_members_may_have_different_factors():
+    likely = [
+        st.RandomInterface(strength=FIELD),
+        st.RandomInterface(strength=FIELD, between={"normal_pressure": FACTOR}),
+    ]
+    found = ensemble(PROBLEM, likely, 40, seed=3)
+    alone = ensemble(PROBLEM, FIELD, 40, seed=3)
+    ratios = (found.critical_stress / alone.critical_stress).values
+    assert 5 < np.sum(ratios == 1.0) < 35
+
+
+PRESSURE = "problem.load.normal_pressure"
+
+
+def test_a_design_is_in_proportion_to_the_pressure():
+    """Stated ends count, the others are 10 % off; common draws make the ratios exact."""
+    families = (st.Lognormal, st.Weibull, st.TruncatedNormal)
+    likely = [
+        dataclasses.replace(RANDOM, between={"strength": kind(mean=1.0, cv=0.12)})
+        for kind in families
+    ]
+    design = st.design_stress(
+        PROBLEM, likely, probability=1e-2, mixture=True, sensitivities=True, **GIVEN
+    )
+    found = design.sensitivities.sel(source=PRESSURE)
+    assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
+    assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
+    stated = {PRESSURE: (4e6, 8e6)}
+    given = GIVEN | {"sensitivities": stated, "probability": 1e-2}
+    wide = st.design_stress(PROBLEM, RANDOM, **given)
+    ends = wide.sensitivities.sel(source=PRESSURE)
+    assert float(ends.stress_at_high / ends.stress_at_low) == pytest.approx(2.0, rel=1e-6)
+    assert wide.sensitivities.source.values[0] == PRESSURE  # the widest
+    # The Weibull family has the heavier lower tail; the answer names both, and what it covers.
+    by = {k: v for k, v in design.sensitivities.attrs.items() if k.startswith("stress by")}
+    assert by["stress by weibull"] < design.stress < by["stress by lognormal"]
+    assert "stress by normal" in by
+    text = str(design)
+    assert "the error of the computation only" in text
+    assert "weibull to lognormal" in text
+    assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
+    refuses(
+        "sensitivities: problem.load.weight: is not a constant",
+        lambda: st.design_stress(
+            PROBLEM, RANDOM, **given | {"sensitivities": {"problem.load.weight": (1, 2)}}
+        ),
+    )
+    plain = st.design_stress(PROBLEM, RANDOM, probability=1e-2, **GIVEN)
+    refuses("has no sensitivities", lambda: st.plot.sensitivities(plain))
+
+
+@pytest.mark.parametrize("several", [False, True], ids=["field", "list"])
+def test_an_uncertain_pressure_is_one_more_factor(several):
+    """The probability is an integral over pressure, factor and 5,000 onsets of the field."""
+    law = scipy.stats.lognorm(0.15, scale=5e6)
+    given = [RANDOM, RANDOM] if several else RANDOM
+    source = st.uncertain(given, {PRESSURE: law})
+    demand = 0.72e6
+    found = st.failure_probability(PROBLEM, source, demand, seed=2, **GIVEN)
+    inner = ensemble(PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"])
+    shares = (np.arange(200) + 0.5) / 200
+    at = demand * 5e6 / law.ppf(shares)[:, None] / inner.critical_stress.values
+    exact = RANDOM.between["strength"].distribution.cdf(at).mean()
+    assert np.log(found.probability / exact) == pytest.approx(0.0, abs=4.0 * found.cv)
+    assert len(source.constants(0)) == 40
+    # Each failing profile has the pressure of its sample.
+    assert np.all(found.failing_profiles.critical_stress < demand)
+
+
+def test_a_coefficient_is_that_of_each_uncertain_pressure():
+    """In proportion to the pressure, so that its scatter does not matter."""
+    uncertain = st.uncertain(RANDOM, {PRESSURE: scipy.stats.lognorm(0.2, scale=5e6)})
+    given = GIVEN | {"friction_coefficient": 0.12, "target_cv": 0.1}
+    known = st.failure_probability(PROBLEM, RANDOM, **given)
+    found = st.failure_probability(PROBLEM, uncertain, **given)
+    error = 4.0 * np.hypot(known.cv, found.cv)
+    assert np.log(found.probability / known.probability) == pytest.approx(0.0, abs=error)
+    state = st.external.limit_state(PROBLEM, uncertain, GIVEN["method"])
+    draws = state.draws(0, 0, 3)
+    onset = st.onset(PROBLEM, {"strength": state.profiles(draws)["strength"]}, method=LOCAL)
+    np.testing.assert_allclose(onset.critical_stress, state(draws), rtol=1e-9)
+
+
+def test_a_study_has_uncertain_constants():
+    table = {"count": 50, PRESSURE: [4e6, 6e6]}
+    study = st.Study(
+        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=20),
+        uncertain=table, reliability={"probability": 1e-2, "target_cv": 0.3},
+    )  # fmt: skip
+    (point,) = study.experiments
+    design = study.reliability.answer(point)
+    ends = design.sensitivities.sel(source=PRESSURE)
+    assert [float(ends.low), float(ends.high)] == pytest.approx([4.1e6, 5.9e6])
+    fixed = dataclasses.replace(study, uncertain=None)
+    stress = study.run(progress=False, pilot=False).critical_stress
+    own = fixed.run(progress=False, pilot=False).critical_stress
+    ratio = (stress / own).values
+    assert 0.8 < ratio.min() < 0.9
+    assert 1.1 < ratio.max() < 1.2
+
+
+def test_members_in_proportion_share_uncertain_values():
+    """As 128 specimens are made of each solved one only where strengths are in proportion."""
+
+    class Source:
+        def interfaces(self, count, seed=0):
+            cvs = np.array([0.12, 0.15, 0.2])[
+                np.random.default_rng(seed).integers(3, size=count)
+            ]
+            marginals = [st.Gamma(mean=0.2 + 1e-5 * n, cv=cv) for n, cv in enumerate(cvs)]
+            return [
+                dataclasses.replace(
+                    RANDOM, strength=dataclasses.replace(RANDOM.strength, marginal=marginal)
+                )
+                for marginal in marginals
+            ]
+
+    laws = {"strength.spectrum.correlation_length": (3e-3, 5e-3), PRESSURE: (4e6, 6e6)}
+    random = drawn_from(st.uncertain(Source(), laws), 200, 0)
+    forms = {}
+    for number, (member, group) in enumerate(zip(random.members, random.groups, strict=True)):
+        field, turn = member.strength, number % len(random.constants)
+        form = field.marginal.cv, field.spectrum.correlation_length, turn
+        assert forms.setdefault(group, form) == form
+    assert 200 / 8 <= len(forms) <= 100
+    moved = drawn_from(st.uncertain(Source(), {"strength.marginal.low": (0.0, 0.01)}), 200, 0)
+    assert np.unique(moved.groups).size == 200
+
+
+def make(**tables):
+    return st.Study(
+        problem=PROBLEM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
+    )  # fmt: skip
+
+
+def test_a_page_of_a_design(tmp_path):
+    """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
+    design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
+    assert design.reliability_index == pytest.approx(-norm.ppf(1e-3))
+    inner = ensemble(
+        PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"]
+    ).critical_stress.values
+    law = RANDOM.between["strength"].distribution
+    levels = np.linspace(0.6e6, 0.9e6, 301)
+    below = [law.cdf(level / inner).mean() for level in levels]
+    # A single interface: the confidence does not count.
+    right = np.interp(0.05, below, levels)
+    assert design.characteristic_stress == pytest.approx(right, rel=0.01)
+    assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
+    source = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
+    evidence = [st.Lognormal(mean=1.0, cv=0.1)]
+    path = st.write_design_page(
+        design, tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
+        title="Lap joint 7",
+    )  # fmt: skip
+    text = path.read_text(encoding="utf-8")
+    for words in (
+        "Lap joint 7", "reliability index", f"{design.partial_factor:.3g}", "drawing 12",
+        "assumed", "Evidence: Lognormal", PRESSURE, "size: A4", "data:image/png",
+    ):  # fmt: skip
+        assert words in text, words
+    assert text.count("certificate 8") == 2  # of both moduli
+    assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
+    refuses(
+        "sources: ... load.weight ... is not an input",
+        lambda: st.write_design_page(
+            design, path, problem=PROBLEM, sources={"load.weight": "scales"}
+        ),
+    )
+    demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
+    refuses(
+        "design: must come from st.design_stress",
+        lambda: st.write_design_page(demand, path, problem=PROBLEM),
+    )
+    # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
+    means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))
+    likely = [
+        st.RandomInterface(
+            strength=st.RandomField(
+                st.Gamma(mean=mean, cv=0.15), RANDOM.strength.spectrum, of="friction_coefficient",
+                mean_mode=True,
+            ),
+            between=RANDOM.between,
+        )
+        for mean in means
+    ]  # fmt: skip
+    bold, careful = (
+        st.design_stress(PROBLEM, likely, probability=1e-2, confidence=share, **GIVEN)
+        for share in (0.5, 0.95)
+    )
+    ratio = careful.characteristic_stress / bold.characteristic_stress
+    assert np.log(ratio) == pytest.approx(-0.05 * norm.ppf(0.95), abs=0.03)
+
+
+def test_the_command_writes_the_page(tmp_path):
+    study = make(random=RANDOM, title="Joint A")
+    study.to_toml(tmp_path / "study.toml")
+    page = tmp_path / "out.html"
+    app(
+        ["reliability", str(tmp_path / "study.toml"), "--page", str(page)],
+        standalone_mode=False,
+    )
+    assert "Joint A" in page.read_text(encoding="utf-8")
+
+
+def test_the_command_makes_constants_uncertain(tmp_path, capsys):
+    """As the table of a study does, to the digit."""
+    table = {PRESSURE: {"low": 4e6, "high": 6e6}, "count": 40}
+    study = make(random=RANDOM)
+    path = tmp_path / "study.toml"
+    study.to_toml(path)
+
+    def command(*lines):
+        options = [word for line in lines for word in ("--uncertain", line)]
+        app(["reliability", str(path), *options], standalone_mode=False)
+        return capsys.readouterr().out
+
+    printed = command(f"{PRESSURE} = [4e6, 6e6]", "count = 40")
+    wanted = dataclasses.replace(study, uncertain=table)
+    assert printed.startswith(str(wanted.reliability.answer(wanted.experiments[0])))
+    refuses("--uncertain: must be a line of TOML", lambda: command(PRESSURE))
+    refuses(
+        "uncertain: problem.load: unknown 'weight'",
+        lambda: command("problem.load.weight = [1, 2]"),
+    )
+
+
+def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeypatch):
+    """The file beside the study holds the same interfaces, and a file of peaks is compared."""
+    monkeypatch.setattr("stiction.study.study.FIRST_MEMBERS", 20)
+    source = st.uncertain(RANDOM, {"strength.marginal.mean": (0.19, 0.21)})
+    refuses("give them as uncertain=", lambda: make(random=source))
+    plain = SimpleNamespace(interfaces=source.interfaces)
+
+    study = make(random=plain, peaks=np.array([0.7, 0.72, 0.9]) * 1e6)
+    study.to_toml(tmp_path / "study.toml")
+    text = (tmp_path / "study.toml").read_text()
+    assert 'random = "study.random.json"' in text
+    again = st.Study.from_toml(tmp_path / "study.toml")
+    assert again.random == source.interfaces(20)
+    np.testing.assert_array_equal(again.peaks.values[0], study.peaks.values[0])
+    assert st.Study.from_dict(again.to_dict()).random == again.random
+    # The same with a file of peaks, in other units, which lie far above the prediction.
+    (tmp_path / "slip.csv").write_text("force [N]\n" + "\n".join(map(str, range(600, 640))))
+    named = 'peaks = "slip.csv"\n' + text.partition("[peaks]")[0]
+    (tmp_path / "named.toml").write_text(named)
+    page = tmp_path / "page.html"
+    options = ["reliability", str(tmp_path / "named.toml"), "--page", str(page)]
+    app(options, standalone_mode=False)
+    assert "40 peaks against the prediction" in capsys.readouterr().out
+    assert "the peaks contradict the prediction, p = 0.001" in page.read_text("utf-8")
+    (tmp_path / "study.random.json").write_text("[{")
+    refuses(
+        "random: ... is not valid JSON", lambda: st.Study.from_toml(tmp_path / "study.toml")
+    )
