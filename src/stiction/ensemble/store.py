@@ -28,7 +28,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -58,16 +58,6 @@ MAX_JSON_BYTES = 64 * 2**20
 
 class Damaged(StoreError):
     """Error for a stored file that is missing or damaged. The message describes the damage."""
-
-
-class Rows(Protocol):
-    """Samples in memory that a store fills."""
-
-    def misfit(self, table: Table) -> str:
-        """Return the reason why a table cannot belong to this study, or ''."""
-
-    def add(self, table: Table) -> None:
-        """Add a table that fits."""
 
 
 class Store:
@@ -116,9 +106,10 @@ class Store:
             _write_json(path / STUDY, study)
         return store
 
-    def read_into(self, rows: Rows) -> None:
+    def read_into(self, rows: Any) -> None:
         """Pass on the intact chunks, and record the defects of damaged chunks in `damage`.
 
+        `rows` accepts tables (`add`), and says why a table does not fit (`misfit`).
         A file that exists but cannot be read may be intact. Such a file raises a
         `StoreError`.
         """
@@ -157,7 +148,7 @@ class Store:
                 raise StoreError(f"{folder / name}: belongs to another study")
             yield name, table
 
-    def resume(self, rows: Rows) -> None:
+    def resume(self, rows: Any) -> None:
         """Pass on the stored samples, warn about different versions, and delete damaged chunks."""
         self.read_into(rows)
         for name, text in self.damage.items():
@@ -215,9 +206,7 @@ def digest(data: bytes) -> str:
 def _check_folder(folder: Path) -> None:
     """Refuse a link in place of the folder of chunks, because files would go to its target."""
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
-        raise InputError(
-            f"{folder}: is not a folder. Remove it, or choose another folder for the run"
-        )
+        raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:

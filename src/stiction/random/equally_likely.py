@@ -107,18 +107,13 @@ class EquallyLikely:
 
     def __post_init__(self) -> None:
         if not self.members:
-            raise InputError(
-                "random: must hold at least one random interface, got an empty list"
-            )
-        kinds = [
-            {name: field.of for name, field in member.properties.items()}
-            for member in self.members
-        ]
-        for number, kind in enumerate(kinds):
-            if kind != kinds[0]:
+            raise InputError("random: needs at least one random interface, got an empty list")
+        first = _named(self.members[0])
+        for number, member in enumerate(self.members):
+            if (named := _named(member)) != first:
                 raise InputError(
                     "random: equally likely interfaces need the same properties, all as stresses or"
-                    f" coefficients: [0] has {_named(kinds[0])}, and [{number}] {_named(kind)}"
+                    f" coefficients: [0] has {first}, and [{number}] {named}"
                 )
 
     @property
@@ -139,19 +134,12 @@ class EquallyLikely:
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
         """Number of the kind of each member. Members with equal fields are of the same kind."""
-        known: dict[Any, int] = {}
-        numbers = [
-            known.setdefault(tuple(member.properties.items()), len(known))
-            for member in self.members
-        ]
-        return np.array(numbers, np.int64)
+        return _numbered([tuple(member.properties.items()) for member in self.members])[1]
 
     @cached_property
     def groups(self) -> NDArray[np.int64]:
         """Number of each member's group. The strengths in a group are proportional."""
-        known: dict[Any, int] = {}
-        forms = [form_of(member.strength) for member in self.members]
-        numbers = np.array([known.setdefault(form, len(known)) for form in forms])
+        _, numbers = _numbered([form_of(member.strength) for member in self.members])
         variants = max(len(self.constants), 1)
         return numbers * variants + np.arange(numbers.size) % variants
 
@@ -163,10 +151,7 @@ class EquallyLikely:
     @cached_property
     def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
         """Distributions of the strength's factor, and each member's number among them."""
-        known: dict[Any, int] = {}
-        laws = [(member.between or {}).get("strength") for member in self.members]
-        numbers = [known.setdefault(law, len(known)) for law in laws]
-        return list(known), np.array(numbers)
+        return _numbered([(member.between or {}).get("strength") for member in self.members])
 
     def factor_column(self, interface: Interface) -> int | None:
         """Return the column of the draw for the strength's factor, or `None`.
@@ -233,7 +218,7 @@ class EquallyLikely:
         return profiles
 
 
-class Columns(NamedTuple):
+class MemberColumns(NamedTuple):
     """Columns that each member uses among the draws of a mixture."""
 
     of: list[NDArray[np.int64]]
@@ -242,7 +227,7 @@ class Columns(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _columns(random: EquallyLikely, interface: Interface) -> Columns:
+def _columns(random: EquallyLikely, interface: Interface) -> MemberColumns:
     # A draw is identified by its stream and its number there, combined in a key.
     keys_of_members = []
     for member in random.members:
@@ -259,11 +244,19 @@ def _columns(random: EquallyLikely, interface: Interface) -> Columns:
         if not drawn[of_member].all():
             covering.append(number)
             drawn[of_member] = True
-    return Columns(columns, drawn.size, covering)
+    return MemberColumns(columns, drawn.size, covering)
 
 
-def _named(kinds: Mapping[str, Any]) -> str:
-    return " and ".join(f"{name} ({of})" if of else name for name, of in kinds.items())
+def _numbered(entries: Sequence[Any]) -> tuple[list[Any], NDArray[np.int64]]:
+    """Return the different entries, and for each entry its number among them."""
+    known: dict[Any, int] = {}
+    numbers = [known.setdefault(entry, len(known)) for entry in entries]
+    return list(known), np.array(numbers, np.int64)
+
+
+def _named(member: RandomInterface) -> str:
+    fields = member.properties.items()
+    return " and ".join(f"{name} ({field.of})" if field.of else name for name, field in fields)
 
 
 def form_of(field: RandomField) -> Any:
@@ -385,9 +378,7 @@ def as_random(
     If `mixture` is true, the list is complete: no other interface is possible.
     """
     if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
-        raise InputError(
-            "mixture: needs a complete list of two or more interfaces. Give one, or leave it out"
-        )
+        raise InputError("mixture: needs a list of all possible interfaces, two or more")
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):

@@ -160,9 +160,7 @@ class RandomField:
         True
         """
         if self.conditions is not None:
-            raise InputError(
-                "profile: the field already has a profile. Combine both into a single profile"
-            )
+            raise InputError("profile: the field already has a profile. Combine both profiles")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.of is not None):
             raise InputError(
@@ -213,8 +211,8 @@ class RandomField:
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
-                f"the grid of {nodes} nodes is coarser than the spectrum: {100.0 * lost:.2g} % of"
-                " the variance lies at wavelengths that it does not resolve. Check the unit of the"
+                f"the grid of {nodes} nodes is coarser than the spectrum: values at nodes are exact,"
+                f" but {100.0 * lost:.2g} % of the variance is not resolved. Check the unit of the"
                 f" length (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
@@ -358,10 +356,8 @@ class RandomInterface:
     def _name_quantity(cls, field: Any, info: ValidationInfo) -> Any:
         """Pass the quantity of a measured profile to the reader of a study file."""
         if info.context is not None and isinstance(field, dict):
-            coefficient = field.get("of") is not None
-            info.context["quantity"] = (
-                "friction_coefficient" if coefficient else info.field_name
-            )
+            of_stress = field.get("of") is None
+            info.context["quantity"] = info.field_name if of_stress else "friction_coefficient"
         return field
 
     @model_validator(mode="after")
@@ -373,9 +369,7 @@ class RandomInterface:
         ]
         scales = [name for name in SCALES if name in self.properties]
         if len(scales) > 1:
-            problems.append(
-                f"give at most one of {', '.join(SCALES)}, got {' and '.join(scales)}"
-            )
+            problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
         correlated, between = self.correlation or {}, self.between or {}
         tables = (
             ("correlation", [*correlated, *chain(*correlated.values())], self.names),
@@ -584,9 +578,7 @@ class RandomInterface:
 def check_draws(draws: Array, dimension: int) -> None:
     """Raise an `InputError` unless draws are finite and have shape (samples, dimension)."""
     if draws.ndim != 2 or draws.shape[1] != dimension:
-        raise InputError(
-            f"draws: must have shape (samples, {dimension}), got shape {draws.shape}"
-        )
+        raise InputError(f"draws: must have shape (samples, {dimension}), got {draws.shape}")
     if not np.isfinite(draws).all():
         raise InputError("draws: must be finite")
 

@@ -107,9 +107,7 @@ class Beta(Marginal):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if not self.low < self.high:
-            raise InputError(
-                f"low must be below high, got low={self.low:g}, high={self.high:g}"
-            )
+            raise InputError(f"low must be below high, got {self.low:g} and {self.high:g}")
         return self
 
     @cached_property
@@ -128,9 +126,7 @@ class _ByMoments(Marginal):
     @model_validator(mode="after")
     def _has_a_distribution(self) -> Self:
         if not self.mean > self.low:
-            raise InputError(
-                f"mean must be above low, got mean={self.mean:g}, low={self.low:g}"
-            )
+            raise InputError(f"mean must be above low, got {self.mean:g} and {self.low:g}")
         hint = (
             "cv: is a standard deviation over a mean, at most 10, got"
             f" {self.cv:g} (for {self.cv:g} % give {self.cv / 100:g})"
@@ -196,9 +192,7 @@ class Weibull(_ByMoments):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
-            raise InputError(
-                f"cv: must lie between 0.001 and 10 as a share of mean - low, got {ratio:g}"
-            )
+            raise InputError(f"cv: must be 0.001 to 10 as a share of mean - low, got {ratio:g}")
 
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)

@@ -91,12 +91,8 @@ def _integrate(
     The tolerance is 1e-12 of `power`, or of each piece if `power` is not known.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
-    options |= {
-        "epsabs": INTEGRAL_RTOL * power,
-        "epsrel": INTEGRAL_RTOL,
-        "limit": 200,
-        "full_output": 1,
-    }
+    options |= {"epsabs": INTEGRAL_RTOL * power, "epsrel": INTEGRAL_RTOL}
+    options |= {"limit": 200, "full_output": 1}  # which silences warnings about the error
 
     def density(k: float) -> float:
         return float(spectrum.density(np.array([k]))[0]) * k**order

@@ -118,17 +118,16 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
     """Return equally likely pressures at a point, Pa."""
     pressure = problem.normal_pressure
     if "normal_pressure" in random.names:
-        levels = _equally_likely(
-            random.properties["normal_pressure"].marginal, PRESSURE_QUANTILES
-        )
+        field = random.properties["normal_pressure"]
+        levels = _equally_likely(field.marginal, PRESSURE_QUANTILES)
         pressure = np.multiply.outer(levels, problem.pressing)
     for key in {"normal_pressure", "pressing_force"} & {*(random.between or {})}:
         factors = _equally_likely((random.between or {})[key], PRESSURE_QUANTILES)
         pressure = np.multiply.outer(factors, pressure)
     flat = np.sort(np.ravel(pressure))
-    return flat[
-        np.linspace(0, flat.size - 1, min(flat.size, PRESSURE_QUANTILES)).round().astype(int)
-    ]
+    # Evenly spaced ranks of the sorted pressures are equally likely, too.
+    ranks = np.linspace(0, flat.size - 1, min(flat.size, PRESSURE_QUANTILES))
+    return flat[ranks.round().astype(int)]
 
 
 def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
@@ -152,9 +151,8 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
     for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
         if name in between:
-            residual = np.outer(
-                residual, _equally_likely(between[name], PRESSURE_QUANTILES) ** power
-            )
+            factors = _equally_likely(between[name], PRESSURE_QUANTILES)
+            residual = np.outer(residual, factors**power)
         if one_sided and name in pressed:
             residual = np.outer(residual, _pressures(problem, random) ** power)
     # 3.

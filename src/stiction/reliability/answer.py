@@ -270,9 +270,8 @@ class Answer(Result):
         else:
             chance = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
             result = f"{chance} c.o.v. {self.cv:.2g}) below {result}"
-        equivalents = [
-            text for name, text in known.items() if math.isfinite(getattr(self, name))
-        ]
+        finite = [name for name in known if math.isfinite(getattr(self, name))]
+        equivalents = [known[name] for name in finite]
         result += f" ({', '.join(equivalents)})" if equivalents else ""
         if bounded(self.lower_bound):
             above = self.stress_above_bound / 1e3
@@ -359,9 +358,7 @@ def prepare(
     state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
-        problems.append(
-            "friction_coefficient: needs load.normal_pressure or load.pressing_force"
-        )
+        problems.append("friction_coefficient: needs load.normal_pressure or pressing_force")
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
     elif algorithm == "two_level" and isinstance(reason := guide_of(state), str):

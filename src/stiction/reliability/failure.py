@@ -304,9 +304,7 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
         # No exact sample fails, so the interval ends at the probability of the guide's level.
         rarest = tail.repetitions[-1].populations[-1]
         interval = 0.0, math.exp(rarest.log_probability)
-        doubts = [
-            f"{tail.short_of('a failure')}. The interval ends at the last level of the first stage"
-        ]
+        doubts = [f"{tail.short_of('a failure')}. The interval ends at the level of the guide"]
     elif not tail.complete:
         # The requested stress is below all samples, so its probability is below the last known.
         there = tail.probability(tail.reached), tail.cv(tail.reached)

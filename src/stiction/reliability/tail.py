@@ -163,11 +163,11 @@ class Tail(NamedTuple):
         parts = self._parts(stress)
         if not parts.any():
             return math.inf
-        pairs = zip(parts, self.repetitions, strict=True)
-        variances = [
-            part * part * descent.relative_variance(stress) for part, descent in pairs if part
-        ]
-        return float(math.sqrt(sum(variances)) / sum(parts))
+        variance = 0.0
+        for part, descent in zip(parts, self.repetitions, strict=True):
+            if part:  # a repetition without a failure has no relative variance
+                variance += part * part * descent.relative_variance(stress)
+        return float(math.sqrt(variance) / sum(parts))
 
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability for each of the equally likely interfaces.
