@@ -605,6 +605,7 @@ class Problem:
         """
         interface, strength = self.interface, profiles["strength"]
         constants = self.constants(strength)
+        # A given profile replaces the value in the problem, so its scale comes first.
         scale = next(name for name in (*profiles, *constants) if name in SCALES)
         known = constants | dict(profiles)
         if known["normal_pressure"] is None:
@@ -613,6 +614,7 @@ class Problem:
             np.broadcast_to(known[name], strength.shape)
             for name in ("residual_strength", "initial_stress", scale, "normal_pressure")
         )
+        # Nodes beyond the extent never break.
         barriers = ~interface.breakable
         if interface.is_held:
             strength = np.where(barriers, np.inf, strength)

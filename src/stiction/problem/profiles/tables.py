@@ -109,6 +109,7 @@ def dataset_of(grid: Grid, table: Table, options: Options) -> xr.Dataset:
             raise InputError(f"record: must be 0 to {blocks[-1]}, got {options.record}")
         chosen = blocks == options.record
         columns, lines, blocks = columns[:, chosen], lines[chosen], blocks[chosen]
+    # 4. Split headings into names and units.
     headed = any({*row.cells} - {"", "-"} for row in table.header)
     headings = _headings(table.header, len(columns))
     for number, (_, about) in enumerate(headings[1:], 1):  # the first may be an index
@@ -173,6 +174,7 @@ def split_at_blanks(line: str, words: set[str]) -> list[str]:
 def numbers_of(grid: Grid, options: Options) -> Table:
     """Return the numbers of a table (steps 1 to 3)."""
     words, separator = options.words, grid.separator
+    # 1. Find the first line of numbers.
     rows = [row for row in grid.rows if any(row.cells)]
     start, numeric = _start(rows, words)
     header, rows = rows[:start], rows[start:]
@@ -187,6 +189,7 @@ def numbers_of(grid: Grid, options: Options) -> Table:
             raise InputError(
                 f"line {row.number} has {len(row.cells)} columns, line {most} has {width}"
             )
+    # Without a line of headings, the last comment may name as many columns as there are.
     if not header and grid.comments and not _SIZE.match(grid.comments[-1]):
         comment = grid.comments[-1]
         at_blanks = split_at_blanks(comment, words)
@@ -197,7 +200,9 @@ def numbers_of(grid: Grid, options: Options) -> Table:
     columns = [list(cells) for cells in zip(*(row.cells[:width] for row in rows), strict=True)]
     if separator == "," and not header and width == 2:
         _check_pairs(columns, rows[0])
+    # 2. Find the decimal mark.
     mark = _decimal_mark(columns, numeric, rows, separator, options.decimal)
+    # 3. Turn cells into numbers. A column may hold words only, or numbers only.
     numbers, texts, mixed = np.empty((width, len(rows))), {}, []
     for column, cells in enumerate(columns):
         values = _numbers(cells, words, mark)
@@ -229,6 +234,7 @@ def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
         raise InputError("holds no numbers")
     numeric = [i for i, cell in enumerate(last.cells) if is_value(cell)]
 
+    # The last line with numbers shows which columns have numbers. A heading has a word there.
     def is_header(row: Row) -> bool:
         cells = [row.cells[i] for i in numeric if i < len(row.cells)]
         return {*row.cells} <= {"", "-"} or any(not is_value(cell, True) for cell in cells)
@@ -273,6 +279,7 @@ def _decimal_mark(
     The number 1.020 means 1.02 in some countries and 1020 in others. Such a file is
     refused unless the caller or a different cell decides.
     """
+    # A cell such as 0.5 or 1.02 shows that its mark stands before decimals.
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
     decimal: set[str] = set()  # marks that stand where a mark of thousands cannot stand
     cells = [(row.number, row.cells[column]) for row in rows for column in numeric]
@@ -349,6 +356,7 @@ def _headings(header: list[Row], width: int) -> list[tuple[str, dict[str, str]]]
             f"line {number} names {len(names)} columns, the numbers below it have {width}. Begin"
             " comment lines with '#', or pass skip= with the number of lines above the headings"
         )
+    # A row below the names may hold the units.
     units = [""] * width
     if len(header) > 1 and len(header[-2].cells) == width and _are_units(names):
         units = [cell.strip("()[]{} ") for cell in names]
