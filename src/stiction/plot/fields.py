@@ -51,7 +51,8 @@ def field(
     profile : array or RandomField
         On a line, an array with shape (nodes,) or (samples, nodes). The first six
         samples are drawn. On a plane, an array with shape (nx, ny) or (samples, nx,
-        ny). The first sample is drawn. A field is drawn as its median with the
+        ny). The first sample is drawn. Units and coordinates are read as in
+        `stiction.onset`. A field is drawn as its median with the
         measured values (`RandomField.given`), and on a line also with its central 90
         % band.
     quantity : str, optional
@@ -179,8 +180,9 @@ def onset(
         or by name.
     strength : array
         tau_p, Pa, with shape (nodes,) or (samples, nodes), or on a plane (nx, ny) or
-        (samples, nx, ny). A DataArray of friction coefficients (unit 1) is multiplied
-        by the normal pressure.
+        (samples, nx, ny). Units and coordinates are read as in `stiction.onset`. A
+        DataArray of friction coefficients (unit 1) is multiplied by the normal
+        pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int

@@ -43,7 +43,7 @@ def specimen(
     problem : Problem
         A problem with a specimen.
     strength : array, optional
-        tau_p, Pa, with shape (nodes,) or (samples, nodes).
+        tau_p, Pa, with shape (nodes,) or (samples, nodes), or with labels and units.
     result : Dataset, optional
         From `stiction.onset` with this strength. The critical patch is marked.
     sample : int
