@@ -74,85 +74,76 @@ def row_start(row: int) -> int:
     return 32 * block * (block + 1) + 8 * (row & 7) * (block + 1)
 
 
+@jit_inside
+def row_slice(row: int, length: int) -> slice:
+    """Return the slice of the flat array that holds the first entries of a row of L."""
+    start = row_start(row)
+    return slice(start, start + length)
+
+
 @jit
 def forward_substitute(factor: Array, first: int, last: int, values: Array) -> None:
     """Solve L x = values in place for the rows first..last-1. Rows before them are solved."""
     for r in range(first, last):
-        start = row_start(r)
-        row = factor[start : start + r + 1]
+        row = factor[row_slice(r, r + 1)]
         values[r] = (values[r] - dot(row, values, r)) / row[r]
+
+
+@jit_inside
+def _solve_two(
+    x: Array, k: int, corner: tuple[float, float, float], u_x: float, v_x: float
+) -> None:
+    """Solve L x = values for the entries k and k + 1, from two rows u and v of L.
+
+    The corner of L holds 1/u_k, v_k and 1/v_k+1. u_x and v_x are the inner products of
+    the rows with the first k entries of x.
+    """
+    x[k] = (x[k] - u_x) * corner[0]
+    x[k + 1] = (x[k + 1] - v_x - corner[1] * x[k]) * corner[2]
 
 
 @jit_inside
 def _forward_substitute_four(factor: Array, n_rows: int) -> None:
     """Solve L x = values in place for four right sides, which are the rows after `n_rows` in L.
 
-    Two columns are processed at a time. Eight running sums keep the processor's
-    vector units busy.
+    Two rows u and v of L are processed at a time. Eight running sums, of each row
+    times each right side, keep the processor's vector units busy.
     """
-    s0 = row_start(n_rows)
-    s1 = row_start(n_rows + 1)
-    s2 = row_start(n_rows + 2)
-    s3 = row_start(n_rows + 3)
-    x0 = factor[s0 : s0 + n_rows]
-    x1 = factor[s1 : s1 + n_rows]
-    x2 = factor[s2 : s2 + n_rows]
-    x3 = factor[s3 : s3 + n_rows]
+    x0 = factor[row_slice(n_rows, n_rows)]
+    x1 = factor[row_slice(n_rows + 1, n_rows)]
+    x2 = factor[row_slice(n_rows + 2, n_rows)]
+    x3 = factor[row_slice(n_rows + 3, n_rows)]
     k = 0
     while k + 1 < n_rows:
-        base = row_start(k)
-        u = factor[base : base + k + 1]
-        base = row_start(k + 1)
-        v = factor[base : base + k + 2]
+        u = factor[row_slice(k, k + 1)]
+        v = factor[row_slice(k + 1, k + 2)]
         vectorised = k - k % LANES
         p0 = p1 = p2 = p3 = zeros()
         q0 = q1 = q2 = q3 = zeros()
         for t in range(0, vectorised, LANES):
-            p = load(u, t)
-            q = load(v, t)
-            y = load(x0, t)
-            p0 = multiply_add(p, y, p0)
-            q0 = multiply_add(q, y, q0)
-            y = load(x1, t)
-            p1 = multiply_add(p, y, p1)
-            q1 = multiply_add(q, y, q1)
-            y = load(x2, t)
-            p2 = multiply_add(p, y, p2)
-            q2 = multiply_add(q, y, q2)
-            y = load(x3, t)
-            p3 = multiply_add(p, y, p3)
-            q3 = multiply_add(q, y, q3)
+            p, q = load(u, t), load(v, t)
+            y0, y1, y2, y3 = load(x0, t), load(x1, t), load(x2, t), load(x3, t)
+            p0, q0 = multiply_add(p, y0, p0), multiply_add(q, y0, q0)
+            p1, q1 = multiply_add(p, y1, p1), multiply_add(q, y1, q1)
+            p2, q2 = multiply_add(p, y2, p2), multiply_add(q, y2, q2)
+            p3, q3 = multiply_add(p, y3, p3), multiply_add(q, y3, q3)
         u0, u1, u2, u3 = totals(p0, p1, p2, p3)
         v0, v1, v2, v3 = totals(q0, q1, q2, q3)
         for t in range(vectorised, k):
-            a = u[t]
-            b = v[t]
-            u0 = multiply_add(a, x0[t], u0)
-            u1 = multiply_add(a, x1[t], u1)
-            u2 = multiply_add(a, x2[t], u2)
-            u3 = multiply_add(a, x3[t], u3)
-            v0 = multiply_add(b, x0[t], v0)
-            v1 = multiply_add(b, x1[t], v1)
-            v2 = multiply_add(b, x2[t], v2)
-            v3 = multiply_add(b, x3[t], v3)
-        inverse = 1.0 / u[k]
-        x0[k] = (x0[k] - u0) * inverse
-        x1[k] = (x1[k] - u1) * inverse
-        x2[k] = (x2[k] - u2) * inverse
-        x3[k] = (x3[k] - u3) * inverse
-        inverse = 1.0 / v[k + 1]
-        x0[k + 1] = (x0[k + 1] - v0 - v[k] * x0[k]) * inverse
-        x1[k + 1] = (x1[k + 1] - v1 - v[k] * x1[k]) * inverse
-        x2[k + 1] = (x2[k + 1] - v2 - v[k] * x2[k]) * inverse
-        x3[k + 1] = (x3[k + 1] - v3 - v[k] * x3[k]) * inverse
+            u0, v0 = multiply_add(u[t], x0[t], u0), multiply_add(v[t], x0[t], v0)
+            u1, v1 = multiply_add(u[t], x1[t], u1), multiply_add(v[t], x1[t], v1)
+            u2, v2 = multiply_add(u[t], x2[t], u2), multiply_add(v[t], x2[t], v2)
+            u3, v3 = multiply_add(u[t], x3[t], u3), multiply_add(v[t], x3[t], v3)
+        corner = 1.0 / u[k], v[k], 1.0 / v[k + 1]
+        _solve_two(x0, k, corner, u0, v0)
+        _solve_two(x1, k, corner, u1, v1)
+        _solve_two(x2, k, corner, u2, v2)
+        _solve_two(x3, k, corner, u3, v3)
         k += 2
-    if k < n_rows:
-        base = row_start(k)
-        u = factor[base : base + k + 1]
-        x0[k] = (x0[k] - dot(u, x0, k)) / u[k]
-        x1[k] = (x1[k] - dot(u, x1, k)) / u[k]
-        x2[k] = (x2[k] - dot(u, x2, k)) / u[k]
-        x3[k] = (x3[k] - dot(u, x3, k)) / u[k]
+    if k < n_rows:  # the last row of an odd number
+        u = factor[row_slice(k, k + 1)]
+        for x in (x0, x1, x2, x3):
+            x[k] = (x[k] - dot(u, x, k)) / u[k]
 
 
 @jit
@@ -165,8 +156,7 @@ def raise_diagonal(
     """
     cosines, sines = rotations[0], rotations[1]
     for r in range(position, n_rows):
-        start = row_start(r)
-        row = factor[start : start + r + 1]
+        row = factor[row_slice(r, r + 1)]
         # The entry of this row in the column a^1/2 e, after the rotations of the
         # rows above.
         added = math.sqrt(amount) if r == position else 0.0
@@ -186,14 +176,10 @@ def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
     i = n_rows
     while i >= 4:
         i -= 4
-        s0 = row_start(i)
-        s1 = row_start(i + 1)
-        s2 = row_start(i + 2)
-        s3 = row_start(i + 3)
-        r0 = factor[s0 : s0 + i + 1]
-        r1 = factor[s1 : s1 + i + 2]
-        r2 = factor[s2 : s2 + i + 3]
-        r3 = factor[s3 : s3 + i + 4]
+        r0 = factor[row_slice(i, i + 1)]
+        r1 = factor[row_slice(i + 1, i + 2)]
+        r2 = factor[row_slice(i + 2, i + 3)]
+        r3 = factor[row_slice(i + 3, i + 4)]
         z3 = values[i + 3] / r3[i + 3]
         z2 = (values[i + 2] - z3 * r3[i + 2]) / r2[i + 2]
         z1 = (values[i + 1] - z3 * r3[i + 1] - z2 * r2[i + 1]) / r1[i + 1]
@@ -209,8 +195,7 @@ def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
             values[t] = multiply_add(-z3, r3[t], reduced)
     while i > 0:
         i -= 1
-        start = row_start(i)
-        row = factor[start : start + i + 1]
+        row = factor[row_slice(i, i + 1)]
         z = values[i] / row[i]
         values[i] = z
         for t in range(i):
@@ -233,12 +218,9 @@ class Workspace(NamedTuple):
     rotations: Array  # (2, n): cosines and sines
     halves: Array  # workspace of products with K
     n_factored: NDArray[np.int64]  # (1,): rows of L that hold for `slipping`
-    n_substituted: NDArray[np.int64]  # (1,): rows for which `Linv_drive` holds
     factored_diagonal: Array  # of A as it is in L, in S
     Linv_p: Array  # L^-1 times the load profile, in S
     Linv_q: Array  # L^-1 times the strength at zero slip, in S
-    Linv_drive: Array  # L^-1 times `substituted_drive`, in S
-    substituted_drive: Array  # drive of the last step of a jump, in S
     margins: Array  # by which `queue` is sorted
     rhs: Array  # a right side
     K_resting: Array  # K times the slip of nodes that slipped and rest
@@ -261,8 +243,8 @@ def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> 
         np.empty(n),
         np.empty((2, n + 4)),
         np.empty((2, n // 2)),
-        *np.zeros((2, 1), dtype=np.int64),
-        *np.zeros((12, n + 4)),
+        np.zeros(1, dtype=np.int64),
+        *np.zeros((10, n + 4)),
     )
 
 
@@ -285,49 +267,39 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
     pivot for the next node in S failed. The row of the failed node, without the
     pivot, then follows the last row in L.
     """
-    factor, slipping, queue = workspace.factor, workspace.slipping, workspace.queue
-    stiffness, diagonal = workspace.stiffness, workspace.diagonal
-    appended = 0
-    while appended < count:
-        group = min(ROWS_APPENDED_TOGETHER, count - appended)
-        for r in range(group):
-            node = queue[appended + r]
-            start = row_start(n_slipping + r)
-            row = factor[start : start + n_slipping]
-            for t in range(n_slipping):
-                row[t] = entry(stiffness, node, slipping[t])
+    factor, slipping, stiffness = workspace.factor, workspace.slipping, workspace.stiffness
+    diagonal = workspace.diagonal
+    n_factored, n_goal = n_slipping, n_slipping + count
+    while n_factored < n_goal:
+        nodes = workspace.queue[n_factored - n_slipping :]
+        group = min(ROWS_APPENDED_TOGETHER, n_goal - n_factored)
+        # The columns of the rows that L had before the group.
+        for r in range(1 if group == 1 else ROWS_APPENDED_TOGETHER):
+            row = factor[row_slice(n_factored + r, n_factored)]
+            for t in range(n_factored):
+                # Rows without a node are zero.
+                row[t] = entry(stiffness, nodes[r], slipping[t]) if r < group else 0.0
         if group == 1:
-            start = row_start(n_slipping)
-            forward_substitute(factor, ZERO, n_slipping, factor[start : start + n_slipping])
+            row = factor[row_slice(n_factored, n_factored)]
+            forward_substitute(factor, ZERO, n_factored, row)
         else:
-            for r in range(group, ROWS_APPENDED_TOGETHER):
-                start = row_start(n_slipping + r)
-                for t in range(n_slipping):
-                    factor[start + t] = 0.0
-            _forward_substitute_four(factor, n_slipping)
+            _forward_substitute_four(factor, n_factored)
         # The columns of the group itself, and the pivots.
-        for r in range(group):
-            node = queue[appended + r]
-            start = row_start(n_slipping + r)
-            row = factor[start : start + n_slipping + r + 1]
-            for k in range(r):
-                start = row_start(n_slipping + k)
-                above = factor[start : start + n_slipping + k + 1]
-                K_jk = entry(stiffness, node, slipping[n_slipping + k])
-                row[n_slipping + k] = (K_jk - dot(above, row, n_slipping + k)) / above[
-                    n_slipping + k
-                ]
-            pivot_squared = diagonal[node] - dot(row, row, n_slipping + r)
-            slipping[n_slipping + r] = node
+        for r in range(n_factored, n_factored + group):
+            node = slipping[r] = nodes[r - n_factored]
+            row = factor[row_slice(r, r + 1)]
+            for k in range(n_factored, r):
+                above = factor[row_slice(k, k + 1)]
+                row[k] = (entry(stiffness, node, slipping[k]) - dot(above, row, k)) / above[k]
+            pivot_squared = diagonal[node] - dot(row, row, r)
             if pivot_squared <= PIVOT_RTOL * diagonal[node]:
-                workspace.n_factored[0] = n_slipping + r
-                return n_slipping + r
-            row[n_slipping + r] = math.sqrt(pivot_squared)
-            workspace.factored_diagonal[n_slipping + r] = diagonal[node]
-        n_slipping += group
-        appended += group
-    workspace.n_factored[0] = n_slipping
-    return n_slipping
+                workspace.n_factored[0] = r
+                return r
+            row[r] = math.sqrt(pivot_squared)
+            workspace.factored_diagonal[r] = diagonal[node]
+        n_factored += group
+    workspace.n_factored[0] = n_factored
+    return n_factored
 
 
 @jit
@@ -336,10 +308,8 @@ def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
     factor, slipping = workspace.factor, workspace.slipping
     cosines, sines = workspace.rotations[0], workspace.rotations[1]
     for r in range(position + 1, n_slipping):
-        start = row_start(r)
-        row = factor[start : start + r + 1]
-        start = row_start(r - 1)
-        new = factor[start : start + r]  # the place of the row above, which has moved already
+        row = factor[row_slice(r, r + 1)]
+        new = factor[row_slice(r - 1, r)]  # the place of the row above, which has moved already
         removed = row[position]
         for k in range(position):
             new[k] = row[k]
@@ -457,6 +427,15 @@ def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) 
 
 
 @jit_inside
+def write_clipped(workspace: Workspace, n_slipping: int, values: Array, field: Array) -> None:
+    """Write values in S, clipped at zero, to a field (n,) that is zero at the other nodes."""
+    for i in range(field.shape[0]):
+        field[i] = 0.0
+    for t in range(n_slipping):
+        field[workspace.slipping[t]] = max(values[t], 0.0)
+
+
+@jit_inside
 def singular_direction(workspace: Workspace, n_factored: int, direction: Array) -> None:
     """Write z = (-A_SS^-1 A_Sj, 1), clipped at zero, after `append` failed at node j.
 
@@ -465,12 +444,9 @@ def singular_direction(workspace: Workspace, n_factored: int, direction: Array) 
     jumps. The entries of z in S, without clipping, are left in `workspace.solution`.
     """
     z = workspace.solution
-    start = row_start(n_factored)
+    failed_row = workspace.factor[row_slice(n_factored, n_factored)]
     for t in range(n_factored):
-        z[t] = -workspace.factor[start + t]
+        z[t] = -failed_row[t]
     back_substitute(workspace.factor, n_factored, z)
-    for i in range(direction.shape[0]):
-        direction[i] = 0.0
-    for t in range(n_factored):
-        direction[workspace.slipping[t]] = max(z[t], 0.0)
+    write_clipped(workspace, n_factored, z, direction)
     direction[workspace.slipping[n_factored]] = 1.0

@@ -52,18 +52,8 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
-from stiction.methods.equilibrium.dense.cholesky import (
-    SlipState,
-    Workspace,
-    append,
-    apply_stiffness_to_resting_slip,
-    back_substitute,
-    factor_slipping,
-    multiply_outside,
-    multiply_slipping,
-    singular_direction,
-    substitute_slipping,
-)
+from stiction.methods.equilibrium.dense import cholesky
+from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
 from stiction.methods.equilibrium.dense.linear_program import (
     queue_overstressed,
     stress_tolerance,
@@ -87,18 +77,19 @@ MAX_ELASTIC_STEPS = 16
 """Elastic steps in a row after which a step 2 follows although nodes keep joining."""
 
 
-class Support(IntEnum):
-    """How strengths support the interface after the overstressed nodes have joined S."""
+class Course(IntEnum):
+    """How a jump continues after a step."""
 
-    RESTING_NODES = 0
-    NONE = 1  # every node slips or has slipped
-    UNKNOWN = 2  # more nodes slip than L has space for
+    GOES_ON = 0
+    SLIDES = 1  # no node is left that can hold the interface
+    RESTS = 2
+    NO_SPACE = 3  # more nodes slip than L has space for
 
 
-class Joined(NamedTuple):
-    """S after the overstressed nodes have joined it."""
+class StepEnd(NamedTuple):
+    """End of a step, after the overstressed nodes have joined S."""
 
-    support: Support
+    course: Course
     n_slipping: int
 
 
@@ -122,20 +113,20 @@ def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
 
 
 @jit_inside
-def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
+def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> StepEnd:
     """Step 3: append the overstressed nodes to S and to the factor of K."""
     workspace = state.workspace
     count = queue_overstressed(state, load, tolerance)
     if count == 0:
-        return Joined(Support.RESTING_NODES, n_slipping)
+        return StepEnd(Course.GOES_ON, n_slipping)
     if n_slipping + count > workspace.max_slipping:
-        return Joined(Support.UNKNOWN, n_slipping)
-    n_factored = append(workspace, n_slipping, count)
+        return StepEnd(Course.NO_SPACE, n_slipping)
+    n_factored = cholesky.append(workspace, n_slipping, count)
     if n_factored < n_slipping + count:  # K is singular on all nodes only
-        return Joined(Support.NONE, n_slipping)
+        return StepEnd(Course.SLIDES, n_slipping)
     for t in range(n_slipping, n_factored):
         workspace.is_slipping[workspace.slipping[t]] = True
-    return Joined(Support.NONE if all_slip(state) else Support.RESTING_NODES, n_factored)
+    return StepEnd(Course.SLIDES if all_slip(state) else Course.GOES_ON, n_factored)
 
 
 @jit_inside
@@ -153,45 +144,32 @@ def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int
 
 
 @jit_inside
-def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: float) -> Joined:
-    """Steps 1 and 3: make an elastic step. The nodes that it overstresses join.
-
-    The rows of L^-1 times the drive are kept for the leading nodes whose drive has
-    not changed since the previous step. At the residual strength, the drive no longer
-    changes.
-    """
+def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: float) -> StepEnd:
+    """Steps 1 and 3: make an elastic step. The nodes that it overstresses join."""
     sample, slip, Kd, workspace, may_stop, _ = state
     solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
-    slipping, substituted_drive = workspace.slipping, workspace.substituted_drive
+    slipping = workspace.slipping
     if may_stop:
-        apply_stiffness_to_resting_slip(state)
+        cholesky.apply_stiffness_to_resting_slip(state)
     while True:
         for t in range(n_slipping):
             i = slipping[t]
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - K_resting[i]
-        n_kept, n_substituted = ZERO, min(workspace.n_substituted[0], n_slipping)
-        while n_kept < n_substituted and drive[slipping[n_kept]] == substituted_drive[n_kept]:
-            n_kept += 1
-        substitute_slipping(workspace, n_kept, n_slipping, drive, workspace.Linv_drive)
-        for t in range(n_slipping):
-            substituted_drive[t] = drive[slipping[t]]
-            solution[t] = workspace.Linv_drive[t]
-        workspace.n_substituted[0] = n_slipping
-        back_substitute(workspace.factor, n_slipping, solution)
+        cholesky.substitute_slipping(workspace, ZERO, n_slipping, drive, solution)
+        cholesky.back_substitute(workspace.factor, n_slipping, solution)
         if not may_stop:
             break
         n_stay = _remove_unloaded(state, n_slipping, tolerance)
         if n_stay == n_slipping:
             break
-        n_slipping = factor_slipping(workspace)
-        workspace.n_substituted[0] = 0
-        apply_stiffness_to_resting_slip(state)
+        n_slipping = cholesky.factor_slipping(workspace)
+        cholesky.apply_stiffness_to_resting_slip(state)
     for t in range(n_slipping):
         i = slipping[t]
         slip[i] = max(slip[i], solution[t])
         solution[t] = slip[i]
         Kd[i] = drive[i]
-    multiply_outside(workspace, n_slipping, solution, Kd)
+    cholesky.multiply_outside(workspace, n_slipping, solution, Kd)
     for i in range(slip.shape[0]):
         Kd[i] += K_resting[i]
     return _join(state, load, n_slipping, tolerance)
@@ -226,33 +204,22 @@ def _write_direction(
     The longest step is 1 if the direction leads to the solution of the linear
     problem, and otherwise infinite.
     """
-    slip, may_stop = state.slip, state.may_stop
     # Leave out nodes that would move back, and solve again, until no such node is
     # left.
     direction, solution = true_pieces.direction, true_pieces.solution
     while True:
-        n_factored = factor_slipping(true_pieces)
+        n_factored = cholesky.factor_slipping(true_pieces)
         if n_factored < n_marked:
-            longest = np.inf
-            singular_direction(true_pieces, n_factored, direction)
-            n_reversed = ZERO
-            if may_stop:
-                n_reversed = _leave_out_reversed(
-                    true_pieces, n_factored, 0.0, NEGATIVE_RATE_RTOL
-                )
+            longest, atol, rtol = np.inf, 0.0, NEGATIVE_RATE_RTOL
+            cholesky.singular_direction(true_pieces, n_factored, direction)
         else:
-            longest = 1.0
-            substitute_slipping(true_pieces, ZERO, n_marked, drive, solution)
-            back_substitute(true_pieces.factor, n_marked, solution)
-            for i in range(slip.shape[0]):
-                direction[i] = 0.0
-            for t in range(n_marked):
-                direction[true_pieces.slipping[t]] = max(solution[t], 0.0)
-            n_reversed = ZERO
-            if may_stop:
-                n_reversed = _leave_out_reversed(
-                    true_pieces, n_marked, MAX_MARGIN_AT_STRENGTH * tolerance, 0.0
-                )
+            longest, atol, rtol = 1.0, MAX_MARGIN_AT_STRENGTH * tolerance, 0.0
+            cholesky.substitute_slipping(true_pieces, ZERO, n_marked, drive, solution)
+            cholesky.back_substitute(true_pieces.factor, n_marked, solution)
+            cholesky.write_clipped(true_pieces, n_marked, solution, direction)
+        if not state.may_stop:
+            return longest
+        n_reversed = _leave_out_reversed(true_pieces, n_factored, atol, rtol)
         if n_reversed == 0:
             return longest
         n_marked -= n_reversed
@@ -261,12 +228,10 @@ def _write_direction(
 @jit_inside
 def _step_with_true_pieces(
     state: SlipState, load: float, true_pieces: Workspace, n_slipping: int, tolerance: float
-) -> Outcome:
-    """Step 2: move slip with the true pieces, and return the outcome.
+) -> StepEnd:
+    """Steps 2 and 3: move slip with the true pieces. The nodes that this overstresses join.
 
-    `true_pieces` is the workspace with the factor of A = K - diag(W). The outcome is ARRESTED if
-    the step ends at the solution of the linear problem, SLIDING if the step is unbounded, otherwise
-    UNDECIDED.
+    `true_pieces` is the workspace with the factor of A = K - diag(W).
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     overload = workspace.rhs
@@ -279,19 +244,22 @@ def _step_with_true_pieces(
     longest = _write_direction(state, true_pieces, n_slipping, overload, tolerance)
     step = step_to_corner(sample, slip, true_pieces.direction, longest)
     if step == np.inf:
-        return Outcome.SLIDING
+        return StepEnd(Course.SLIDES, n_slipping)
     for t in range(n_slipping):
         workspace.solution[t] = slip[workspace.slipping[t]]
-    multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+    cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
     if may_stop:
-        apply_stiffness_to_resting_slip(state)
+        cholesky.apply_stiffness_to_resting_slip(state)
     at_rest = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
         Kd[i] += workspace.K_resting[i]
         if workspace.is_slipping[i] and not true_pieces.is_slipping[i]:  # it was left out
             overload_i = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
             at_rest = at_rest and overload_i <= MAX_MARGIN_AT_STRENGTH * tolerance
-    return Outcome.ARRESTED if at_rest else Outcome.UNDECIDED
+    end = _join(state, load, n_slipping, tolerance)
+    if at_rest and end.course == Course.GOES_ON and end.n_slipping == n_slipping:
+        return StepEnd(Course.RESTS, n_slipping)
+    return end
 
 
 @jit
@@ -314,8 +282,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
         n_marked += workspace.is_slipping[i]
     if n_marked > workspace.max_slipping:
         return Outcome.UNDECIDED
-    n_slipping = factor_slipping(workspace)
-    workspace.n_substituted[0] = 0
+    n_slipping = cholesky.factor_slipping(workspace)
     if n_slipping < n_marked or n_marked == n:
         return Outcome.SLIDING
     steps_in_row = 0
@@ -323,35 +290,27 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     for _ in range(MAX_ELASTIC_STEPS_IN_ALL):
         # 1. and 3.
         n_before = n_slipping
-        joined = _elastic_step(state, load, n_slipping, tolerance)
-        if joined.support == Support.UNKNOWN:
-            return Outcome.UNDECIDED
-        n_slipping = joined.n_slipping
+        course, n_slipping = _elastic_step(state, load, n_slipping, tolerance)
         # 5. Behind a machine slip lowers the load, so the mean strength does not decide.
         dead_load = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
-        if joined.support == Support.NONE or (dead_load and unsupported(sample, load, slip)):
-            return Outcome.SLIDING
         run, n_corners = _residual_runs(sample, slip)
-        if run >= unstoppable:
+        slides = run >= unstoppable or (dead_load and unsupported(sample, load, slip))
+        if course == Course.GOES_ON and slides:
             return Outcome.SLIDING
         # 4.
         steps_in_row += 1
         progress = n_slipping > n_before or n_corners > n_corners_before
         n_corners_before = n_corners
-        if progress and steps_in_row < MAX_ELASTIC_STEPS:
-            continue
-        steps_in_row = 0
-        # 2. and 3.
-        n_before = n_slipping
-        outcome = _step_with_true_pieces(state, load, true_pieces, n_slipping, tolerance)
-        if outcome == Outcome.SLIDING:
+        if course == Course.GOES_ON and not (progress and steps_in_row < MAX_ELASTIC_STEPS):
+            # 2. and 3.
+            steps_in_row = 0
+            course, n_slipping = _step_with_true_pieces(
+                state, load, true_pieces, n_slipping, tolerance
+            )
+        if course == Course.SLIDES:
             return Outcome.SLIDING
-        joined = _join(state, load, n_slipping, tolerance)
-        if joined.support == Support.UNKNOWN:
-            return Outcome.UNDECIDED
-        if joined.support == Support.NONE:
-            return Outcome.SLIDING
-        n_slipping = joined.n_slipping
-        if outcome == Outcome.ARRESTED and n_slipping == n_before:
+        if course == Course.RESTS:
             return Outcome.ARRESTED
+        if course == Course.NO_SPACE:
+            break
     return Outcome.UNDECIDED

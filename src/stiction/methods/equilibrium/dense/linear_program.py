@@ -46,16 +46,8 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import apply, entry
-from stiction.methods.equilibrium.dense.cholesky import (
-    SlipState,
-    Workspace,
-    append,
-    back_substitute,
-    multiply_slipping,
-    singular_direction,
-    solve_slip,
-    substitute_slipping,
-)
+from stiction.methods.equilibrium.dense import cholesky
+from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
 from stiction.methods.equilibrium.sample import StaticSample, strength_at
 
 OVERSTRESS_RTOL = 1e-12
@@ -120,8 +112,8 @@ def stress_tolerance(sample: StaticSample, load: float) -> float:
 @jit_inside
 def _solve(state: SlipState, load: float, n_slipping: int) -> None:
     """Write the slip in S at a load to `workspace.solution`. Also write K d."""
-    solve_slip(state.workspace, n_slipping, load, state.workspace.solution)
-    multiply_slipping(state.workspace, n_slipping, state.workspace.solution, state.Kd)
+    cholesky.solve_slip(state.workspace, n_slipping, load, state.workspace.solution)
+    cholesky.multiply_slipping(state.workspace, n_slipping, state.workspace.solution, state.Kd)
 
 
 @jit_inside
@@ -137,8 +129,8 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
     v, Kv = workspace.solution, workspace.Kv
     for t in range(n_slipping):
         v[t] = workspace.Linv_p[t]
-    back_substitute(workspace.factor, n_slipping, v)
-    multiply_slipping(workspace, n_slipping, v, Kv)
+    cholesky.back_substitute(workspace.factor, n_slipping, v)
+    cholesky.multiply_slipping(workspace, n_slipping, v, Kv)
     step = 0.0
     for i in range(Kd.shape[0]):
         margin = sample.excess[i] - load * sample.profile[i] + Kd[i]
@@ -164,7 +156,7 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
         for t in range(n_forward, n_slipping):
             workspace.is_slipping[workspace.slipping[t]] = False
         n_slipping = n_forward
-        solve_slip(workspace, n_slipping, load, slip)
+        cholesky.solve_slip(workspace, n_slipping, load, slip)
     return n_slipping
 
 
@@ -175,7 +167,7 @@ def _cut(
     """Step 3: return the load of the cut and the new bound. Write the multiplier of the bound."""
     sample, _, _, workspace, _, _ = state
     y = workspace.direction
-    singular_direction(workspace, n_factored, y)
+    cholesky.singular_direction(workspace, n_factored, y)
     excess_y = 0.0
     p_y = 0.0
     for t in range(n_factored + 1):
@@ -235,9 +227,13 @@ def solve_program(
         if n_slipping + count > workspace.max_slipping:
             break
         n_before = n_slipping
-        n_slipping = append(workspace, n_slipping, count)
-        substitute_slipping(workspace, n_before, n_slipping, sample.profile, workspace.Linv_p)
-        substitute_slipping(workspace, n_before, n_slipping, sample.excess, workspace.Linv_q)
+        n_slipping = cholesky.append(workspace, n_slipping, count)
+        cholesky.substitute_slipping(
+            workspace, n_before, n_slipping, sample.profile, workspace.Linv_p
+        )
+        cholesky.substitute_slipping(
+            workspace, n_before, n_slipping, sample.excess, workspace.Linv_q
+        )
         for t in range(n_before, n_slipping):
             is_slipping[slipping[t]] = True
         if n_slipping == n_before + count:  # 2.
@@ -247,9 +243,9 @@ def solve_program(
         cut, bound = _cut(state, n_slipping, bound, multiplier)
         by_round_off_only = cut >= load - tolerance
         load = min(load, bound)
-        solve_slip(workspace, n_slipping, load, workspace.solution)
+        cholesky.solve_slip(workspace, n_slipping, load, workspace.solution)
         n_slipping = _remove_reversed(workspace, n_slipping, load)
-        multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+        cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
         if by_round_off_only:
             solved = True
             _back_off(state, load, n_slipping)

@@ -66,21 +66,8 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit_allocating, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
-from stiction.methods.equilibrium.dense.cholesky import (
-    SlipState,
-    Workspace,
-    append,
-    apply_stiffness_to_resting_slip,
-    back_substitute,
-    factor_slipping,
-    multiply_outside,
-    multiply_slipping,
-    raise_diagonal,
-    remove,
-    singular_direction,
-    solve_slip,
-    substitute_slipping,
-)
+from stiction.methods.equilibrium.dense import cholesky
+from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
 from stiction.methods.equilibrium.sample import PathStatus, piece_at, start_of, strength_at
 
@@ -158,8 +145,10 @@ def _substitute(state: SlipState, q: Array, first: int, n_slipping: int) -> None
     for t in range(first, n_slipping):
         i = workspace.slipping[t]
         workspace.rhs[i] = q[i] + workspace.K_resting[i]
-    substitute_slipping(workspace, first, n_slipping, state.sample.profile, workspace.Linv_p)
-    substitute_slipping(workspace, first, n_slipping, workspace.rhs, workspace.Linv_q)
+    cholesky.substitute_slipping(
+        workspace, first, n_slipping, state.sample.profile, workspace.Linv_p
+    )
+    cholesky.substitute_slipping(workspace, first, n_slipping, workspace.rhs, workspace.Linv_q)
 
 
 @jit_inside
@@ -205,8 +194,8 @@ def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> i
     node = workspace.slipping[position]
     workspace.is_slipping[node] = False
     v_nodes[node] = 0.0
-    n_slipping = remove(workspace, n_slipping, position)
-    apply_stiffness_to_resting_slip(state)
+    n_slipping = cholesky.remove(workspace, n_slipping, position)
+    cholesky.apply_stiffness_to_resting_slip(state)
     return n_slipping
 
 
@@ -215,7 +204,7 @@ def _solve_v(workspace: Workspace, n_slipping: int) -> None:
     """Step 2: write the solution v of (2) to `workspace.v`."""
     for t in range(n_slipping):
         workspace.v[t] = workspace.Linv_p[t]
-    back_substitute(workspace.factor, n_slipping, workspace.v)
+    cholesky.back_substitute(workspace.factor, n_slipping, workspace.v)
 
 
 @jit_inside
@@ -247,8 +236,8 @@ def _stop_unloaded(
 def _refresh(state: SlipState, load: float, n_slipping: int) -> None:
     """Compute slip and K d again from the factor."""
     _, slip, Kd, workspace, _, _ = state
-    solve_slip(workspace, n_slipping, load, workspace.solution)
-    multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
+    cholesky.solve_slip(workspace, n_slipping, load, workspace.solution)
+    cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
     for t in range(n_slipping):
         slip[workspace.slipping[t]] = max(workspace.solution[t], 0.0)
     for i in range(slip.shape[0]):
@@ -291,7 +280,7 @@ def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: 
     Returns the position in S of the node whose rate reaches zero, or NOBODY if z is unbounded.
     """
     workspace = state.workspace
-    singular_direction(workspace, n_factored, direction)
+    cholesky.singular_direction(workspace, n_factored, direction)
     if not state.may_stop:
         return NOBODY
     # `direction` is z clipped at zero, by node. z itself is left in `solution`,
@@ -316,7 +305,7 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
     for i in range(v_nodes.shape[0]):
         if not is_slipping[i]:
             v_nodes[i] = 0.0
-    apply_stiffness_to_resting_slip(state)
+    cholesky.apply_stiffness_to_resting_slip(state)
 
 
 @jit_inside
@@ -346,14 +335,16 @@ def _pass_corner(
     W = pieces.slopes[piece[i]] * sample.weakening_rate[i]
     workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
     if W_before >= W:
-        raise_diagonal(workspace.factor, n_slipping, corner, W_before - W, workspace.rotations)
+        cholesky.raise_diagonal(
+            workspace.factor, n_slipping, corner, W_before - W, workspace.rotations
+        )
         workspace.factored_diagonal[corner] = workspace.diagonal[i]
         return n_slipping
     # The node weakens more steeply: compute L again from its row on. `append`
     # reads the queue.
     for t in range(corner, n_slipping):
         workspace.queue[t - corner] = workspace.slipping[t]
-    return append(workspace, corner, n_slipping - corner)
+    return cholesky.append(workspace, corner, n_slipping - corner)
 
 
 @jit_inside
@@ -366,7 +357,7 @@ def _start(
     some_stopped = False
     while True:
         workspace.queue[0] = node  # `append` reads it
-        if append(workspace, n_slipping, ONE) > n_slipping:
+        if cholesky.append(workspace, n_slipping, ONE) > n_slipping:
             break
         bounding = _move_along_z(state, n_slipping, v_nodes, direction)
         if bounding == NOBODY:
@@ -376,7 +367,7 @@ def _start(
         some_stopped = True
     workspace.is_slipping[node] = True
     if state.slip[node] > 0.0:  # it rested after slip
-        apply_stiffness_to_resting_slip(state)
+        cholesky.apply_stiffness_to_resting_slip(state)
         first_changed = ZERO
     return Start(True, n_slipping + 1, first_changed, some_stopped)
 
@@ -416,7 +407,7 @@ def follow_stable_path(
         return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
     for i in range(n):
         workspace.K_resting[i] = 0.0
-    n_slipping = factor_slipping(workspace)
+    n_slipping = cholesky.factor_slipping(workspace)
     some_left = False  # whether nodes left S for want of a row in L, since the load last rose
     if n_slipping < n_marked:
         if _move_along_z(state, n_slipping, v_nodes, direction) == NOBODY:
@@ -424,7 +415,7 @@ def follow_stable_path(
         _keep_factored(state, n_slipping, v_nodes)
         some_left = True
     elif stopped:
-        apply_stiffness_to_resting_slip(state)
+        cholesky.apply_stiffness_to_resting_slip(state)
     first_changed = ZERO
 
     # Each node passes each corner once, and starts once unless nodes stop.
@@ -441,7 +432,7 @@ def follow_stable_path(
             i = workspace.slipping[t]
             W = entry(workspace.stiffness, i, i) - workspace.diagonal[i]
             Kv[i] = sample.profile[i] + W * v[t]
-        multiply_outside(workspace, n_slipping, v, Kv)
+        cholesky.multiply_outside(workspace, n_slipping, v, Kv)
         if event_number % EVENTS_PER_REFRESH == 0:
             _refresh(state, load, n_slipping)  # safe here: S and L match until the event
 
