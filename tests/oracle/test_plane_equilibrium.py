@@ -50,11 +50,11 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     given = (field.ravel() for field in (weakening_rate, strength, profile))
     exact, _, multiplier = by_linear_programme(dense(plane.symbol(shape), shape), *given)
     found = plane_onset(plane, strength, profile, weakening_rate, gap=1e-9)
-    assert found.closed
+    assert found.closed(1e-9)
     assert found.lower <= exact * (1.0 + 1e-12)  # round-off of either programme
     assert found.upper >= exact * (1.0 - 1e-12)
     assert found.lower == pytest.approx(exact, rel=1e-9)
-    error = np.abs(found.multiplier - multiplier.reshape(shape)).max()
+    error = np.abs(found.multiplier - multiplier).max()
     assert error < 1e-6 * multiplier.max()
 
 

@@ -11,6 +11,7 @@ Algorithm
    within round-off of sliding.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,19 @@ from stiction.methods.equilibrium.events import (
     event_variables,
     travel_of,
 )
-from stiction.methods.equilibrium.sample import at_rest, sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_program, warn_of_signs
+from stiction.methods.equilibrium.sample import (
+    EquilibriumState,
+    Program,
+    StaticSample,
+    at_rest,
+    sample_of,
+)
+from stiction.methods.equilibrium.solver import (
+    SamplePath,
+    follow_to_sliding,
+    make_program,
+    warn_of_signs,
+)
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 
@@ -56,6 +68,32 @@ def _check_loads(loads: Any) -> Array:
             f"loads: must be finite, not negative, and rise, got {describe(given.tolist())}"
         )
     return given
+
+
+def _states_at(
+    program: Program, sample: StaticSample, path: SamplePath, loads: Array
+) -> Iterator[EquilibriumState]:
+    """Yield the equilibrium at each of the rising loads, until the interface slides."""
+    events = path.all_events
+    starts = [at_rest(sample), *(event.after for event in events)]
+    state = starts[0]
+    for load in map(float, loads):
+        # An interface that ends still creeps after the event in which it slides.
+        if load > path.last.load and path.sliding is None:
+            return
+        # 2.
+        n_passed = sum(event.before.load < load for event in events)
+        state = max(starts[n_passed], state, key=lambda start: start.load)
+        # 3.
+        reached = program.at(sample, state, load)
+        if reached is None and n_passed < len(events):
+            about_to_jump = events[n_passed].before
+            if load > (1.0 - LOAD_RTOL) * about_to_jump.load:
+                reached = about_to_jump
+        if reached is None:
+            return
+        state = reached
+        yield state
 
 
 def equilibrium_path(
@@ -152,36 +190,24 @@ def equilibrium_path(
     program = make_program(problem) if method is None else method.program(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, program.pieces, 0)
-    path = follow_to_sliding(program, sample, to_rest=True)  # 1.
-    passed, end, known = path.all_events, path.last.load, path.known
+    # 1.
+    path = follow_to_sliding(program, sample, to_rest=True)
+    events, end = path.all_events, path.last.load
+    n_events = np.searchsorted([event.before.load for event in events], given)
+    # After sliding there is no state, and values stay NaN.
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
-    at = np.array([event.before.load for event in passed])
-    events = (at[None, :] < given[:, None]).sum(axis=1)
-    sliding = given > end
-    state = at_rest(sample)
-    for i, load in enumerate(
-        map(float, given if path.sliding is not None else given[~sliding])
-    ):
-        if events[i]:  # 2.
-            after = passed[events[i] - 1].after
-            state = max(after, state, key=lambda reached: reached.load)
-        state_there = program.at(sample, state, load)  # 3.
-        next_event = passed[events[i]].before if events[i] < len(passed) else None
-        is_at_event = next_event is not None and load > (1.0 - LOAD_RTOL) * next_event.load
-        if state_there is None and is_at_event:
-            state_there = next_event
-        if state_there is None:
-            sliding[i:] = True
-            break
-        state = state_there
+    sliding = np.ones(given.size, dtype=np.bool_)
+    for i, state in enumerate(_states_at(program, sample, path, given)):
+        load = float(given[i])
+        sliding[i] = load > end
         slip[i] = state.slip
         released = program.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
         if problem.specimen is not None:
             travel[i] = travel_of(problem, load, state.slip)
             far[i] = travel[i] + elongation_of(problem, stress[i].mean())
-    if not known and sliding.any():
+    if not path.known and sliding.any():
         warn_accuracy(
             f"no equilibrium was found beyond {end:g} Pa, but sliding was not proved either: the"
             " path ends at this load"
@@ -191,11 +217,11 @@ def equilibrium_path(
         "slip": slip.reshape(wide),
         "stress": stress.reshape(wide),
         "mean_stress": interface.mean(stress.reshape(wide)),
-        "arrested_events": np.minimum(events, len(path.events)),
+        "arrested_events": np.minimum(n_events, len(path.events)),
         "sliding": sliding,
     }
     of_events = event_variables(interface, inertia=method is not None)
-    values |= event_table(problem, rows, 0, passed, of_events)
+    values |= event_table(problem, rows, 0, events, of_events)
     variables = VARIABLES | of_events
     variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     if interface.is_free:
@@ -204,6 +230,6 @@ def equilibrium_path(
     if problem.area is not None:
         values |= forces(values, problem.area)
         variables |= force_variables(variables)
-    coordinates = {"load": (given, LOAD), "event": (np.arange(len(passed)), EVENT)}
+    coordinates = {"load": (given, LOAD), "event": (np.arange(len(events)), EVENT)}
     attributes = study_attributes(problem=problem, **({"method": method} if method else {}))
     return to_dataset(values, variables, coordinates, attributes, interface)

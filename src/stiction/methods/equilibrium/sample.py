@@ -262,6 +262,12 @@ def exceeds(sample: StaticSample, slip: Array, piece: NDArray[np.int64] | None =
     return bool(beyond.any()) and bool((beyond & (sample.critical > 0.0)).any())
 
 
+def all_breakable_slip(sample: StaticSample, slip: Array) -> bool:
+    """Return whether the interface ends, and every node that can break slips."""
+    can_break = np.isfinite(sample.excess)
+    return not can_break.all() and bool((slip[can_break] > 0.0).all())
+
+
 @jit_inside
 def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
     """Return the piece on which a node with a given d_c is after some slip."""

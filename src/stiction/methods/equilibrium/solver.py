@@ -26,6 +26,7 @@ from stiction.methods.equilibrium.sample import (
     PathStatus,
     Program,
     StaticSample,
+    all_breakable_slip,
     make_sample,
     multiplier_of,
     present_pieces,
@@ -91,8 +92,7 @@ def follow_to_sliding(
     further. An interface that ends slides as soon as every node that can break slips. Pass
     `to_rest` to follow this last event until it stops.
     """
-    can_break = np.isfinite(sample.excess)
-    ends, sliding = not can_break.all(), None
+    ends, sliding = not np.isfinite(sample.excess).all(), None
     first: EquilibriumState | None = None
     events: list[ArrestedEvent] = []
     outcome, arrival = Outcome.NOT_UNSTABLE, None
@@ -108,7 +108,7 @@ def follow_to_sliding(
         slides = outcome in (Outcome.SLIDING, Outcome.UNDECIDED)
         if outcome == Outcome.ARRESTED:  # 4.
             events.append(ArrestedEvent(state, jump.state, jump.timed))
-            slides = ends and bool((jump.state.slip[can_break] > 0.0).all())
+            slides = all_breakable_slip(sample, jump.state.slip)
         if slides:
             arrival = jump.arrival
             break

@@ -49,14 +49,11 @@ MAX_PIECE_REVISIONS = 20
 
 
 class Turn(NamedTuple):
-    """Load (Pa) and slip (m) at a turn of a path, and its direction y with <p, y> = 1.
+    """Turn of a path, or its state at the target if the path goes on."""
 
-    The direction is zero if the path goes on.
-    """
-
-    load: float
-    slip: Array
-    direction: Array
+    load: float  # Pa
+    slip: Array  # m
+    direction: Array | None  # y, in which slip jumps, with <p, y> = 1; None if the path goes on
 
 
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
@@ -116,7 +113,7 @@ def follow_to_turn(
         step = min(float(rise[node]), target - load)
         load, slip = load + step, slip + step * v
         if load >= target:
-            return Turn(load, slip, np.zeros_like(slip))
+            return Turn(load, slip, None)
         unit = np.zeros_like(slip)
         unit[node] = 1.0
         if inside[node]:  # 3.

@@ -24,7 +24,6 @@
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -37,6 +36,7 @@ from stiction.methods.equilibrium.sample import (
     Outcome,
     PathStatus,
     StaticSample,
+    all_breakable_slip,
     at_rest,
     exceeds,
     multiplier_of,
@@ -112,18 +112,9 @@ def halved_strength(fine: Array) -> Array:
     return np.divide(coarse, weight, out=np.full(even.shape, np.inf), where=even)
 
 
-class PlaneOnset(NamedTuple):
-    """Onset of a sample: rigorous bounds of the load and their proofs.
-
-    The bounds are loads (Pa). Slip (m) and multiplier, with shape (*shape), prove the
-    bounds. `closed` states whether the bounds are as close as required.
-    """
-
-    lower: float
-    upper: float
-    slip: Array
-    multiplier: Array
-    closed: bool
+def _refined(coarse: Array, shape: tuple[int, ...]) -> Array:
+    """Return a flat field on the next finer grid, which has a given shape."""
+    return doubled(coarse.reshape([nodes // 2 for nodes in shape])).flatten()
 
 
 def _narrow(bracket: Bracket, gap: float) -> float:
@@ -152,15 +143,15 @@ def plane_onset(
     gap: float = 1e-6,
     slip: Array | None = None,
     corner: Array | None = None,
-) -> PlaneOnset:
-    """Return the largest load that has an equilibrium before a node reaches a corner of its law.
+) -> Bracket:
+    """Bracket the largest load with an equilibrium before a node reaches a corner of its law.
 
     All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength
     minus the initial stress (Pa). `profile` is the load profile p > 0. `W` is the
     weakening rate (Pa/m, zero at residual nodes). `slip` (m) belongs to an equilibrium at a
     lower load, from which the search starts instead of coarse grids. `corner` is the slip
     at the next corner (m, 0 without a corner). The search stops when the bounds agree to a
-    relative `gap`. If a node of a coarse grid slips beyond its corner, the onset of this
+    relative `gap`. If a node of a coarse grid slips beyond its corner, the bracket of this
     grid is returned.
     """
     # 1.
@@ -180,39 +171,35 @@ def plane_onset(
         grids.append((halved_strength(strength), *map(halved, fine)))
     coarser: Bracket | None = None
     bend = 0.0
-    for number in range(len(grids) - 1, -1, -1):
-        goal = gap if number == 0 else max(COARSE_GAP, gap)
+    while True:
         strength, load_profile, weakening, end = grids.pop()
-        symbol = half_spaces.symbol(strength.shape)
-        coarse_shape = tuple(nodes // 2 for nodes in strength.shape)
-        lifting = None
-        if coarser is not None:
-            lifting = doubled(coarser.lifting[0].reshape(coarse_shape)).flatten()
+        is_finest, shape = not grids, strength.shape
+        goal = gap if is_finest else max(COARSE_GAP, gap)
+        lifting = None if coarser is None else _refined(coarser.lifting[0], shape)
         try:
-            bracket = Bracket(symbol, weakening, strength, load_profile, lifting)
+            bracket = Bracket(
+                half_spaces.symbol(shape), weakening, strength, load_profile, lifting
+            )
         except TooSmallError:  # on a coarse grid a small extent may be smaller
-            if number == 0:
+            if is_finest:
                 raise
             continue
         if slip is not None:
             bracket.raise_slip(slip.flatten())
         closed = False
         if coarser is not None:  # 3.
-            guess = doubled(coarser.slip.reshape(coarse_shape)).flatten()
-            phi = doubled(coarser.multiplier.reshape(coarse_shape)).flatten()
+            guess, phi = (
+                _refined(field, shape) for field in (coarser.slip, coarser.multiplier)
+            )
             guess, phi = np.where(bracket.can_break, (guess, phi), 0.0)
             phi *= 1.0 / np.sqrt((phi**2).sum())
             closed, bend = close(bracket, phi, coarser.lower, guess, goal, bend)
         if not closed:  # 2.
             bend = _narrow(bracket, goal)
-        coarser = bracket
         end = end.reshape(-1)
-        if number > 0 and ((bracket.slip > end) & (end > 0.0)).any():
-            break
-    return PlaneOnset(
-        bracket.lower, bracket.upper, bracket.slip.reshape(strength.shape),
-        bracket.multiplier.reshape(strength.shape), bracket.closed(gap),
-    )  # fmt: skip
+        if is_finest or ((bracket.slip > end) & (end > 0.0)).any():
+            return bracket
+        coarser = bracket
 
 
 class PlaneProgram:
@@ -232,7 +219,7 @@ class PlaneProgram:
             self.shape,
         )
 
-    def _onset(self, sample: StaticSample, corner: Array) -> PlaneOnset:
+    def _onset(self, sample: StaticSample, corner: Array) -> Bracket:
         """Return the onset without corners, or on a coarse grid on which a node passes a corner."""
         fields = (sample.excess, sample.profile, sample.weakening_rate, corner)
         excess, profile, W, corner = (field.reshape(self.shape) for field in fields)
@@ -258,12 +245,11 @@ class PlaneProgram:
             if exceeds(sample, turn.slip):
                 return turn
             onset = self._onset(sample, np.zeros_like(sample.excess))
-        slip, multiplier = onset.slip.reshape(-1), onset.multiplier.reshape(-1)
-        if exceeds(sample, slip):
+        if exceeds(sample, onset.slip):
             return self._follow_from_rest(sample, onset)
-        return EquilibriumState(onset.lower, slip, multiplier, gap=onset.upper - onset.lower)
+        return EquilibriumState(onset.lower, onset.slip, onset.multiplier, gap=onset.gap)
 
-    def _follow_from_rest(self, sample: StaticSample, onset: PlaneOnset) -> EquilibriumState:
+    def _follow_from_rest(self, sample: StaticSample, onset: Bracket) -> EquilibriumState:
         """Follow the path from rest, at first most of the way to the onset without corners."""
         rest = at_rest(sample)
         step = max(
@@ -282,9 +268,7 @@ class PlaneProgram:
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
         passed = [(load, slip)]
-        can_break = np.isfinite(sample.excess)
-        ends = not can_break.all()
-        while not (ends and (slip[can_break] > 0.0).all()):
+        while not all_breakable_slip(sample, slip):
             accuracy = max(0.1 * gap, min(STEP_RESIDUAL * step / abs(load), MAX_STEP_RESIDUAL))
             guess = slip
             if len(passed) > 1:
@@ -292,8 +276,8 @@ class PlaneProgram:
                 steps_ahead = min(step / (load - load_before), MAX_EXTRAPOLATION)
                 guess = slip + steps_ahead * (slip - slip_before)
             end = stable_equilibrium(operator, sample, load + step, slip, accuracy, guess)
-            all_slip = ends and end is not None and bool((end[can_break] > 0.0).all())
-            if (end is None or all_slip) and step > gap * abs(load):
+            too_far = end is None or all_breakable_slip(sample, end)
+            if too_far and step > gap * abs(load):
                 # The last step is below the gap.
                 step = max(STEP_FACTOR_IF_FAILED * step, 0.7 * gap * load)
                 continue
@@ -303,7 +287,7 @@ class PlaneProgram:
                 if turn is None:
                     direction = slip - passed[0][1]
                     return EquilibriumState(load, slip, direction, gap=step, certified=False)
-                if turn.direction.any():
+                if turn.direction is not None:
                     return EquilibriumState(
                         turn.load, turn.slip, turn.direction, gap=load_beyond - turn.load,
                         certified=False, multiplier=turn.direction,
@@ -348,7 +332,7 @@ class PlaneProgram:
         for retreat in START_RETREATS if state.certified else ():
             load = state.load - retreat * abs(state.load)
             turn = follow_to_turn(operator, sample, load, load_beyond, slip)
-            if turn is not None and turn.direction.any():
+            if turn is not None and turn.direction is not None:
                 return turn.direction
             slip = np.zeros(slip.size)  # the slip that proves the bound may be beyond the turn
         return np.full(slip.size, np.nan)

@@ -72,6 +72,7 @@ from stiction.methods.equilibrium.sample import (
     Outcome,
     Present,
     StaticSample,
+    all_breakable_slip,
     present_pieces,
     residual_nodes,
     step_to_corner,
@@ -288,8 +289,6 @@ def least_equilibrium(
     or load. If an interface ends, it slides when all nodes that can break slip, unless it
     is followed `to_rest`.
     """
-    can_break = np.isfinite(sample.excess)
-    stops = not (to_rest or can_break.all())
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
     omitted = 0.0  # share of the weakening that is omitted
@@ -301,7 +300,7 @@ def least_equilibrium(
         drive = load * sample.profile - present.strength
         if float((drive + present.weakening_rate * slip).sum()) > tolerance * slip.size:
             return Relaxed(Outcome.SLIDING, slip)
-        if stops and (slip[can_break] > 0.0).all():
+        if not to_rest and all_breakable_slip(sample, slip):
             return Relaxed(Outcome.SLIDING, slip)
         # 2.
         if is_unstable:
