@@ -56,6 +56,7 @@ def relative_differences(stress: Array, exact: Array) -> Array:
 
     A sample is left out if either method finds no onset.
     """
+    # The mean, and not each onset, divides: an onset may be close to zero.
     known = np.isfinite(stress) & np.isfinite(exact)
     mean = np.abs(exact.mean(where=known)) if known.any() else 1.0
     return (stress - exact)[known] / mean
@@ -158,6 +159,7 @@ def onset(
     # Profiles pass the checks for users' data here, and nowhere else.
     sample, measured = problem.placed_sample(profiles, optional_member(method, "accepts"), gaps)
     problem.doubt(sample)
+    # Batches keep arrays small, and let the progress move.
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
     meter = Meter(f"onset by {method.label}", sample.samples, progress)
     with meter, merge_warnings() as warned:
@@ -181,6 +183,7 @@ def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) ->
     The exact method solves as many samples as take `COMPARISON_SECONDS`, at most
     `MAX_COMPARED`.
     """
+    # The cost decides how many samples are compared, and the quick test whether any are.
     exact = exact_counterpart(problem, method)
     if exact is None:
         return

@@ -132,7 +132,7 @@ MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
 
 def as_method(value: Any) -> Any:
     """Return a method, or raise a ValueError that lists its missing members."""
-    if isinstance(value, type):
+    if isinstance(value, type):  # parentheses were forgotten
         raise ValueError(f"must be an object. Write st.{value.__name__}(...)")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
     if missing:
@@ -153,6 +153,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
     """Return the solver of a method. It checks values, and adds friction coefficients."""
     solver = method.prepare(problem)
     variables = method.variables(problem)
+    # Other layers read these variables from any method.
     lacking = [name for name in ONSET_VARIABLES if name not in variables]
     if lacking:
         raise InputError(
@@ -162,6 +163,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
     def solve(sample: Sample) -> Values:
         values = {name: np.asarray(value) for name, value in solver(sample).items()}
         _check_values(method.label, values, variables, sample)
+        # The pressure is NaN if the problem has none.
         pressure = sample.mean(sample.normal_pressure)
         if not np.isnan(pressure).all():
             values["friction_coefficient"] = values["critical_stress"] / pressure
@@ -178,6 +180,7 @@ def _check_values(
             f"method: the solver of {name} must return its variables {', '.join(variables)},"
             f" but returned {', '.join(values)}"
         )
+    # Dimensions of known size. On a line there is no 'y'.
     sizes = dict(zip(("x", "y"), sample.shape, strict=False))
     sizes |= {"sample": sample.samples, DIRECTION: 2}
     for key, variable in variables.items():

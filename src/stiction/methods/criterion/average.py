@@ -37,7 +37,7 @@ from stiction.elasticity.operator import Transform, convolve, make_transform
 from stiction.methods.criterion.windows import Window, places_of
 from stiction.problem.interface import Interface
 
-STENCIL = 10  # nodes of a polynomial
+STENCIL = 10  # nodes of a polynomial, five on either side of its cell
 PARABOLA_ERROR = 0.065  # largest distance of a cubic from its parabola, in third differences
 MAX_NEWTON_STEPS = 50
 PLACE_ATOL = 1e-11  # change of the place, in nodes, that is round-off
@@ -57,6 +57,7 @@ def averages(
     profile p has shape (*shape). An average is infinite if the window reaches beyond
     the extent of the interface.
     """
+    # Both averages are convolutions with the weights.
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
     if interface.is_held:
@@ -87,6 +88,7 @@ def least_average(
     interpolated.
     """
     count = len(excess)
+    # A line has one window, and its minimum is found between the nodes.
     load, place, chosen = np.full(count, np.inf), np.zeros(count), np.zeros(count, np.int64)
     if not interface.is_plane and not interface.is_held:
         transform, multiplier = make_transform(interface.shape), np.array(windows[0].spectrum)
@@ -115,6 +117,7 @@ def _between_nodes(average: Array) -> Array:
         line = average[through]
         before, middle, after = (line[(node[axis] + s) % line.size] for s in (-1, 0, 1))
         bend = before - 2.0 * middle + after
+        # A flat or infinite neighbourhood has no parabola.
         if 0.0 < bend < np.inf:
             place[axis] += 0.5 * (before - after) / bend
     return np.mod(place, average.shape)
@@ -188,6 +191,7 @@ def _minimum_near(
         value = 0.0
         for p in range(STENCIL - 1, -1, -1):
             value = value * u + power[p]
+        # The second bound: values that rise faster and faster stay above the lines from outside.
         value = max(values[cell] + value, least)
         at_node, beside = values[node], values[(node + side) % n]
         before, rise = at_node - values[(node - side) % n], beside - at_node

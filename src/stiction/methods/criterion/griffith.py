@@ -135,7 +135,7 @@ def griffith_length(
         release_rate = _release_rate(problem, resting + tau * unit)
         return release_rate.min(axis=-1) > fracture_energy
 
-    # 2.
+    # 2. The lengths at which a crack is tested, and whether it runs there under each load.
     lengths = problem.interface.spacing * np.append(
         SHORT_LENGTHS, np.arange(1, problem.interface.size)
     )
@@ -143,6 +143,7 @@ def griffith_length(
     # A crack can be arrested only after it has begun to run.
     if arrest:
         above = ~above & np.maximum.accumulate(above, axis=1)
+    # Bisect between the first such length and the length before it.
     crosses, first = above.any(axis=1), above.argmax(axis=1)
     low, high = np.append(0.0, lengths)[first[crosses]], lengths[first[crosses]]
     for _ in range(N_HALVINGS if crosses.any() else 0):
@@ -180,6 +181,7 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
         # 1. The substitution of (1) turns the crack into -1 < cos t < 1.
         U = np.tan(0.5 * np.pi * part / period)
         u = U[:, None] * cosine
+        # D is linear between the nodes to the left and the right of a place.
         place = (centre + np.arctan(u) * period / np.pi) / interface.spacing
         left = np.floor(place)
         share, left = place - left, left.astype(np.int64) % interface.size

@@ -104,7 +104,7 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time for a sample on a core, s."""
-        # Measured. The time on planes is mostly transforms over several ellipses.
+        # The numbers are measured. The time on planes is mostly transforms over several ellipses.
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
 
@@ -157,6 +157,7 @@ class LocalCriterion:
         The quick test applies to lines between half-spaces without ends. In other
         cases the result is True.
         """
+        # The quick test needs the signs of K and a law with one piece.
         interface = problem.interface
         half_spaces = problem.specimen is None and not interface.is_plane
         if not (half_spaces and problem.friction.linear and not interface.is_held):
@@ -187,6 +188,7 @@ class LocalCriterion:
             excess, profile = excess_of(sample), sample.load_profile
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
+            # The rate, and with it the nucleation length, may differ between samples.
             for weakening_rate, rows in _weakening_rates(sample):
                 # 1.
                 windows = windows_of(problem, weakening_rate)
@@ -197,6 +199,7 @@ class LocalCriterion:
                 if interface.is_plane:
                     patches = [(y.aspect, *y.extents, y.area) for y in windows]
                     patch[rows] = np.array(patches)[chosen]
+            # Arrested events are not known, so the first instability is the onset.
             stress = sample.mean_stress(load)
             values = {
                 "critical_load": load,
@@ -242,7 +245,9 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                     " criterion does not hold; use st.Equilibrium()"
                 )
             width[i] = windows.widths[c]
-            if blocks.relief > 0.0 or problem.interface.is_held:  # 3.
+            # 3. Under a dead load, slip does not change the mean stress, unless it
+            # transfers stress to nodes beyond an extent.
+            if blocks.relief > 0.0 or problem.interface.is_held:
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
                 relief[i] = _relief_of_patch(problem, weakening_rate, run, drive)
@@ -316,6 +321,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
+    # A profile has one nucleation length.
     ((weakening_rate, _), *further_weakening_rates) = _weakening_rates(sample)
     if further_weakening_rates:
         raise InputError("weakening_rate: differs between samples. Pass each sample alone")

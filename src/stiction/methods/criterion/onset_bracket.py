@@ -73,6 +73,7 @@ def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
     """
     column = line_of(problem.half_spaces, problem.interface.size).entries.column
     bounds = np.zeros(sample.samples)
+    # Many threads would wait for each other in such small systems.
     with one_blas_thread():
         for i in range(sample.samples):
             initial, weakening_rate = sample.initial_stress[i], sample.weakening_rate[i]
@@ -91,6 +92,7 @@ def _least_difference(
     """Return the widest bracket, on a given side, that does not contain the onset, or 0."""
     least = 0.0
     for width in BRACKETS:
+        # Below the onset the line must rest, and above it must slide.
         sliding = slides(column, peak, residual, weakening_rate, (1.0 + side * width) * load)
         if sliding is None:
             return np.inf
@@ -137,6 +139,7 @@ def slides(
         force = np.maximum(overstress[moving], 0.0)
         if force.max(initial=0.0) < REST_RTOL * scale:
             return False
+        # K is a Toeplitz matrix: its entries depend on the distance of two nodes.
         stiffness = column[np.abs(np.subtract.outer(moving, moving))]
         # 4.
         left = (critical - slip)[moving]

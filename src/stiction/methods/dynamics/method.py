@@ -372,7 +372,7 @@ def make_run(
     profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
     steepest = steepest_weakening_rate(strength[None], residual[None], weakening[None])
-    steepest *= friction.steepest_slope / friction.initial_slope
+    steepest *= friction.steepening
     load = method.load
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))

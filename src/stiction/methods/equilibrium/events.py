@@ -66,6 +66,8 @@ MIN_ADDED_SLIP = 1e-3
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:
     """Return the variables of events. `inertia` adds the variables that a rupture provides."""
 
+    # On a plane, positions have two components, and an area replaces the length. `per_area`
+    # changes the units of energies and moments.
     def variable(units: str, text: str) -> Variable:
         return Variable(units, text, ("event",))
 
@@ -130,9 +132,11 @@ def event_table(
     padded with NaN.
     """
     events = events[:most]
+    # Methods that lack a variable do not ask for it, so `_measures` may return more.
     measured = [_measures(problem, rows, row, *event) for event in events]
     table = {}
     for name, variable in variables.items():
+        # After 'event', the only other dimension is 'direction'.
         components = (2,) * (len(variable.dims) - 1)
         table[name] = np.full((len(events) if most is None else most, *components), np.nan)
         table[name][: len(events)] = np.reshape(
@@ -157,6 +161,7 @@ def _measures(
     slips = before.slip.reshape(interface.shape), after.slip.reshape(interface.shape)
     added = slips[1] - slips[0]
     # 1. and 2. Patch and moment.
+    # The centre and the extents follow the growth alone.
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
@@ -164,12 +169,15 @@ def _measures(
     # 3. and 4. Stress drops and fracture energy. Waves and weakening share what the mean of the
     # stress before and after, at a constant load, does on the slip beyond the residual strength.
     drop, residual = problem.released_stress(added), rows.residual_strength[row]
+    # `above` is the stress before the event, less the residual strength.
     above = rows.initial_stress[row] + before.load * rows.load_profile - residual
     above = above - problem.released_stress(slips[0])
+    # Nodes that cannot break do not slip, and dissipate nothing.
     weakening = np.where(np.isfinite(rows.strength[row]), rows.strength[row] - residual, 0.0)
     dissipated = [law.dissipated(slip, weakening, rows.weakening_rate[row]) for slip in slips]
     fracture = float((dissipated[1] - dissipated[0]).sum()) * interface.cell
     released = 0.5 * float(((2.0 * above - drop) * added).sum()) * interface.cell
+    # With inertia, the energies are known. They include the work of the load that rises.
     if "event_radiated_energy" in timed:
         released = fracture + timed["event_radiated_energy"]
     values = {
@@ -223,6 +231,6 @@ def elongation_of(problem: Problem, stress: float) -> float:
     machine, depth = problem.specimen.drive.stiffness, problem.specimen.thickness
     if machine == 0.0:
         return np.nan
-    if depth is None:  # it is rigid
+    if depth is None:  # without a thickness a machine must be rigid
         return 0.0
     return stress * (problem.interface.measure * depth) / machine

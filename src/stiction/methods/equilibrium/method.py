@@ -126,6 +126,7 @@ class Equilibrium:
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
+        # Each corner that a node passes changes the factor.
         linear, corners = problem.friction.linear, pieces_of(problem.friction).ends.size
         more = 1.0 if linear else 6.0 * corners**0.5
         if problem.specimen is not None:  # more events, and jumps are followed to their end
@@ -161,12 +162,14 @@ class Equilibrium:
         """
         if problem.interface.is_held:
             return False, False
+        # A stiff machine lets the interface slide without an instability, which is then NaN.
         certain = not (problem.has_machine and event == "first_instability")
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables of the solver's results."""
         interface = problem.interface
+        # On planes, positions and extents have a component along each direction.
         variables = onset_variables(interface) | VARIABLES
         variables |= OF_PLANES if interface.is_plane else OF_LINES
         for name in {"sliding_position", "critical_patch_extent"} & variables.keys():

@@ -36,6 +36,7 @@ class Patch(NamedTuple):
 
 def count_patches(slip: Array) -> int:
     """Return the number of runs of slipping nodes on a circle."""
+    # A run starts where a node slips and its left neighbour does not.
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
     return max(starts, int(above[0]))
@@ -53,6 +54,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     for i in range(n):
         if field[i] > field[peak]:
             peak = i
+    # Go left from the peak to the first node of the run, and then right to the last.
     start = peak
     length = 1
     while length < n and field[start - 1 if start else n - 1] > 0.0:
@@ -129,6 +131,7 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents = [], []
     for axis in (0, 1):
+        # The other axis is projected away, so that the patch becomes an arc.
         start, length = span(np.any(mask, axis=1 - axis), int(peak[axis]))
         profile = np.where(mask, weight, 0.0).sum(axis=1 - axis)
         n = mask.shape[axis]
@@ -147,7 +150,7 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
     their weight exceeds a share of the largest weight.
     """
     above = weight > share * weight.max()
-    if weight.ndim == 1:
+    if weight.ndim == 1:  # a line
         above = np.where(above, weight, 0.0)
         start, length, _ = main_patch(with_ends(above, interface))
         inside = np.zeros(weight.size, dtype=np.bool_)

@@ -81,10 +81,10 @@ def _states_at(
         # An interface that ends still creeps after the event in which it slides.
         if load > path.last.load and path.sliding is None:
             return
-        # 2.
+        # 2. After an event, the path continues from the state to which the event led.
         n_passed = sum(event.before.load < load for event in events)
         state = max(starts[n_passed], state, key=lambda start: start.load)
-        # 3.
+        # 3. Close to an event, round-off may hide the equilibrium that is about to jump.
         reached = program.at(sample, state, load)
         if reached is None and n_passed < len(events):
             about_to_jump = events[n_passed].before
@@ -193,6 +193,7 @@ def equilibrium_path(
     # 1.
     path = follow_to_sliding(program, sample, to_rest=True)
     events, end = path.all_events, path.last.load
+    # An event counts at all loads above its own.
     n_events = np.searchsorted([event.before.load for event in events], given)
     # After sliding there is no state, and values stay NaN.
     slip, stress = np.full((2, given.size, interface.size), np.nan)
@@ -212,11 +213,13 @@ def equilibrium_path(
             f"no equilibrium was found beyond {end:g} Pa, but sliding was not proved either: the"
             " path ends at this load"
         )
+    # Kernels have flat nodes, and results the shape of the interface.
     wide = (given.size, *interface.shape)
     values = {
         "slip": slip.reshape(wide),
         "stress": stress.reshape(wide),
         "mean_stress": interface.mean(stress.reshape(wide)),
+        # The event in which an interface slides is the last, and is not arrested.
         "arrested_events": np.minimum(n_events, len(path.events)),
         "sliding": sliding,
     }

@@ -100,7 +100,7 @@ def follow_to_sliding(
     state = program.next(sample)
     peak = state.highest
     while state.status == PathStatus.UNSTABLE:  # 2.
-        # 3.
+        # 3. Without ends there is no difference between sliding and all slip.
         jump = program.jump(sample, state, to_rest and ends)
         outcome = jump.outcome
         if outcome != Outcome.NOT_UNSTABLE:
@@ -160,7 +160,7 @@ class OnsetSolver:
             sample = row_of(samples, row)
             try:
                 path = follow_to_sliding(self.program, sample, self.options.events > 0)
-            except Exception as error:
+            except Exception as error:  # say which sample failed
                 error.add_note(
                     f"in sample {row} of the {rows.samples} that were solved together"
                 )
@@ -168,6 +168,7 @@ class OnsetSolver:
             flags.append((path.known, path.first.certified, path.first.stopped))
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([row[name] for row in table]) for name in table[0]}
+        # Loads become mean stresses: add the initial stress, multiply by the mean profile.
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.mean(rows.load_profile)
@@ -181,9 +182,7 @@ class OnsetSolver:
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
-        # On lines a known multiplier means that a linear programme found the
-        # instability, so no node has passed a corner before it.
-        straight = last is first and first.multiplier is not None and not interface.is_plane
+        # After an arrested event another patch may let go of the whole interface.
         if last is not first and last.direction.any():
             sliding_patch = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
@@ -197,7 +196,7 @@ class OnsetSolver:
             ),
             "slip_patches": patches_of(first.slip, interface),
             "arrested_events": len(path.events),
-            "residual_reached": not straight and bool(residual_nodes(sample, last.slip).any()),
+            "residual_reached": bool(residual_nodes(sample, last.slip).any()),
         }
         if interface.is_plane:
             values["critical_patch_extent"] = patch.extents
@@ -243,6 +242,7 @@ class OnsetSolver:
     ) -> None:
         """Warn about exceptional samples. `values` holds all samples, with stresses in Pa."""
         first, unproved = values["first_instability"], ~certified
+        # Gaps are compared with the load. A stress of zero must not divide them.
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
@@ -276,6 +276,7 @@ class OnsetSolver:
             " NaN",
             stopped & np.isfinite(first),
         )
+        # Compare the peak with the stress of sliding, on the scale of the fall of strength.
         residual = rows.mean(rows.residual_strength)
         falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)
         falls = falls[:, np.isfinite(falls[0])]
@@ -326,6 +327,7 @@ def _quotients(
     Between events paths are straight, so a small step gives the exact derivative.
     """
     stress_before = first.load - problem.relief(first.slip)
+    # At nodes that cannot break, the derivative is zero.
     can_break = np.isfinite(sample.excess)
     step = STRENGTH_STEP * float(np.abs(sample.excess[can_break]).mean())
     derivative = np.zeros(sample.excess.size)

@@ -52,6 +52,7 @@ def _by_type(parameters: type) -> Callable[..., tuple[float, float]]:
     shape = compiled(parameters)
 
     def line(law, peak, residual, weakening_rate, slip, ahead):
+        # u = d/d_c with d_c = -f'(0) (tau_p - tau_r)/W.
         drop, first = peak - residual, law.initial_slope
         if drop <= 0.0:
             return residual, 0.0

@@ -32,6 +32,8 @@ SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Each of them alone sets how fast a law weakens."""
 NEARLY_RESIDUAL = 0.01
 """Remaining share of tau_p - tau_r at which a law that never ends counts as residual."""
+MIN_STEEPENING = 1.001
+"""Ratio of slopes up to which a law of the user counts as falling most steeply at first."""
 SLIPS = 4097
 """Number of slips up to `FrictionLaw.reach` at which a law of the user is examined."""
 LAWS = Kinds("laws")
@@ -107,18 +109,13 @@ class FrictionLaw(ABC):
         return float(self.parameters.initial_slope)
 
     @property
-    def steepest_slope(self) -> float:
-        """The largest -f'(u), or -f'(0) if the two differ by less than 0.1 %."""
-        first = self.initial_slope
-        if isinstance(self.parameters, Linear | Exponential):
-            return first
-        later = float(_examined(self)[2].max())
-        return later if later > 1.001 * first else first
-
-    @property
     def steepening(self) -> float:
         """Ratio of the steepest slope to the initial slope, at least 1. It governs stability."""
-        return self.steepest_slope / self.initial_slope
+        if isinstance(self.parameters, Linear | Exponential):
+            return 1.0
+        # The examined slopes of a law of the user have some error.
+        ratio = float(_examined(self)[2].max()) / self.initial_slope
+        return ratio if ratio > MIN_STEEPENING else 1.0
 
     @property
     def integral(self) -> float:
@@ -174,6 +171,7 @@ class FrictionLaw(ABC):
         (Pa/m) have shape (nodes,).
         """
         if self.linear:
+            # Slip beyond d_c dissipates no more.
             weakened = np.minimum(slip, drop / weakening_rate)
             return weakened * (drop - 0.5 * weakening_rate * weakened)
         critical = self.critical_slip_of(drop, weakening_rate)
@@ -315,9 +313,9 @@ class PiecewiseWeakening(FrictionLaw):
         return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
 
     @property
-    def steepest_slope(self) -> float:
-        """-f' of the steepest piece."""
-        return float(self._pieces[0].max())
+    def steepening(self) -> float:
+        """Ratio of the slope of the steepest piece to the slope of the first."""
+        return float(self._pieces[0].max()) / self.initial_slope
 
     @property
     def integral(self) -> float:
@@ -327,6 +325,7 @@ class PiecewiseWeakening(FrictionLaw):
     def area(self, u: Any) -> Array:
         """Return the area under f up to u."""
         (corners, f), (slopes, areas) = self.corners, self._pieces
+        # The area up to the corner before u, and a trapezium from this corner to u.
         at_corners = np.append(0.0, np.cumsum(areas))
         u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
         piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
@@ -368,7 +367,9 @@ class PiecewiseWeakening(FrictionLaw):
         fraction[-1] = 0.0
         u = np.array([law.slip_at(float(f)) for f in fraction])
         if not np.isfinite(u[-1]):
+            # The last piece is a triangle with the energy of the tail.
             u[-1] = u[-2] + 2.0 * pieces * (law.integral - float(law.area(u[-2])))
+        # A scale of the law becomes the same scale of its pieces.
         chord = (1.0 - float(fraction[0])) / float(u[0])
         area = float(np.trapezoid(np.append(1.0, fraction), np.append(0.0, u)))
         factors = {
@@ -401,6 +402,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
     """Return the mistakes in a user's law. Its f may rise, or contradict its other members."""
     if type(law).__module__.startswith("stiction."):
         return []
+    # Check first what the later checks need: an inverse, parameters, and f that compiles.
     name, parameters = type(law).__name__, law.parameters
     try:
         end = float(law.slip_at(0.0))
@@ -437,6 +439,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
     }  # fmt: skip
     if violations := [text for text, is_so in wrong.items() if is_so]:
         return [f"{name}: {violations[0]}"]
+    # The law states its slope, its integral and its inverse. Compare them with f itself.
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, slope[0]),
         "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),

@@ -100,7 +100,7 @@ def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
     longest = 0
     run = 0
     n_corners = 0
-    for q in range(2 * n):
+    for q in range(2 * n):  # twice around, so that a run across the first node is complete
         i = q if q < n else q - n
         residual = slip[i] > 0.0 and slip[i] >= sample.pieces.at_corner * sample.critical[i]
         run = run + 1 if residual else 0
@@ -117,7 +117,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
     """Step 3: append the overstressed nodes to S and to the factor of K."""
     workspace = state.workspace
     count = queue_overstressed(state, load, tolerance)
-    if count == 0:
+    if count == 0:  # the resting nodes hold the interface
         return StepEnd(Course.GOES_ON, n_slipping)
     if n_slipping + count > workspace.max_slipping:
         return StepEnd(Course.NO_SPACE, n_slipping)
@@ -152,6 +152,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
     if may_stop:
         cholesky.apply_stiffness_to_resting_slip(state)
     while True:
+        # The drive is the stress that the slip of S must release to meet the strengths.
         for t in range(n_slipping):
             i = slipping[t]
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - K_resting[i]
@@ -164,6 +165,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
             break
         n_slipping = cholesky.factor_slipping(workspace)
         cholesky.apply_stiffness_to_resting_slip(state)
+    # Slip does not go back. In S, K d is then the drive, to round-off.
     for t in range(n_slipping):
         i = slipping[t]
         slip[i] = max(slip[i], solution[t])
@@ -205,7 +207,7 @@ def _write_direction(
     problem, and otherwise infinite.
     """
     # Leave out nodes that would move back, and solve again, until no such node is
-    # left.
+    # left. Each pass leaves out a node, so the loop ends.
     direction, solution = true_pieces.direction, true_pieces.solution
     while True:
         n_factored = cholesky.factor_slipping(true_pieces)
@@ -242,6 +244,7 @@ def _step_with_true_pieces(
         true_pieces.diagonal[i] = entry(workspace.stiffness, i, i) - W
         overload[i] = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
     longest = _write_direction(state, true_pieces, n_slipping, overload, tolerance)
+    # Without a corner on the way, slip along an unstable direction never stops.
     step = step_to_corner(sample, slip, true_pieces.direction, longest)
     if step == np.inf:
         return StepEnd(Course.SLIDES, n_slipping)
@@ -250,6 +253,8 @@ def _step_with_true_pieces(
     cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
     if may_stop:
         cholesky.apply_stiffness_to_resting_slip(state)
+    # At rest, if the step was not cut short by a corner, and all nodes left out stay below
+    # their strength.
     at_rest = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
         Kd[i] += workspace.K_resting[i]
@@ -283,7 +288,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     if n_marked > workspace.max_slipping:
         return Outcome.UNDECIDED
     n_slipping = cholesky.factor_slipping(workspace)
-    if n_slipping < n_marked or n_marked == n:
+    if n_slipping < n_marked or n_marked == n:  # K is singular on all nodes only
         return Outcome.SLIDING
     steps_in_row = 0
     n_corners_before = 0

@@ -87,6 +87,7 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
     count = ZERO
     for i in range(Kd.shape[0]):
         if not workspace.is_slipping[i]:
+            # On a specimen, a node that slipped before may rest at any piece of its law.
             never_slipped = slip[i] == 0.0  # then its strength is known without a search
             strength = sample.excess[i] if never_slipped else strength_at(sample, slip, i)
             margin = strength - load * sample.profile[i] + Kd[i]
@@ -101,6 +102,7 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
 @jit_inside
 def stress_tolerance(sample: StaticSample, load: float) -> float:
     """Return the overstress, Pa, that counts as round-off."""
+    # Nodes with infinite strength, which cannot break, do not count.
     total = 0.0
     n = sample.excess.shape[0]
     for i in range(n):
@@ -148,6 +150,7 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
     """
     slip = workspace.solution
     while n_slipping > 0:
+        # L^-1 p and L^-1 q hold for the leading rows, so only the back substitution is repeated.
         n_forward = 0
         while n_forward < n_slipping and slip[n_forward] >= 0.0:
             n_forward += 1
@@ -174,6 +177,7 @@ def _cut(
         i = workspace.slipping[t]
         excess_y += y[i] * sample.excess[i]
         p_y += y[i] * sample.profile[i]
+    # By (2), no load above the cut has an equilibrium.
     cut = excess_y / p_y
     if cut < bound:
         bound = cut
@@ -218,6 +222,7 @@ def solve_program(
             if load >= top:
                 solved = True
                 break
+            # At the bound itself far too many nodes may join, unless the load is close.
             if top - load <= CLOSE_RTOL * abs(top):
                 load = top
             else:
@@ -240,6 +245,7 @@ def solve_program(
             _solve(state, load, n_slipping)
             continue
         # 3. A pivot failed.
+        # The row of the failed node follows the last row of L, and gives the cut.
         cut, bound = _cut(state, n_slipping, bound, multiplier)
         by_round_off_only = cut >= load - tolerance
         load = min(load, bound)
@@ -272,6 +278,7 @@ def certificate(
     lower = np.inf
     excess_y = 0.0
     count = ZERO
+    # The load of (1) is the least balance over load profile, for any slip.
     for i in range(n):
         balance = sample.excess[i] + Kd[i] - sample.weakening_rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])

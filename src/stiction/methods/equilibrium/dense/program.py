@@ -85,6 +85,7 @@ class DenseProgram:
             self.runs = runs_of(problem.half_spaces, self.nodes)
         else:
             self.elastic = problem.blocks
+        # `runs_away` follows a run of nodes around a circle.
         self.ends = problem.interface.is_held
         if self.ends and count_patches(1.0 * problem.interface.breakable) > 1:
             self.runs = None  # a run of nodes stops at the end of its part
@@ -97,6 +98,7 @@ class DenseProgram:
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
         """Workspaces of the thread, for elastic steps (and programmes) and for true pieces."""
+        # Threads share the program, but kernels overwrite the workspaces.
         if not hasattr(self._of_thread, "workspaces"):
             self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
@@ -179,6 +181,7 @@ class DenseProgram:
         """
         state = state or at_rest(sample)
         from_rest = not state.slip.any()
+        # Behind a machine the stress may be largest before the instability.
         search = Search.EVENTS if self.driven else state.search
         if from_rest:
             for workspace in self._workspaces:
@@ -187,7 +190,7 @@ class DenseProgram:
             instability = self._next_by_programme(sample, state, from_rest)
             if instability is not None:
                 return instability
-            if not from_rest:
+            if not from_rest:  # a corner is near, so the programme would fail again
                 search = Search.EVENTS
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         held = self.ends and target < np.inf
@@ -214,6 +217,7 @@ class DenseProgram:
         solution = self.solve(present, state=None if from_rest else state)
         if solution is None or not (from_rest or solution.load >= state.load):
             return None
+        # The programme holds only if no node passes the corner at the end of its piece.
         piece = None if from_rest else present_pieces(sample, state.slip).piece
         if exceeds(sample, solution.slip, piece):
             return None
@@ -252,11 +256,11 @@ class DenseProgram:
             elastic, true_pieces = self._workspaces
             slip_state = SlipState(sample, slip, Kd, elastic, self.may_stop, to_rest)
             outcome = jump(slip_state, instability.load, unstoppable, true_pieces)
+        # Strength that falls linearly cannot stop an instability.
         if outcome == Outcome.ARRESTED:
             before = present_pieces(sample, instability.slip).piece
             after = present_pieces(sample, slip).piece
-            if not np.any(after > before):
-                # Round-off: only nodes that pass a corner can stop an instability.
+            if not np.any(after > before):  # round-off
                 outcome = Outcome.UNDECIDED
         state = EquilibriumState(
             instability.load, slip, instability.direction, Kd, PathStatus.STABLE,
@@ -274,6 +278,7 @@ class DenseProgram:
         """
         direction = instability.direction
         if self.runs is None or to_rest:
+            # Only whether a corner is on the way is known.
             step = step_to_corner(sample, slip, direction, np.inf)
             return (Outcome.SLIDING if step == np.inf else Outcome.UNDECIDED), np.inf
         K_direction = instability.K_direction

@@ -63,10 +63,11 @@ class TooSmallError(Exception):
 def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Array, Array]:
     """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A."""
     lifting = np.where(can_break, guess, 0.0)
+    tolerance = LIFTING_RTOL * float(operator.weakening_rate.max())
+    # The eigenvector z > 0 has A z = lambda z on the part, so A z < 0 if lambda < 0.
     value, _ = lowest_eigenvector(
-        operator, can_break, lifting, LIFTING_RTOL * float(operator.weakening_rate.max()),
-        MAX_EIGENVECTOR_ITERATIONS,
-    )  # fmt: skip
+        operator, can_break, lifting, tolerance, MAX_EIGENVECTOR_ITERATIONS
+    )
     if value >= 0.0:
         raise TooSmallError
     image = np.empty_like(lifting)
@@ -115,11 +116,13 @@ class Bracket:
     ) -> None:
         self.operator = make_operator(symbol, weakening_rate, excess.shape)
         self.excess, self.profile = excess.flatten(), profile.flatten()
+        # The residual and the mask are workspaces of solvers.
         self.residual, self.slip, self.multiplier = np.zeros((3, excess.size))
         self.inside = np.zeros(excess.size, dtype=np.bool_)
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
         self.can_break = np.isfinite(self.excess)
+        # Where nothing can break y = 0, and inf times 0 must count as 0.
         self.finite_excess = np.where(self.can_break, self.excess, 0.0)
         if self.can_break.all():
             self.lifting = _lifting_field(self.operator)
@@ -167,6 +170,7 @@ class Bracket:
         trial = np.maximum(y, 0.0)
         product(self.operator, trial, self.residual)
         lifting, lifted = self.lifting
+        # Only nodes that can break need A y <= 0. The other nodes never slip.
         infeasible, liftable = (self.residual > 0.0) & self.can_break, lifted > 0.0
         if (infeasible & ~liftable).any():
             return np.inf
@@ -188,6 +192,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())
+    # The ends of the interval differ from the bounds: `low` was found to be stable only
+    # to the accuracy, and `high` to be unstable without a multiplier.
     low, high = bracket.lower, bracket.upper
     stable = bracket.slip.copy()
     for _ in range(MAX_HALVINGS):
@@ -197,6 +203,7 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
         load = 0.5 * (low + high)
         slip = stable.copy()
         inside = bracket.inside
+        # Nodes whose strength is below the load alone would be overloaded without slip.
         inside[:] = (slip > 0.0) | (excess < load * profile)
         status, _ = equilibrate(
             operator, load * profile - excess, inside, slip, bracket.residual,
@@ -206,17 +213,14 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             low, stable = load, slip
             bracket.raise_slip(slip)
             continue
-        # 3.
+        # 3. Without a direction the iterations were exhausted, as they are close to the onset.
         high = load
         if status != NEGATIVE_CURVATURE:
             continue
         vector = np.abs(operator.direction)
+        tolerance = EIGENVALUE_RTOL * float(operator.weakening_rate.max())
         value, _ = lowest_eigenvector(
-            operator,
-            inside,
-            vector,
-            EIGENVALUE_RTOL * float(operator.weakening_rate.max()),
-            MAX_EIGENVECTOR_ITERATIONS,
+            operator, inside, vector, tolerance, MAX_EIGENVECTOR_ITERATIONS
         )
         if value <= 0.0:
             direction = np.maximum(vector, 0.0)

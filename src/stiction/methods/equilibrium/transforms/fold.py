@@ -105,8 +105,10 @@ def follow_to_turn(
         closing = sample.profile - image
         corner = np.append(pieces.ends, 1e300)[piece] * sample.critical
         rise = np.full(slip.size, np.inf)  # of the load until the event of each node
+        # A node at rest starts when its margin has closed.
         starts = ~inside & (closing > 0.0)
         rise[starts] = margin[starts] / closing[starts]
+        # A slipping node passes the corner at the end of its piece.
         weakens = inside & (v > 0.0) & (piece < pieces.ends.size)
         rise[weakens] = np.maximum(corner[weakens] - slip[weakens], 0.0) / v[weakens]
         node = int(np.argmin(rise))
@@ -134,7 +136,8 @@ def follow_to_turn(
                 break
             y[node], inside[node] = 1.0, True
             pivot, push = inner(image, y), closing[node]
-        if pivot <= 0.0:  # 5.
+        # 5.
+        if pivot <= 0.0:
             return Turn(load, slip, y / inner(sample.profile, y))
         v += push / pivot * y
     return None

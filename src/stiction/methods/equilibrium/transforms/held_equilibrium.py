@@ -82,12 +82,13 @@ def equilibrate(
     solution. If (1) is solved, the residual r does not exceed the tolerance (Pa) at
     any node, and on the set it is within twice the tolerance.
     """
+    # 1. Begin with the nodes that the guess overloads.
     restrict(slip, inside)
     residual_of(operator, right, slip, residual)
     _revise(inside, slip, residual, tolerance)
     iterations = 0
     while iterations < MAX_ITERATIONS:
-        # 2.
+        # 2. A rough solution is enough to see which nodes join.
         goal = max(LOOSE_RESIDUAL * largest_inside(residual, inside), tolerance)
         status, taken = solve_inside(operator, inside, slip, residual, goal)
         iterations += taken + 1
@@ -96,8 +97,9 @@ def equilibrate(
         # 3. and 1.
         residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)
+        # Round-off may let the true residual exceed the residual of conjugate gradients.
         if joined == 0 and left == 0 and largest_inside(residual, inside) <= 2.0 * tolerance:
             return SOLVED, iterations
-        if left > 0:
+        if left > 0:  # the slip of these nodes was set to zero
             residual_of(operator, right, slip, residual)
     return EXHAUSTED, iterations

@@ -107,6 +107,7 @@ def halved_strength(fine: Array) -> Array:
     finite = np.isfinite(fine)
     if finite.all():
         return halved(fine)
+    # A coarse node can break if the fine node at its place can.
     even = finite[tuple(slice(None, None, 2) for _ in fine.shape)]
     coarse, weight = halved(np.where(finite, fine, 0.0)), halved(1.0 * finite)
     return np.divide(coarse, weight, out=np.full(even.shape, np.inf), where=even)
@@ -126,6 +127,8 @@ def _narrow(bracket: Bracket, gap: float) -> float:
     share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
     while not bracket.closed(gap):
+        # Newton's method starts from the lower bound of bisection and its last unstable
+        # direction, which is close to the patch that turns.
         residual = BISECTED_RESIDUAL * min(share, COARSE_GAP)
         direction = bisect(bracket, share, residual)
         _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
@@ -166,7 +169,7 @@ def plane_onset(
         odd = any(nodes % 2 for nodes in shape)
         resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
         if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
-            break
+            break  # this is the coarsest grid
         strength, *fine = grids[-1]
         grids.append((halved_strength(strength), *map(halved, fine)))
     coarser: Bracket | None = None
@@ -191,11 +194,13 @@ def plane_onset(
             guess, phi = (
                 _refined(field, shape) for field in (coarser.slip, coarser.multiplier)
             )
+            # Interpolation spreads both to nodes that cannot break.
             guess, phi = np.where(bracket.can_break, (guess, phi), 0.0)
             phi *= 1.0 / np.sqrt((phi**2).sum())
             closed, bend = close(bracket, phi, coarser.lower, guess, goal, bend)
         if not closed:  # 2.
             bend = _narrow(bracket, goal)
+        # Beyond a corner the finer onsets would not hold either.
         end = end.reshape(-1)
         if is_finest or ((bracket.slip > end) & (end > 0.0)).any():
             return bracket
@@ -233,14 +238,15 @@ class PlaneProgram:
         If the path was followed because of a coarse grid, and turns before any node reaches a
         corner, the onset is computed after all, with its certificate.
         """
-        if state is not None:
+        if state is not None:  # 5. after a jump
             return self._follow_in_steps(sample, state, FIRST_LOAD_STEP * state.load)
+        # 4.
         try:
             onset = self._onset(sample, self.pieces.ends[0] * sample.critical)
-        except TooSmallError:
+        except TooSmallError:  # there is no onset without corners, perhaps no instability
             rest = at_rest(sample)
             return self._follow_in_steps(sample, rest, FIRST_LOAD_STEP * abs(rest.load))
-        if onset.slip.size < sample.excess.size:
+        if onset.slip.size < sample.excess.size:  # of a coarse grid
             turn = self._follow_from_rest(sample, onset)
             if exceeds(sample, turn.slip):
                 return turn
@@ -270,6 +276,7 @@ class PlaneProgram:
         passed = [(load, slip)]
         while not all_breakable_slip(sample, slip):
             accuracy = max(0.1 * gap, min(STEP_RESIDUAL * step / abs(load), MAX_STEP_RESIDUAL))
+            # Slip grows smoothly with the load, so extrapolate it as a guess.
             guess = slip
             if len(passed) > 1:
                 load_before, slip_before = passed[-2]
@@ -285,6 +292,7 @@ class PlaneProgram:
             if end is None:  # 6.
                 turn = self._turn(operator, sample, passed, load_beyond)
                 if turn is None:
+                    # The path may turn here or not: `jump` decides, along the last growth.
                     direction = slip - passed[0][1]
                     return EquilibriumState(load, slip, direction, gap=step, certified=False)
                 if turn.direction is not None:
@@ -292,7 +300,7 @@ class PlaneProgram:
                         turn.load, turn.slip, turn.direction, gap=load_beyond - turn.load,
                         certified=False, multiplier=turn.direction,
                     )  # fmt: skip
-                end = turn.slip
+                end = turn.slip  # the path goes on beyond the step
             growth = end - slip
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
@@ -328,6 +336,7 @@ class PlaneProgram:
             return multiplier_of(sample, state)
         assert state.gap is not None  # instabilities of planes have a gap
         operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
+        # Without a certificate, the path was followed already, and no turn was found.
         slip = state.slip
         for retreat in START_RETREATS if state.certified else ():
             load = state.load - retreat * abs(state.load)
@@ -342,6 +351,7 @@ class PlaneProgram:
     ) -> Jump:
         assert instability.gap is not None  # instabilities of planes have a gap
         load_beyond = instability.load + instability.gap
+        # Above the turn by the requested gap, where there is no equilibrium close by.
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(
             self._operator(sample), sample, load_beyond, instability.slip,

@@ -117,6 +117,7 @@ def solve_pieces(
     operator: Operator, drive: Array, weakening_rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
     """Solve (1) for given pieces, with drive = load p - q. Return the status and the slip."""
+    # Nodes that the load alone would overload begin inside; the others join if they must.
     slip = guess.copy()
     inside = (guess > 0.0) | (drive > 0.0)
     operator = operator._replace(weakening_rate=weakening_rate)
@@ -136,6 +137,8 @@ def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bo
     curvature = inner(growth, image)
     if not curvature > 0.0:
         return False
+    # From nearly any right side, conjugate gradients meet a negative curvature. With the
+    # growth as the soft mode, they take few iterations.
     operator, residual = operator._replace(soft_mode=growth / np.sqrt(curvature)), 1.0 * inside
     status, _ = solve_inside(operator, inside, solution, residual, CURVATURE_RESIDUAL)
     return status == SOLVED
@@ -162,6 +165,7 @@ def stable_equilibrium(
     # 1.
     for _ in range(MAX_REVISIONS):
         present = present_pieces(sample, end)
+        # The pieces must belong to a slip that was solved to the tolerance.
         if allowed <= tolerance and np.array_equal(assumed, present.piece):
             break
         drive, assumed = load * sample.profile - present.strength, present.piece
@@ -177,6 +181,7 @@ def stable_equilibrium(
     else:
         return None
     # 2.
+    # The weakening of a law that flattens is steepest at the start.
     steepest = start.weakening_rate
     if pieces.steepens:
         piece = np.arange(pieces.slopes.size)[:, None]
@@ -213,8 +218,11 @@ def _bound(
     W = (1.0 - omitted) * present.weakening_rate - omitted * drag
     start = present.strength - (present.weakening_rate - W) * slip
     corner = np.append(sample.pieces.ends, 1e300)[present.piece] * sample.critical
-    falls = (present.weakening_rate > 0.0) & np.isfinite(corner)
-    level = np.full(slip.size, -np.inf)
+    # `level` is the strength at the next corner. Nodes without a corner have no level.
+    falls, level = (
+        (present.weakening_rate > 0.0) & np.isfinite(corner),
+        np.full(slip.size, -np.inf),
+    )
     level[falls] = present.strength[falls] - present.weakening_rate[falls] * corner[falls]
     is_level = np.zeros(slip.size, dtype=np.bool_)
     end, lowered = slip, tolerance if omitted > 0.0 else 0.0
@@ -259,6 +267,7 @@ def _step_to_corner(
         largest_W = float(sample.weakening_rate.max())
         lowest_eigenvector(operator, inside, direction, 1e-6 * largest_W, MAX_ITERATIONS)
         direction = np.where(direction > DIRECTION_RTOL * direction.max(), direction, 0.0)
+        # Strength falls by more than stress along it, until a node reaches a corner.
         longest = np.inf
     moved = slip.copy()
     step_to_corner(sample, moved, direction, longest)
@@ -295,7 +304,7 @@ def least_equilibrium(
     omitted_before = 0.0  # the same, before a step with the share 1 was tried
     fall = 0.0  # largest fall of strength in the step before, Pa
     for _ in range(MAX_JUMP_STEPS):
-        # 1.
+        # 1. The load less the present strength, summed over the nodes. The sum of K d is zero.
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
         if float((drive + present.weakening_rate * slip).sum()) > tolerance * slip.size:
@@ -303,7 +312,7 @@ def least_equilibrium(
         if not to_rest and all_breakable_slip(sample, slip):
             return Relaxed(Outcome.SLIDING, slip)
         # 2.
-        if is_unstable:
+        if is_unstable:  # as if step 2 had met the unstable direction
             bound = Bound(NEGATIVE_CURVATURE, slip, False)
             is_unstable = False
         else:

@@ -136,12 +136,9 @@ def _other_patch(bracket: Bracket) -> Array | None:
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
+    tolerance = PATCH_EIGENVALUE_RTOL * float(bracket.operator.weakening_rate.max())
     value, _ = lowest_eigenvector(
-        bracket.operator,
-        bracket.inside,
-        vector,
-        PATCH_EIGENVALUE_RTOL * float(bracket.operator.weakening_rate.max()),
-        MAX_PATCH_ITERATIONS,
+        bracket.operator, bracket.inside, vector, tolerance, MAX_PATCH_ITERATIONS
     )
     if value <= 0.0:
         bracket.raise_multiplier(vector)
@@ -156,11 +153,11 @@ def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
     return state.load - force / state.force_by_load
 
 
-def _amplitude_between(below: Held, above: Held, turn: int) -> float:
+def _amplitude_between(below: Held, above: Held, is_linear: bool) -> float:
     """Step 4: guess the turning point between states with mu' > 0 and mu' < 0."""
-    if turn % 2 == 0:  # mu' is linear in a, as where many nodes join one after the other
+    if is_linear:  # mu' is linear in a, as where many nodes join one after the other
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
-    else:  # mu' has one step, as where a single node joins: where the two `_load_at` agree
+    else:  # mu' has a single step, as where a node joins: where the two `_load_at` agree
         load_below = _load_at(below, below.amplitude)
         load_above = _load_at(above, below.amplitude)
         rise = below.slope_of_force / -below.force_by_load
@@ -209,7 +206,7 @@ def close(
     guess = Held(load, inner(phi, slip), slip, phi)
     step = last_slope = 0.0
     patch_changes = idle_states = 0
-    for turn in range(MAX_STATES):
+    for number in range(MAX_STATES):
         # 1.
         state = _hold(bracket, phi, guess, accuracy)
         if state is None:  # 2.
@@ -217,6 +214,7 @@ def close(
             other_patch = _other_patch(bracket)
             if patch_changes > MAX_PATCH_CHANGES or other_patch is None:
                 break
+            # The other patch may have turned at this load already, so begin below it.
             phi = other_patch
             load = min(guess.load, bracket.upper)
             load -= PATCH_CHANGE_RETREAT * 2.0 ** (patch_changes - 1) * bracket.magnitude
@@ -234,6 +232,7 @@ def close(
             above = state
             bracket.raise_multiplier(state.slope)
         if below is not None and above is not None:
+            # With these shares the slopes mu' cancel, so A y = 0 where both states slip.
             fall = -above.slope_of_force
             bracket.raise_multiplier(below.slope * fall + above.slope * below.slope_of_force)
         if bracket.closed(gap):
@@ -242,6 +241,7 @@ def close(
         idle_states = idle_states + 1 if bracket.gap > IDLE_GAP_SHARE * gap_before else 0
         if idle_states > MAX_IDLE_STATES:
             break
+        # A secant from the first state on, which smooths the steps of mu'.
         first = first or state
         moved = state.amplitude - first.amplitude
         curvature = bend / max(state.amplitude, 1e-300)
@@ -251,7 +251,7 @@ def close(
             bend = curvature * state.amplitude
         if below is not None and above is not None and below.amplitude < above.amplitude:
             # 4.
-            amplitude = _amplitude_between(below, above, turn)
+            amplitude = _amplitude_between(below, above, is_linear=number % 2 == 0)
             step = amplitude - state.amplitude
             load = min(_load_at(below, amplitude), _load_at(above, amplitude))
         else:
