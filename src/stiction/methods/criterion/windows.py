@@ -92,7 +92,7 @@ def windows_of(
     middle = float(1.0 / np.sqrt(1.0 - solid.poisson_ratio))
     windows = []
     for aspect in (middle * stretch for stretch in stretches):
-        window = _ellipse(problem.half_spaces, interface.shape, W, aspect)
+        window = ellipse_window(problem.half_spaces, interface.shape, W, aspect)
         if window is None:
             size = " x ".join(f"{side:.4g}" for side in interface.lengths)
             raise InputError(
@@ -133,27 +133,16 @@ def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
     return weights, spectrum
 
 
-@lru_cache(maxsize=64)
-def _ellipse(
-    half_spaces: HalfSpaces, shape: tuple[int, ...], W: float, aspect: float
-) -> Window | None:
-    symbol = half_spaces.symbol(shape)
-    return ellipse_window(symbol, shape, half_spaces.lengths, W, aspect)
-
-
+@lru_cache(maxsize=64, typed=True)
 def ellipse_window(
-    symbol: Array,
-    shape: tuple[int, ...],
-    lengths: tuple[float, ...],
-    W: float,
-    aspect: float,
+    half_spaces: HalfSpaces, shape: tuple[int, ...], W: float, aspect: float
 ) -> Window | None:
     """Return the smallest unstable ellipse with an aspect, or `None` if it meets its images.
 
     See steps 1 to 3 in the docstring of the module.
     """
-    spacings = np.divide(lengths, shape)
-    column = np.fft.irfft2(symbol, shape)
+    spacings = np.divide(half_spaces.lengths, shape)
+    column = np.fft.irfft2(half_spaces.symbol(shape), shape)
     stable_square, side = 0.0, MIN_BOX_NODES
     while True:
         # 1. An ellipse may fill half of the box, or all of the plane.
@@ -207,6 +196,7 @@ def _smallest_unstable(
     low, high = (int(np.searchsorted(radii, square)) for square in (stable_square, max_square))
     low -= 1
     ellipse: Ellipse | None = None
+    tolerance = EIGENVECTOR_RTOL * W
     vector = np.ones(column.shape)
     probe = max(1, (high - low) // FIRST_PROBE_SHARE)  # small ones take the fewest iterations
     while high - low > 1:
@@ -214,11 +204,7 @@ def _smallest_unstable(
         inside = distance <= radii[middle]
         vector = vector.copy() if vector[inside].any() else np.ones(column.shape)
         value, _ = lowest_eigenvector(
-            operator,
-            inside.reshape(-1),
-            vector.reshape(-1),
-            EIGENVECTOR_RTOL * W,
-            MAX_ELLIPSE_ITERATIONS,
+            operator, inside.reshape(-1), vector.reshape(-1), tolerance, MAX_ELLIPSE_ITERATIONS
         )
         if value <= W:
             high, ellipse = middle, Ellipse(float(radii[middle]), value, vector)

@@ -263,9 +263,9 @@ class SlipState(NamedTuple):
 def append(workspace: Workspace, n_slipping: int, count: int) -> int:
     """Step 1: append queue[:count] to S and L, until all are appended or a pivot fails.
 
-    Returns the number of rows in L. If this number is below n_slipping + count, the
-    pivot for the next node in S failed. The row of the failed node, without the
-    pivot, then follows the last row in L.
+    Appended nodes are marked in `is_slipping`. Returns the number of rows in L. If this
+    number is below n_slipping + count, the pivot for the next node in S failed. The row
+    of the failed node, without the pivot, then follows the last row in L.
     """
     factor, slipping, stiffness = workspace.factor, workspace.slipping, workspace.stiffness
     diagonal = workspace.diagonal
@@ -297,6 +297,7 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
                 return r
             row[r] = math.sqrt(pivot_squared)
             workspace.factored_diagonal[r] = diagonal[node]
+            workspace.is_slipping[node] = True
         n_factored += group
     workspace.n_factored[0] = n_factored
     return n_factored
@@ -304,9 +305,10 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
 
 @jit
 def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
-    """Step 2: remove the node at a position from S and L. Return the number of remaining nodes."""
+    """Step 2: remove the node at a position from S, its marks and L. Return how many remain."""
     factor, slipping = workspace.factor, workspace.slipping
     cosines, sines = workspace.rotations[0], workspace.rotations[1]
+    workspace.is_slipping[slipping[position]] = False
     for r in range(position + 1, n_slipping):
         row = factor[row_slice(r, r + 1)]
         new = factor[row_slice(r - 1, r)]  # the place of the row above, which has moved already
@@ -406,7 +408,8 @@ def multiply_outside(
 def apply_stiffness_to_resting_slip(state: SlipState) -> None:
     """Write K times the slip of nodes that slipped and now rest to `workspace.K_resting`.
 
-    Overwrites `workspace.queue` and `workspace.rhs`.
+    It is zero if no such node exists, as on a line. Overwrites `workspace.queue` and
+    `workspace.rhs`.
     """
     slip, workspace = state.slip, state.workspace
     nodes, values, count = workspace.queue, workspace.rhs, ZERO
@@ -424,6 +427,14 @@ def solve_slip(workspace: Workspace, n_slipping: int, load: float, slip: Array) 
     for t in range(n_slipping):
         slip[t] = load * workspace.Linv_p[t] - workspace.Linv_q[t]
     back_substitute(workspace.factor, n_slipping, slip)
+
+
+@jit_inside
+def solve_v(workspace: Workspace, n_slipping: int, v: Array) -> None:
+    """Solve A_SS v = p for the rates of slip with the load in S, given L^-1 p."""
+    for t in range(n_slipping):
+        v[t] = workspace.Linv_p[t]
+    back_substitute(workspace.factor, n_slipping, v)
 
 
 @jit_inside

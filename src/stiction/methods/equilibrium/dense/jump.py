@@ -124,8 +124,6 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
     n_factored = cholesky.append(workspace, n_slipping, count)
     if n_factored < n_slipping + count:  # K is singular on all nodes only
         return StepEnd(Course.SLIDES, n_slipping)
-    for t in range(n_slipping, n_factored):
-        workspace.is_slipping[workspace.slipping[t]] = True
     return StepEnd(Course.SLIDES if all_slip(state) else Course.GOES_ON, n_factored)
 
 
@@ -149,8 +147,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
     sample, slip, Kd, workspace, may_stop, _ = state
     solution, drive, K_resting = workspace.solution, workspace.rhs, workspace.K_resting
     slipping = workspace.slipping
-    if may_stop:
-        cholesky.apply_stiffness_to_resting_slip(state)
+    cholesky.apply_stiffness_to_resting_slip(state)
     while True:
         # The drive is the stress that the slip of S must release to meet the strengths.
         for t in range(n_slipping):
@@ -235,7 +232,7 @@ def _step_with_true_pieces(
 
     `true_pieces` is the workspace with the factor of A = K - diag(W).
     """
-    sample, slip, Kd, workspace, may_stop, _ = state
+    sample, slip, Kd, workspace, _, _ = state
     overload = workspace.rhs
     for i in range(slip.shape[0]):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -251,8 +248,7 @@ def _step_with_true_pieces(
     for t in range(n_slipping):
         workspace.solution[t] = slip[workspace.slipping[t]]
     cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
-    if may_stop:
-        cholesky.apply_stiffness_to_resting_slip(state)
+    cholesky.apply_stiffness_to_resting_slip(state)
     # At rest, if the step was not cut short by a corner, and all nodes left out stay below
     # their strength.
     at_rest = step == 1.0 and longest == 1.0
@@ -283,7 +279,6 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     for i in range(n):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i)
         workspace.is_slipping[i] = slip[i] > 0.0
-        workspace.K_resting[i] = 0.0
         n_marked += workspace.is_slipping[i]
     if n_marked > workspace.max_slipping:
         return Outcome.UNDECIDED

@@ -129,9 +129,7 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
     """
     sample, _, Kd, workspace, _, _ = state
     v, Kv = workspace.solution, workspace.Kv
-    for t in range(n_slipping):
-        v[t] = workspace.Linv_p[t]
-    cholesky.back_substitute(workspace.factor, n_slipping, v)
+    cholesky.solve_v(workspace, n_slipping, v)
     cholesky.multiply_slipping(workspace, n_slipping, v, Kv)
     step = 0.0
     for i in range(Kd.shape[0]):
@@ -239,8 +237,6 @@ def solve_program(
         cholesky.substitute_slipping(
             workspace, n_before, n_slipping, sample.excess, workspace.Linv_q
         )
-        for t in range(n_before, n_slipping):
-            is_slipping[slipping[t]] = True
         if n_slipping == n_before + count:  # 2.
             _solve(state, load, n_slipping)
             continue

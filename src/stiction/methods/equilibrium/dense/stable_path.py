@@ -67,7 +67,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import ZERO, jit_allocating, jit_inside
 from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense import cholesky
-from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
+from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
 from stiction.methods.equilibrium.sample import PathStatus, piece_at, start_of, strength_at
 
@@ -190,21 +190,10 @@ def _move_v(
 @jit_inside
 def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
     """Remove a node from S. Return the number of nodes that still slip."""
-    workspace = state.workspace
-    node = workspace.slipping[position]
-    workspace.is_slipping[node] = False
-    v_nodes[node] = 0.0
-    n_slipping = cholesky.remove(workspace, n_slipping, position)
+    v_nodes[state.workspace.slipping[position]] = 0.0
+    n_slipping = cholesky.remove(state.workspace, n_slipping, position)
     cholesky.apply_stiffness_to_resting_slip(state)
     return n_slipping
-
-
-@jit_inside
-def _solve_v(workspace: Workspace, n_slipping: int) -> None:
-    """Step 2: write the solution v of (2) to `workspace.v`."""
-    for t in range(n_slipping):
-        workspace.v[t] = workspace.Linv_p[t]
-    cholesky.back_substitute(workspace.factor, n_slipping, workspace.v)
 
 
 @jit_inside
@@ -225,7 +214,7 @@ def _stop_unloaded(
         _move_v(state, n_slipping, v_nodes, v, share, endless=False)
         n_slipping = _stop(state, n_slipping, first, v_nodes)
         _substitute(state, q, ZERO, n_slipping)
-        _solve_v(workspace, n_slipping)
+        cholesky.solve_v(workspace, n_slipping, v)
         some_stopped = True
     for t in range(n_slipping):
         v_nodes[workspace.slipping[t]] = max(v[t], 0.0)
@@ -305,7 +294,6 @@ def _keep_factored(state: SlipState, n_factored: int, v_nodes: Array) -> None:
     for i in range(v_nodes.shape[0]):
         if not is_slipping[i]:
             v_nodes[i] = 0.0
-    cholesky.apply_stiffness_to_resting_slip(state)
 
 
 @jit_inside
@@ -365,7 +353,6 @@ def _start(
         n_slipping = _stop(state, n_slipping, bounding, v_nodes)
         first_changed = ZERO
         some_stopped = True
-    workspace.is_slipping[node] = True
     if state.slip[node] > 0.0:  # it rested after slip
         cholesky.apply_stiffness_to_resting_slip(state)
         first_changed = ZERO
@@ -405,8 +392,6 @@ def follow_stable_path(
     peak = load - mean_relief(workspace.stiffness, sample.profile, slip)
     if n_marked > workspace.max_slipping:
         return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
-    for i in range(n):
-        workspace.K_resting[i] = 0.0
     n_slipping = cholesky.factor_slipping(workspace)
     some_left = False  # whether nodes left S for want of a row in L, since the load last rose
     if n_slipping < n_marked:
@@ -414,8 +399,7 @@ def follow_stable_path(
             return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
         _keep_factored(state, n_slipping, v_nodes)
         some_left = True
-    elif stopped:
-        cholesky.apply_stiffness_to_resting_slip(state)
+    cholesky.apply_stiffness_to_resting_slip(state)
     first_changed = ZERO
 
     # Each node passes each corner once, and starts once unless nodes stop.
@@ -424,7 +408,7 @@ def follow_stable_path(
         _substitute(state, q, first_changed, n_slipping)
 
         # 2. The rates of slip and of K d. In S the latter follow from (2): K v = p + W v.
-        _solve_v(workspace, n_slipping)
+        cholesky.solve_v(workspace, n_slipping, v)
         if may_stop:
             n_slipping, some_stopped = _stop_unloaded(state, q, n_slipping, v_nodes)
             stopped = stopped or some_stopped
@@ -462,6 +446,7 @@ def follow_stable_path(
                     return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
                 n_slipping = n_factored
                 _keep_factored(state, n_slipping, v_nodes)
+                cholesky.apply_stiffness_to_resting_slip(state)
                 some_left = True
                 first_changed = ZERO
         else:
