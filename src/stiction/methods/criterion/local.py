@@ -1,5 +1,18 @@
 """The local criterion: the onset at the weakest patch, with each patch in isolation.
 
+Problem
+-------
+s is the strength minus initial stress (Pa), p is the load profile, and y >= 0 are the
+weights of a critical window, centred at x. A patch of this size becomes unstable in
+isolation at the nucleation stress (K. Uenishi and J. R. Rice, J. Geophys. Res. 108,
+2003, equation 14; G. Albertini et al., 2020, equation 9)
+
+    tau_n(x) = <s, y>_x / <p, y>_x.                                                           (1)
+
+The predicted onset is the least tau_n over all positions and windows.
+
+Algorithm
+---------
 1. Find the critical windows for the weakening rate (`windows`).
 2. Find the least average of strength over load, over windows and positions
    (`average`). On a specimen every position has its own window

@@ -1,5 +1,10 @@
 """The path of a sample: slip and stress at given loads, and arrested events.
 
+Problem
+-------
+Return the slip d of the least equilibrium, equation (1) in `solver`, at each of some
+rising loads, and the stress tau_i + load p - K d.
+
 Algorithm
 ---------
 1. Follow the sample to global sliding. This gives the arrested events and the last

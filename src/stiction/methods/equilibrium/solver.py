@@ -1,6 +1,21 @@
 """Onsets of samples from exact equilibrium, on lines, specimens and planes.
 
-Algorithm for a sample (`follow_to_sliding`). A `Program` supplies the two searches:
+Problem
+-------
+The load (Pa) rises slowly from zero. K is the stiffness (Pa/m), d >= 0 the slip (m),
+s(d) the strength minus initial stress (Pa), which falls with slip, and p the load
+profile. Slip d is an equilibrium at a load if
+
+    load p - K d <= s(d),  with '=' where d > 0.                                              (1)
+
+Follow the least equilibrium, which an interface without inertia takes, from rest to the
+load at which (1) has no solution: there the whole interface slides. Slip never goes
+back. The first instability is the load at which the path of equilibria turns first,
+and a patch jumps.
+
+Algorithm for a sample
+----------------------
+The algorithm is our own (`follow_to_sliding`). A `Program` supplies the two searches:
 
 1. Start from rest and raise the load to the next instability (`Program.next`).
 2. If the path ends without an instability, the interface slides stably: stop.

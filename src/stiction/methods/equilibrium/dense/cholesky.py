@@ -256,7 +256,7 @@ class SlipState(NamedTuple):
     Kd: Array  # K d, Pa
     workspace: Workspace
     may_stop: bool  # whether slip at one node can unload another, which then stops
-    held: bool = False  # whether to go on once all has slipped that can, held by nodes beyond
+    goes_on: bool = False  # whether a path or jump goes on once every node that can break slips
 
 
 @jit

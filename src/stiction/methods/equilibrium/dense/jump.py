@@ -61,7 +61,7 @@ from stiction.methods.equilibrium.dense.linear_program import (
 from stiction.methods.equilibrium.dense.stable_path import (
     MAX_MARGIN_AT_STRENGTH,
     NEGATIVE_RATE_RTOL,
-    all_slip,
+    ends_sliding,
 )
 from stiction.methods.equilibrium.sample import (
     Outcome,
@@ -124,7 +124,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
     n_factored = cholesky.append(workspace, n_slipping, count)
     if n_factored < n_slipping + count:  # K is singular on all nodes only
         return StepEnd(Course.SLIDES, n_slipping)
-    return StepEnd(Course.SLIDES if all_slip(state) else Course.GOES_ON, n_factored)
+    return StepEnd(Course.SLIDES if ends_sliding(state) else Course.GOES_ON, n_factored)
 
 
 @jit_inside

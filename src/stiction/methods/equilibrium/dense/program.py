@@ -193,8 +193,9 @@ class DenseProgram:
             if not from_rest:  # a corner is near, so the programme would fail again
                 search = Search.EVENTS
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
-        held = self.ends and target < np.inf
-        slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, held)
+        # Between given loads, a path goes on although the interface slides.
+        goes_on = self.ends and target < np.inf
+        slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, goes_on)
         end = follow_stable_path(slip_state, state.load, target, direction)
         reached = EquilibriumState(
             end.load, slip, direction, Kd, PathStatus(end.status), search,

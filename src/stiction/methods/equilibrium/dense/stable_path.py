@@ -360,9 +360,9 @@ def _start(
 
 
 @jit_inside
-def all_slip(state: SlipState) -> bool:
-    """Return whether every node that can break slips or has slipped. A path or jump then ends."""
-    if state.held:
+def ends_sliding(state: SlipState) -> bool:
+    """Return whether a path or jump ends because every node that can break has slipped."""
+    if state.goes_on:
         return False
     for i in range(state.slip.shape[0]):
         slips = state.workspace.is_slipping[i] or state.slip[i] > 0.0
@@ -457,6 +457,6 @@ def follow_stable_path(
             if not start.bounded:
                 return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
             n_slipping, first_changed = start.n_slipping, start.first_changed
-            if all_slip(state):  # 6. Behind a stiff machine the interface slides stably.
+            if ends_sliding(state):  # 6. Behind a stiff machine the interface slides stably.
                 return PathEnd(load, peak, stopped, PathStatus.STABLE)
     return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)
