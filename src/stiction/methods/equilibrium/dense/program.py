@@ -106,6 +106,16 @@ class DenseProgram:
         pair: tuple[Workspace, Workspace] = self._of_thread.workspaces
         return pair
 
+    def bound(self, sample: StaticSample) -> tuple[float, Array]:
+        """Return the bound from the weakest window of a sample (Pa), and its multiplier."""
+        low, high = _range_of_weakening_rates(sample)
+        windows = self.elastic.windows(low, high) if high > 0.0 else NONE
+        allowed, multiplier = np.empty((2, self.nodes))
+        bound = window_bound(
+            sample.excess, sample.profile, sample.weakening_rate, windows, allowed, multiplier
+        )
+        return bound, multiplier
+
     def solve(
         self, sample: StaticSample, cap: float = np.inf, state: EquilibriumState | None = None
     ) -> EquilibriumState | None:
@@ -114,13 +124,7 @@ class DenseProgram:
         Only the first piece of the friction law is used: `excess` and `weakening_rate`. `state`
         is a known equilibrium at a lower load.
         """
-        # The weakest window bounds the load from above.
-        low, high = _range_of_weakening_rates(sample)
-        windows = self.elastic.windows(low, high) if high > 0.0 else NONE
-        allowed, multiplier = np.empty((2, self.nodes))
-        bound = window_bound(
-            sample.excess, sample.profile, sample.weakening_rate, windows, allowed, multiplier
-        )
+        bound, multiplier = self.bound(sample)
         if bound == cap == np.inf:  # no window fits within the extent
             return None
         # Dense factors cost the cube of the slipping nodes, transforms little
@@ -133,6 +137,7 @@ class DenseProgram:
                     return solution
         slip, Kd = np.zeros((2, self.nodes))
         start = top = min(bound, cap)
+        low, high = _range_of_weakening_rates(sample)
         if state is not None:
             start, slip = state.load, state.slip.copy()
         elif low < high:  # the bound is not close: at too high a load far too many nodes join
