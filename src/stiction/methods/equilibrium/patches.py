@@ -172,11 +172,11 @@ def critical_patch(multiplier: Array, interface: Any) -> Patch:
     if not multiplier.any():
         nowhere = (np.nan,) * len(interface.shape)
         return Patch(nowhere, nowhere, np.nan)
-    if interface.is_plane:
-        return largest_patch(multiplier.reshape(interface.shape), interface, MIN_PATCH_WEIGHT)[
-            1
-        ]
-    return line_patch(multiplier, interface)
+    if not interface.is_plane:
+        return line_patch(multiplier, interface)
+    field = multiplier.reshape(interface.shape)
+    _, patch = largest_patch(field, interface, MIN_PATCH_WEIGHT)
+    return patch
 
 
 def patches_of(slip: Array, interface: Any) -> int:

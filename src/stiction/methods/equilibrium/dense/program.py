@@ -78,17 +78,16 @@ class DenseProgram:
         self.problem = problem
         self.pieces = pieces_of(problem.friction)
         self.nodes = problem.interface.size
-        self.elastic: Elasticity
-        self.runs: Runs | None = None
-        if problem.specimen is None:
-            self.elastic = line_of(problem.half_spaces, self.nodes)
-            self.runs = runs_of(problem.half_spaces, self.nodes)
-        else:
-            self.elastic = problem.blocks
-        # `runs_away` follows a run of nodes around a circle.
         self.ends = problem.interface.is_held
-        if self.ends and count_patches(1.0 * problem.interface.breakable) > 1:
-            self.runs = None  # a run of nodes stops at the end of its part
+        self.elastic: Elasticity
+        self.runs: Runs | None = None  # what the test for sliding needs, where it applies
+        if problem.specimen is not None:
+            self.elastic = problem.blocks
+        else:
+            self.elastic = line_of(problem.half_spaces, self.nodes)
+            # If several parts can break, a run of nodes may stop at the end of its part.
+            if count_patches(1.0 * problem.interface.breakable) == 1:
+                self.runs = runs_of(problem.half_spaces, self.nodes)
         self.driven = self.elastic.relief > 0.0
         self.may_stop = self.elastic.positive > 0.0  # slip may unload a node that slips
         self._of_thread = threading.local()
@@ -257,7 +256,7 @@ class DenseProgram:
         self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
     ) -> Jump:
         slip, Kd = instability.slip.copy(), instability.Kd.copy()
-        outcome, unstoppable = self._run(sample, instability, slip, to_rest)
+        outcome, unstoppable = self._test_sliding(sample, instability, slip, to_rest)
         if outcome == Outcome.UNDECIDED:
             elastic, true_pieces = self._workspaces
             slip_state = SlipState(sample, slip, Kd, elastic, self.may_stop, to_rest)
@@ -274,7 +273,7 @@ class DenseProgram:
         )  # fmt: skip
         return Jump(Outcome(outcome), state)
 
-    def _run(
+    def _test_sliding(
         self, sample: StaticSample, instability: EquilibriumState, slip: Array, to_rest: bool
     ) -> tuple[int, float]:
         """Test for sliding (step 5). Return the outcome and an unstoppable length.
