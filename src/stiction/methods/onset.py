@@ -192,6 +192,7 @@ def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) ->
     first, stress = sample.part(slice(0, count)), stress[:count]
     if not count or not optional_member(method, "may_differ")(problem, first, stress):
         return
+    # The exact method may warn of its own accuracy, which is not the question here.
     with collect_warnings():  # and drop warnings of the comparison
         true = prepared(problem, exact)(first)["critical_stress"]
     differences = relative_differences(stress, true)

@@ -201,6 +201,7 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
             f"method: seconds_per_sample of {method.label} must return a number of seconds, zero"
             f" or more, got {seconds!r}"
         )
+    # Batch sizes and estimates divide by the time.
     return max(float(seconds), 1e-9)
 
 

@@ -83,6 +83,7 @@ def energy_release_rate(
     True
     """
     resting, profile = _stress_drops(problem)
+    # At the length of the period a crack meets its image.
     flat, period = np.atleast_1d(lengths), problem.interface.measure
     if flat.ndim != 1 or not np.all((flat > 0.0) & (flat < period)):
         raise InputError(
@@ -128,6 +129,7 @@ def griffith_length(
         raise InputError(
             f"load: must be a finite number or a list of them, got {describe(load)}"
         )
+    # The factors without load and by a unit load serve every load: shape (loads, lengths, tips).
     tau, drops = load.reshape(-1, 1, 1), _stress_drops(problem)
 
     def runs(lengths: Array, tau: Array) -> Any:
@@ -177,6 +179,7 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
     points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)
     factors = []
+    # A part of the lengths at a time, so that memory stays small.
     for part in np.array_split(lengths, 1 + lengths.size * points // POINTS_AT_ONCE):
         # 1. The substitution of (1) turns the crack into -1 < cos t < 1.
         U = np.tan(0.5 * np.pi * part / period)

@@ -145,6 +145,7 @@ class LocalCriterion:
         Averaged over all positions between half-spaces, this is load <p> <= <tau_p -
         tau_i>. An interface that ends has no bounds.
         """
+        # Nodes beyond an end take over stress, but do not count in means.
         everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
@@ -232,6 +233,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     """Return the onset of each specimen, at its weakest position."""
     _warn_if_coarse(problem, sample)
     excess, spacing = excess_of(sample), problem.interface.spacing
+    # The weakest window of each sample: its load, its first node, and its number of nodes.
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
     for weakening_rate, rows in _weakening_rates(sample):
@@ -287,6 +289,7 @@ def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> fl
     # The last row and column are the added equation and its unknown force, scaled
     # like the others.
     matrix[[0, -2], -1] = matrix[-1, [0, -2]] = W
+    # The slip of a part that would move back counts as zero.
     slip = np.zeros(len(drive))
     slip[run] = np.linalg.solve(matrix, np.append(drive[run], 0.0))[:-1]
     return problem.relief(np.maximum(slip, 0.0))

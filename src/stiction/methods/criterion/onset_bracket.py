@@ -128,6 +128,7 @@ def slides(
         overstress = load - np.fft.irfft(symbol * np.fft.rfft(slip), nodes) - strength
         # 2.
         intact = np.flatnonzero(slip < critical)
+        # A run of residual nodes lies between two neighbours among the intact nodes.
         run = (
             np.diff(intact, append=intact[:1] + nodes).max(initial=0) if intact.size else nodes
         )
@@ -142,6 +143,7 @@ def slides(
         # K is a Toeplitz matrix: its entries depend on the distance of two nodes.
         stiffness = column[np.abs(np.subtract.outer(moving, moving))]
         # 4.
+        # A step beyond a corner may pass the least equilibrium.
         left = (critical - slip)[moving]
         unstable = True
         if not frozen:

@@ -129,6 +129,7 @@ class Equilibrium:
         # Each corner that a node passes changes the factor.
         linear, corners = problem.friction.linear, pieces_of(problem.friction).ends.size
         more = 1.0 if linear else 6.0 * corners**0.5
+        # A platen under a dead load causes the fewest events.
         if problem.specimen is not None:  # more events, and jumps are followed to their end
             drive = problem.specimen.drive
             more *= 60.0 if drive.type == "platen" and not drive.stiffness else 300.0

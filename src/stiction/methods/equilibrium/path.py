@@ -67,6 +67,7 @@ LOAD_RTOL = 1e-9
 
 def _check_loads(loads: Any) -> Array:
     given = np.atleast_1d(check("loads", loads, RealArray))
+    # `prepend` also refuses a negative first load.
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
     if not (rises and np.isfinite(given[-1])):
         raise InputError(
@@ -81,6 +82,7 @@ def _states_at(
     """Yield the equilibrium at each of the rising loads, until the interface slides."""
     events = path.all_events
     starts = [at_rest(sample), *(event.after for event in events)]
+    # Each state begins where the state before ended, because a path only goes up.
     state = starts[0]
     for load in map(float, loads):
         # An interface that ends still creeps after the event in which it slides.
@@ -190,6 +192,7 @@ def equilibrium_path(
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")
     problem.doubt(rows)
+    # Slip and stress, each of 8 bytes, at every load and node.
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     program = make_program(problem) if method is None else method.program(problem)

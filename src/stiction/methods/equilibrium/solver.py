@@ -170,6 +170,7 @@ class OnsetSolver:
             MIN_NODES_IN_NUCLEATION_LENGTH,
             ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)],
         )
+        # One after the other, so that the result of a sample depends on this sample alone.
         samples, table, flags = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
@@ -220,7 +221,7 @@ class OnsetSolver:
         else:
             values["critical_patch_length"] = patch.area
         # Behind a stiff machine, or within a short extent, an interface can slide without any
-        # instability.
+        # instability. Then there is no critical patch.
         stable = first.status == PathStatus.STABLE
         if stable:
             names = OF_INSTABILITY & values.keys()
@@ -274,6 +275,7 @@ class OnsetSolver:
                 unproved & np.isfinite(first),
                 share,
             )
+        # Only machines and ends hold an interface in which all nodes slip.
         cause = "machine is so stiff" if self.problem.has_machine else "extent is so small"
         warn_of_samples(
             f"no patch becomes unstable in {{samples}}: the {cause} that the interface slides"

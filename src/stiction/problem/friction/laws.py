@@ -309,6 +309,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def _pieces(self) -> tuple[Array, Array]:
+        # Slopes and areas of the pieces.
         u, f = self.corners
         return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
 
@@ -334,6 +335,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     def slip_at(self, fraction: float) -> float:
         """Return the u at which f has the given value."""
+        # `interp` needs rising numbers, and f falls.
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
 
@@ -426,6 +428,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
         lines = [line for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
         return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
+    # The first violation is reported: the later checks may follow from it.
     rising = u[:-1][np.diff(f) > 1e-9]
     wrong = {
         f"f and -f' must be finite up to u = {u[-1]:.4g}": not np.isfinite([f, slope]).all(),

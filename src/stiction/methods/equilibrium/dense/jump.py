@@ -182,7 +182,7 @@ def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol
     and the solution is also below -`rtol` times the largest solution.
     """
     solution = workspace.solution
-    largest = 1.0
+    largest = 1.0  # a direction of singularity is 1 at the node that failed
     for t in range(n_slipping):
         largest = max(largest, solution[t])
     count = ZERO
@@ -233,6 +233,8 @@ def _step_with_true_pieces(
     `true_pieces` is the workspace with the factor of A = K - diag(W).
     """
     sample, slip, Kd, workspace, _, _ = state
+    # Nodes that the step leaves out lose their mark among the true pieces only. In elastic
+    # steps they still slip.
     overload = workspace.rhs
     for i in range(slip.shape[0]):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -275,6 +277,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]
     tolerance = stress_tolerance(sample, load)
+    # Factor K on all nodes that slip.
     n_marked = ZERO
     for i in range(n):
         workspace.diagonal[i] = entry(workspace.stiffness, i, i)

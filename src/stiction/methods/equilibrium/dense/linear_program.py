@@ -131,6 +131,7 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
     v, Kv = workspace.solution, workspace.Kv
     cholesky.solve_v(workspace, n_slipping, v)
     cholesky.multiply_slipping(workspace, n_slipping, v, Kv)
+    # The largest step that any overstressed node needs.
     step = 0.0
     for i in range(Kd.shape[0]):
         margin = sample.excess[i] - load * sample.profile[i] + Kd[i]
@@ -200,6 +201,7 @@ def solve_program(
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
     slipping, is_slipping = workspace.slipping, workspace.is_slipping
+    # Begin without slip. The nodes of a known state join at once, in any order.
     n_slipping = ZERO
     n_known = ZERO  # nodes that slip already, until they have joined
     for i in range(slip.shape[0]):
@@ -243,6 +245,7 @@ def solve_program(
         # 3. A pivot failed.
         # The row of the failed node follows the last row of L, and gives the cut.
         cut, bound = _cut(state, n_slipping, bound, multiplier)
+        # The load had an equilibrium up to round-off if the cut hardly lowers it.
         by_round_off_only = cut >= load - tolerance
         load = min(load, bound)
         cholesky.solve_slip(workspace, n_slipping, load, workspace.solution)

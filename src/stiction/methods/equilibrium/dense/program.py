@@ -134,6 +134,7 @@ class DenseProgram:
                 solution = self._by_transforms(sample, state)
                 if solution is not None:
                     return solution
+        # Start from a known equilibrium, or from a load at which not too many nodes join.
         slip, Kd = np.zeros((2, self.nodes))
         start = top = min(bound, cap)
         low, high = _range_of_weakening_rates(sample)
@@ -196,6 +197,7 @@ class DenseProgram:
                 return instability
             if not from_rest:  # a corner is near, so the programme would fail again
                 search = Search.EVENTS
+        # The kernel moves these arrays, and the state before must stay.
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         # Between given loads, a path goes on although the interface slides.
         goes_on = self.ends and target < np.inf
@@ -244,6 +246,7 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         if load <= state.load:
             return state
+        # From rest, a programme that ends at the load is faster than the events.
         if state.search == Search.PROGRAMME_FROM_REST and not self.driven:
             solution = self.solve(sample, load)
             if solution is not None and not exceeds(sample, solution.slip):

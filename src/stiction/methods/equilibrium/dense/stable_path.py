@@ -120,6 +120,7 @@ def _find_slipping(
     rests.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
+    # A node of a specimen that slipped before may rest below its strength.
     n_slipping = ZERO
     some_rest = False
     atol = MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load)
@@ -163,6 +164,7 @@ def _first_to_stop(
     largest = 0.0
     for t in range(n_slipping):
         largest = max(largest, abs(new[t]))
+    # If rates of several nodes are zero already, the node that reverses fastest stops first.
     first = NOBODY
     share = np.inf
     for t in range(n_slipping):

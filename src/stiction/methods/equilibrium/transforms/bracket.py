@@ -89,6 +89,7 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
         w = float(operator.weakening_rate[~free].min())
         g = np.empty_like(lifting)
         filtered(operator, w / (operator.symbol + w), free.astype(np.float64), g)
+        # A step down at the nodes that do not weaken, smoothed so that A z < 0 also there.
         lifting -= LIFTING_SHARE * g
     image = np.empty_like(lifting)
     product(operator, lifting, image)
@@ -129,6 +130,7 @@ class Bracket:
         else:
             guess = np.ones(excess.size) if lifting is None else lifting
             self.lifting = _lifting_part(self.operator, self.can_break, guess)
+        # The first upper bound: all nodes slide at once.
         self.raise_multiplier(self.lifting[0])
 
     @property
@@ -155,6 +157,7 @@ class Bracket:
 
     def raise_slip(self, slip: Array) -> None:
         """Accept a slip, cut off at zero, if it proves a higher lower bound."""
+        # A d + s - load p >= 0 at every node gives the largest load that this slip proves.
         trial = np.maximum(slip, 0.0)
         product(self.operator, trial, self.residual)
         load = float(((self.residual + self.excess) / self.profile).min())

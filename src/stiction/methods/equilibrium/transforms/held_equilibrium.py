@@ -91,7 +91,7 @@ def equilibrate(
         # 2. A rough solution is enough to see which nodes join.
         goal = max(LOOSE_RESIDUAL * largest_inside(residual, inside), tolerance)
         status, taken = solve_inside(operator, inside, slip, residual, goal)
-        iterations += taken + 1
+        iterations += taken + 1  # a revision costs a product, too
         if status == NEGATIVE_CURVATURE:
             return status, iterations
         # 3. and 1.
