@@ -5,7 +5,8 @@
    friction law (`linear_program`). If very many nodes of a line slip, transforms
    are used (`plane_onset`), because they are faster.
 2. Otherwise the path is followed event by event (`stable_path`). On this path the
-   programme is not tried again, except from rest.
+   programme is not tried again, except from rest. A state says in `search` how the
+   path goes on.
 3. With a machine, the path is always followed: slip lowers the force, and the force
    may be largest before the instability. If all nodes slip without an instability,
    the interface slides stably.
