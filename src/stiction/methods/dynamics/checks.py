@@ -1,6 +1,6 @@
 """Errors and warnings for a run: coarse grids, fast loading, and loads that reverse."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -97,23 +97,32 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         )
 
 
-def warn_of_fast_loading(run: Run, results: Sequence[Any]) -> None:
-    """Warn if the load rises so fast that arrested events differ from events at a slow load."""
+def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
+    """Return the rise of the load while shear waves cross the nucleation length, and its rate.
+
+    The rise is a share of the stress scale, and the rate is in Pa/s. Both are zero without
+    arrested events.
+    """
     first_slip = run.first_slip()
-    if first_slip is None or not any(result["arrested_events"] > 0 for result in results):
-        return
+    if first_slip is None or not result["arrested_events"] > 0:
+        return 0.0, 0.0
     lengths = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     crossing = lengths[0] / run.medium.problem.solid.shear_wave_speed
-    loads = [float(result["applied_load"]) for result in results]
-    loading_rate, scale = run.slope(first_slip), run.scale_at(np.nanmax(loads))
-    rise = loading_rate * crossing / scale
-    slow_rate = FAST_RISE / rise * loading_rate
+    loading_rate = run.slope(first_slip)
+    return loading_rate * crossing / run.scale_at(float(result["applied_load"])), loading_rate
+
+
+def warn_of_fast_loading(rises: Iterable[tuple[float, float]]) -> None:
+    """Warn if the load rises so fast that arrested events differ from events at a slow load.
+
+    The rises are results of `rise_in_crossing`.
+    """
+    rise, loading_rate = max(rises)
     if rise > FAST_RISE:
         warn_accuracy(
-            f"loading_rate: while shear waves cross the nucleation length, in {crossing:.2g} s, the"
-            f" load rises by {rise:.2g} of the stress scale, {scale:.2g} Pa. Number and size of"
-            f" arrested events then depend on the rate; load at {slow_rate:.1g} Pa/s"
-            " or slower to read them as quasi-static"
+            f"loading_rate: the load rises by {rise:.2g} of the stress scale while shear waves"
+            " cross the nucleation length. Number and size of arrested events then depend on the"
+            f" rate. Load at {FAST_RISE / rise * loading_rate:.1g} Pa/s or slower"
         )
 
 

@@ -300,15 +300,16 @@ class Rupture:
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_if_coarse(problem, rows)
-            summaries = []
+            summaries, rises = [], []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
                 start = None
                 if static and loading_rate:
                     start = slow_start(static, run, rows, i, loading_rate)
                 summaries.append(self._summary_of(run, start, rows, i))
+                rises.append(checks.rise_in_crossing(run, summaries[-1]))
             checks.warn_of_survival(self.stop, summaries)
-            checks.warn_of_fast_loading(run, summaries)
+            checks.warn_of_fast_loading(rises)
             names = self.variables(problem)
             return {name: np.array([row[name] for row in summaries]) for name in names}
 

@@ -147,7 +147,7 @@ def simulate_rupture(
     result = _complete(dataset, method, run, state, rows)
     if stopped in ("rest", "time"):
         checks.warn_of_survival(method.stop, [result])
-    checks.warn_of_fast_loading(run, [result])
+    checks.warn_of_fast_loading([checks.rise_in_crossing(run, result)])
     recorder.finish(result, stopped)
     return with_gaps(problem, result, measured)
 
