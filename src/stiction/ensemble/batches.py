@@ -140,6 +140,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             with one_blas_thread(), collect_warnings() as caught:
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
+            # One bad sample makes its batch fail. Solve each sample of the batch alone.
             if count > 1:  # find the sample that failed
                 waiting.extendleft((first + i, 1) for i in reversed(range(count)))
                 continue
@@ -158,6 +159,7 @@ def piece_size(
 ) -> int:
     """Return the number of samples for the next piece, from the pace in s per sample."""
     block = block_of(len(experiment.problem.interface.shape))
+    # The first piece is short, because it measures the pace.
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
     if pace:
         size = int(PIECE_SECONDS / max(pace, 1e-9))
@@ -273,6 +275,7 @@ def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
     """Return spans of missing samples, given a mask (points, samples)."""
     spans = []
     for point, row in enumerate(missing):
+        # Missing samples begin and end where the mask changes.
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)
         spans += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
     return spans

@@ -246,6 +246,7 @@ class Experiment:
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Divide samples, beginning with `first`, into (first, count) at multiples of a size."""
         size, end = size or self.batch, first + count
+        # Batches begin at multiples of the size, so that blocks of draws are whole.
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))
 

@@ -222,6 +222,8 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
     """Return whether the onset is proportional to the strength. See `inference.scaling`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
+    # See the derivation in `inference.scaling`: the weakening rate is given, and the initial
+    # stress is uniform. It must be zero if the load varies.
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales
     return bool(
         scaling != "none"

@@ -63,6 +63,7 @@ def check_run(points: Sequence[Experiment]) -> None:
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
     """Warn, before it begins, about an ensemble that takes hours."""
+    # Points of a sweep may take different times for a sample.
     counts = missing.sum(axis=1)
     seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
     if seconds > LONG_RUN_SECONDS:
@@ -96,6 +97,7 @@ def complete(
             stack.callback(store.save)
         warned = stack.enter_context(merge_warnings())
         stack.enter_context(meter)
+        # Closing the generator cancels pieces that have not begun.
         work = solve_spans(points, spans, solve, executor=executor, workers=workers)
         for span, table in stack.enter_context(closing(work)):
             if store:

@@ -176,6 +176,7 @@ class Store:
     def add(self, table: Table) -> None:
         """Collect a table. Store the collected tables if they are large or it is time."""
         self._taken.append(table)
+        # Few large chunks are read faster, but a kill may lose the last seconds of work.
         size = sum(table.rows.nbytes for table in self._taken)
         if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
@@ -248,6 +249,7 @@ def _read(file: Path, max_bytes: int) -> bytes:
 
 def _write_json(file: Path, content: Mapping[str, Any]) -> None:
     """Write JSON with its format and a digest, completely or not at all."""
+    # Sorted keys give the same digest on every machine.
     body = {"format": FORMAT, "content": content}
     sealed = body | {"digest": digest(json.dumps(body, sort_keys=True).encode())}
     write_whole(file, json.dumps(sealed, indent=1).encode())

@@ -94,6 +94,7 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
     problems: list[str] = []
     distributions: dict[str, Any] = {}
     for key, value in given.items():
+        # A name and its full key are the same parameter. All mistakes are listed.
         try:
             full = full_key(str(key))
             if not full.startswith(begin):

@@ -192,6 +192,7 @@ class EquallyLikely:
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
         """Draw samples `first`, `first` + 1, ... as an array (samples, dimension)."""
+        # NaN shows a column that no member has drawn.
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
@@ -237,6 +238,7 @@ def _columns(random: EquallyLikely, interface: Interface) -> MemberColumns:
             numbers = np.concatenate([np.arange(int(stream.mean_mode)), modes.ravel()])
             keys.append(stream.number * MAX_DRAWS_OF_STREAM + numbers)
         keys_of_members.append(np.concatenate(keys))
+    # Column 0 selects the member. The other columns are in the order of their keys.
     all_keys = np.unique(np.concatenate(keys_of_members))
     columns = [1 + np.searchsorted(all_keys, keys) for keys in keys_of_members]
     drawn, covering = np.zeros(1 + all_keys.size, np.bool_), []
@@ -363,6 +365,7 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
     40
     """
     laws = uncertain_laws(parameters)
+    # Another interface has other nodes, so its draws and profiles would not fit together.
     if wrong := [key for key in laws if key.startswith("problem.interface.")]:
         raise InputError(f"uncertain: {wrong[0]}: cannot be uncertain. Sweep over it instead")
     with prefixed("random"):

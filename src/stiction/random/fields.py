@@ -178,6 +178,7 @@ class RandomField:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
             [(_, conditioning)] = conditionings(self._alone, interface)
+            # The marginal rises, so quantiles of z become quantiles of the field.
             z = conditioning.quantile_at(phi, probability)
         return from_normal(self.marginal, z).reshape(interface.shape)
 
@@ -211,12 +212,13 @@ class RandomField:
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
-                f"the grid of {nodes} nodes is coarser than the spectrum: values at nodes are exact,"
-                f" but {100.0 * lost:.2g} % of the variance is not resolved. Check the unit of the"
-                f" length (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
+                f"the grid of {nodes} nodes is coarser than the spectrum: values at nodes are"
+                f" exact, but {100.0 * lost:.2g} % of the variance is not resolved. Check the unit"
+                f" (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:
             return
+        # How much would the mean mode hold, if there were one?
         with_mean = make_modes(self.spectrum, True, self.anisotropy or 1.0, interface)
         share = float(with_mean.sigma[0] ** 2)
         if share > MAX_MEAN_SHARE:
@@ -387,6 +389,7 @@ class RandomInterface:
                     f"between.{name}: scatters between specimens, but {name}.given was measured on"
                     " a single specimen. Leave one of them out"
                 )
+            # The field has the mean of the property, and the factor only scatters about it.
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
             if low < -1e-12 or abs(float(mean) - 1.0) > 1e-6:
                 problems.append(
@@ -477,6 +480,7 @@ class RandomInterface:
         in the order of `names`, and then the draws for `between`.
         """
         streams = layout(self, interface)
+        # Draws, and the profiles that follow from them.
         numbers_per_sample = streams[-1].columns.stop + len(self.names) * interface.size
         check_memory("samples", 8.0 * min(samples, 2**62) * numbers_per_sample)
         draws = [stream.draw(seed, first, samples) for stream in streams]
@@ -491,7 +495,7 @@ class RandomInterface:
         """
         check_draws(draws, self.dimension(interface))
         streams = layout(self, interface)
-        # 1.
+        # 1. Groups have different columns, so their order does not matter.
         for columns, conditioning in conditionings(self, interface):
             draws = draws.copy()
             draws[:, columns] = conditioning.draws(draws[:, columns])
@@ -499,7 +503,7 @@ class RandomInterface:
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
-            # 2.
+            # 2. The factor is triangular: only draws of properties up to this one.
             mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
             of_property = np.ascontiguousarray(mixed[:, stream.of_property])
             # 3.
@@ -560,6 +564,7 @@ class RandomInterface:
         (30, True)
         """
         laws = uncertain_laws(parameters, "random.")
+        # A value may be invalid together with the others, so the message names all of them.
         interfaces = []
         for values in hypercube(laws, count, seed):
             where = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())

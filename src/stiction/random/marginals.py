@@ -144,6 +144,7 @@ class _ByMoments(Marginal):
 
     @cached_property
     def distribution(self) -> Any:
+        # Above the lower bound, the family has this mean and this ratio of deviation to mean.
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
         return frozen(self.scipy_family, shape, self.low, above / mean_over_scale)
@@ -246,6 +247,7 @@ class TruncatedNormal(_ByMoments):
     def distribution(self) -> Any:
         deviation, high = self.cv * self.mean, math.inf if self.high is None else self.high
 
+        # Both unknowns are of order one: the shift in deviations, and the log of the width.
         def parameters(guess: Any) -> tuple[float, float, float, float]:
             centre = self.mean + deviation * float(guess[0])
             width = deviation * math.exp(float(guess[1]))
@@ -334,11 +336,13 @@ def marginal_of(value: Any) -> Marginal:
     Raises an `InputError` for any other value, or if a moment is not finite.
     """
     if isinstance(value, Marginal):
+        # Families of this package have finite moments by construction.
         if not type(value).__module__.startswith("stiction."):
             value.check_moments()
         return value
     if isinstance(value, Mapping):
         name, rest = value.get("type"), {k: v for k, v in value.items() if k != "type"}
+        # 'beta' and 'gamma' are names here and in scipy. The parameters tell which is meant.
         theirs = name in ("beta", "gamma") and {"a", "b", "loc", "scale"} & rest.keys()
         if not isinstance(name, str) or (name in MARGINALS and not theirs):
             return marginal_of(from_table(MARGINALS, value))
@@ -361,6 +365,7 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]
         raise InputError(unknown_name("type", name, valid))
+    # Parameters in order, as scipy takes them: shapes, location, scale.
     shapes = family.shapes.replace(" ", "").split(",") if family.shapes else []
     known = [*shapes, "loc", "scale"]
     parameters = {**dict(zip(known, first, strict=False)), **given}

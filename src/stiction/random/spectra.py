@@ -98,6 +98,7 @@ def _integrate(
         return float(spectrum.density(np.array([k]))[0]) * k**order
 
     pieces = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
+    # QUADPACK estimates the error of each piece. Their sum bounds the error of the integral.
     integrals, errors = np.array(pieces).T
     if not errors.sum() <= MAX_INTEGRAL_ERROR * (power or np.abs(integrals).sum()):
         raise InputError(
@@ -111,6 +112,7 @@ def _integrate(
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
     """Return the ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
     scale, end = spectrum.scale, spectrum.cutoff()
+    # From half the scale on, each piece ends at twice the wavenumber of the piece before.
     octaves = scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / scale))))
     edges = np.concatenate(([0.0], octaves[octaves < end], [end]))
     return edges, _integrate(spectrum, edges)
@@ -207,6 +209,7 @@ class _PowerOfWavenumber(ScaledSpectrum):
         return (1.0 + ratio * ratio) ** -(self.exponent + 0.5 * (dimensions - 1))
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        # The power is a beta integral in t = k^2/(scale^2 + k^2).
         ratio = (wavenumber / self.scale) ** 2
         return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
@@ -258,6 +261,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
 
     def cutoff(self, dimensions: int = 1) -> float:
         if self.truncation is None and self.power_kept is None:
+            # The same wavenumber on a line and on a plane.
             return max(2.5 * self.scale, self.quantile(self.default_power))
         return super().cutoff(dimensions)
 

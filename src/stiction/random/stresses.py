@@ -65,6 +65,7 @@ def profiles_in_stress(
     """
     stresses = {name: rows for name, rows in profiles.items() if not name.startswith(FACTOR)}
     factors = {name: rows for name, rows in profiles.items() if name.startswith(FACTOR)}
+    # A pressure is random itself, or the pressure of the problem times a random factor.
     pressure = problem.normal_pressure
     if "normal_pressure" in stresses:
         pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * problem.pressing
