@@ -176,13 +176,25 @@ def events(
         `event_area_stress_drop`: Eshelby's circular crack for planes, and Starr's crack
         for lines.
 
+    Raises
+    ------
+    InputError
+        If a result has no table of events, or if no event came to rest.
+
     Examples
     --------
     >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=192)
-    >>> field = st.paper.strength(problem, correlation_ratio=2.0)
-    >>> method = st.Equilibrium(events=4)
-    >>> result = st.monte_carlo(problem, field, method=method, samples=20, seed=1)
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(shear_modulus=2.43e10, poisson_ratio=0.25, density=2700.0),
+    ...     interface=st.Interface(length=4e3, nodes=256, extent=(1e3, 3e3)),
+    ...     friction=st.LinearWeakening(critical_slip=0.1, residual_strength=30e6),
+    ...     load=st.Load(initial_stress=27e6),
+    ...     mode="III",
+    ... )
+    >>> marginal = st.Beta(alpha=1.5, beta=2.0, low=30.2e6, high=42e6)
+    >>> strength = st.RandomField(marginal, st.PowerLawSpectrum(300.0), mean_mode=True)
+    >>> method = st.Equilibrium(events=20)
+    >>> result = st.monte_carlo(problem, strength, method=method, samples=10, seed=1)
     >>> st.plot.events(result)[0].get_ylabel()
     'events per sample, at least as large'
     """
