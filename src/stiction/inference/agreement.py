@@ -36,7 +36,7 @@ Steps for a posterior. The peaks of one campaign share the unknown parameters.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
@@ -65,13 +65,6 @@ PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the 
 """Compared properties of precursors, with their names in printed text."""
 
 
-class Predicted(NamedTuple):
-    """Predicted distribution function of peaks, for one kind of specimen."""
-
-    values: Array  # rising, in the unit of the peaks
-    share: Array  # share of peaks up to each value
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Agreement(Result):
     """Distances between measured and predicted peaks, with their p-values.
@@ -88,7 +81,8 @@ class Agreement(Result):
         For each distance, by name: the probability of a distance at least as large if
         the prediction is right.
     predicted : tuple of (values, share)
-        Predicted distribution function for each kind of specimen.
+        Predicted distribution function for each kind of specimen: rising values in the
+        unit of the peaks, and the share of peaks up to each value.
     band : float
         The largest deviation stays below this value in 90 % of campaigns.
     precursors : dict of str to (measured, predicted) arrays
@@ -102,7 +96,7 @@ class Agreement(Result):
     cramer_von_mises: float
     largest_deviation: float
     p_values: dict[str, float]
-    predicted: tuple[Predicted, ...]
+    predicted: tuple[tuple[Array, Array], ...]
     band: float
     precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
@@ -216,7 +210,7 @@ def agreement(
     distances = _permuted(measured.values[0], values, replicates, rng)
     at = np.unique(np.concatenate([measured.values[0], values]))
     share = np.searchsorted(np.sort(values), at, side="right") / values.size
-    result = _agreement(measured, distances, (Predicted(at, share),))
+    result = _agreement(measured, distances, ((at, share),))
     if isinstance(peaks, Curves) and "event" in prediction.dims:
         precursors = _precursors(prediction, peaks)
         for name, pair in precursors.items():
@@ -327,7 +321,7 @@ def _with_posterior(
         # 5.
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
-        law = Predicted(at, shares.mean(axis=0))
+        law = at, shares.mean(axis=0)
         # Values of the mean distribution are uniform if the peaks come from it.
         squares, most = _distances(np.interp(np.sort([peaks, *drawn]), *law))
         distances[:, 0] += squares

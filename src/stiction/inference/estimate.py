@@ -64,8 +64,8 @@ LEAST_LEFT = 0.2
 """Least share of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
 """Rounds of step 6. The error of the field's share falls to this share of itself in each round."""
-PER_OCTAVE = 3
-"""Bands of wavenumbers in an octave."""
+BANDS_PER_OCTAVE = 3
+"""Bands of wavenumbers whose averages measure the roughness."""
 DRAWN = 5.0
 """Difference of scores above which no field of the lower family is drawn."""
 
@@ -260,7 +260,7 @@ def bands(group: Observed, expected: Array) -> Array:
     kept = weights > 0.0
     k = k[kept]
     # Single ordinates scatter by their own size. Averages of a band hide this scatter.
-    band = np.unique(np.round(PER_OCTAVE * np.log2(k / k.min())), return_inverse=True)[1]
+    band = np.unique(np.round(BANDS_PER_OCTAVE * np.log2(k / k.min())), return_inverse=True)[1]
     sums = [np.bincount(band, weights=w) for w in (k, group.average[kept], expected[kept])]
     return np.transpose(sums) / np.bincount(band)[:, None]
 
