@@ -34,6 +34,7 @@ Steps for the widths, for each design and each simulated campaign:
 Departure. Steps 5 to 8 keep only the `MAX_FIELDS` fields with the largest mass.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any
@@ -306,9 +307,9 @@ def _present(
         if problem != random.problem:
             raise InputError("problem: must be the problem of the posterior")
         size, tables = problem.interface.measure, random.likelihood
-        lengths = [size if length is None else length for length in random.peaks.lengths]
-        order = np.argsort(~np.isclose(lengths, size, rtol=1e-9), kind="stable")
-        if not np.isclose(lengths[order[0]], size, rtol=1e-9):
+        same = [length is None or math.isclose(length, size) for length in random.peaks.lengths]
+        order = np.argsort(np.logical_not(same), kind="stable")
+        if not any(same):
             raise InputError(f"random: no peaks are of specimens of the problem, {size:g} m")
         tables = tables.of([tables.peaks[kind] for kind in order], order)
         mass = random.grid.mass.sum(axis=(1, 2, 3))

@@ -429,9 +429,8 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
             "random: holds draws of mean and scatter between specimens, as a stored fit does. Pass"
             " the fit itself, or, for the fields within alone, [one.strength for one in random]"
         )
-    members = likely.members
-    refuse_conditioned(members)
-    return Profiles.of_interfaces(members, **more)
+    refuse_conditioned(likely.members)
+    return Profiles.of_interfaces(likely.members, **more)
 
 
 def _information(grid: FactorGrid, before: FactorGrid, proper: bool) -> dict[str, float]:

@@ -433,12 +433,11 @@ def effective_samples(alike: float, many: int, few: int) -> float:
 
 def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> None:
     """Warn if the simulation takes more than `WARN_SECONDS`."""
-    per_onset = experiment.seconds
-    seconds = samples * per_onset / (workers or usable_cores())
+    seconds = samples * experiment.seconds / (workers or usable_cores())
     if seconds > WARN_SECONDS:
         warn_user(
             f"the likelihood takes about {duration(seconds)}: {samples:,} onsets of"
-            f" {duration(per_onset)}. Take fewer samples or parameters, or LocalCriterion()",
+            f" {duration(experiment.seconds)}. Take fewer samples, nodes or unknown parameters",
             UserWarning,
         )
 
