@@ -190,10 +190,11 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
         share, left = place - left, left.astype(np.int64) % interface.size
         right = (left + 1) % interface.size
         scale = np.sqrt(period * (1.0 + U**2) * U)
-        weighted = [(D[left] * (1.0 - share) + D[right] * share) / (1.0 + u * u) for D in drops]
-        tips = [[scale * (w * (1.0 + side * cosine)).mean(axis=1) for side in (-1.0, 1.0)]
-                for w in weighted]  # fmt: skip
-        factors.append(np.moveaxis(np.array(tips), 1, 2))
+        D = np.take(drops, left, axis=1) * (1.0 - share) + np.take(drops, right, axis=1) * share
+        weighted = D / (1.0 + u * u)
+        left_tip, right_tip = (weighted * (1.0 + side * cosine) for side in (-1.0, 1.0))
+        both = np.stack((left_tip.mean(axis=-1), right_tip.mean(axis=-1)), axis=-1)
+        factors.append(scale[:, None] * both)
     return np.concatenate(factors, axis=1)
 
 

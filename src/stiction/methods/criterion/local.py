@@ -246,13 +246,9 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
             )
         for i in rows:
             # 2.
+            W, profile = sample.weakening_rate[i], sample.load_profile
             load[i], c, start[i] = weakest_window(
-                excess[i],
-                sample.load_profile,
-                sample.weakening_rate[i],
-                windows,
-                np.inf,
-                allowed,
+                excess[i], profile, W, windows, np.inf, allowed
             )
             if not np.isfinite(load[i]):
                 raise InputError(
