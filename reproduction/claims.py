@@ -11,7 +11,7 @@ from pathlib import Path
 import jinja2
 import pandas as pd
 
-from reproduction import PARAMETERS, measures, modulus, rules, setting
+from reproduction import PARAMETERS, measures, rules, setting
 from reproduction import numbers_with_errors as estimates
 from reproduction.numbers_with_errors import Number, number_of, rounded
 from reproduction.rules import Rule, Verdict, limits_times, together
@@ -99,7 +99,7 @@ class Finding:
 def series(quantity: Sequence[str], data: Data, key: str = "") -> Series:
     """Compute a quantity of a claim, in a reading of the modulus if it depends on it."""
     label, unit, source = quantity
-    names = NAMES | {"d": data, "key": key, "v": functools.partial(modulus.at, data, key)}
+    names = NAMES | {"d": data, "key": key, "v": functools.partial(data.reading, key)}
     function = _expression(source)
     for letter, ratios in OVER.items():
         if re.search(rf"\b{letter}\b", source):

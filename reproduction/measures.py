@@ -13,7 +13,7 @@ from scipy.special import ndtr
 import stiction as st
 from reproduction import PARAMETERS, TEXTS, setting
 from reproduction import numbers_with_errors as estimates
-from reproduction.modulus import at, odds, reading  # noqa: F401  # named in statements.toml
+from reproduction.modulus import compare, odds  # noqa: F401  # named in statements.toml
 from reproduction.numbers_with_errors import Number, lower_spread, mean, share
 from reproduction.runner import Data, LeftOut
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H

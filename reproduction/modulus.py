@@ -21,11 +21,6 @@ RESAMPLED = 400
 """Bootstrap samples, of the same draws in every reading."""
 
 
-def at(d: Data, key: str, name: str, ratio: float) -> np.ndarray:
-    """Return a variable of a reading at one xi_0/h_n."""
-    return d["readings"][name].sel(reading=key, correlation_ratio=ratio).values
-
-
 def _count(number: int, of: int, *ratios: float) -> Callable:
     """Return the chance of a number of misplaced onsets among so many."""
 
@@ -94,32 +89,27 @@ def _bootstrapped(values: np.ndarray) -> Number:
 
 
 @functools.cache
-def compare(data: Data, visible: float = 1.0) -> list[Reading]:
+def compare(data: Data, visible: float = 1.0) -> dict[str, Reading]:
     """Return all readings; `visible` is the difference of two means that would be seen."""
     count = data["readings"].sizes["sample"]
     drawn = np.random.default_rng(0).integers(count, size=(RESAMPLED, count))
     drawn = np.vstack([np.arange(count), drawn])
-    readings = []
+    readings = {}
     for key in READINGS:
-        values_of = functools.partial(at, data, key)
+        values_of = functools.partial(data.reading, key)
 
         @functools.cache
         def resampled(name, ratio, function=np.asarray, values_of=values_of):
             return np.mean(function(values_of(name, ratio))[drawn], axis=1)
 
         chances = tuple(function(resampled, visible) for function in EVIDENCE)
-        readings.append(Reading(key, chances, _bootstrapped(_eight(resampled))))
+        readings[key] = Reading(key, chances, _bootstrapped(_eight(resampled)))
     return readings
-
-
-def reading(data: Data, key: str) -> Reading:
-    """Return the reading with a letter."""
-    return compare(data)[list(READINGS).index(key)]
 
 
 def most_likely(data: Data) -> float:
     """Return the largest likelihood of a reading."""
-    return max(float(reading.likelihood[0]) for reading in compare(data)) or 1.0
+    return max(float(reading.likelihood[0]) for reading in compare(data).values()) or 1.0
 
 
 def odds(data: Data, evidence=slice(None), visible: float = 1.0) -> tuple[float, float, float]:
@@ -127,7 +117,7 @@ def odds(data: Data, evidence=slice(None), visible: float = 1.0) -> tuple[float,
 
     The best reading of each kind counts; `evidence` chooses among the printed results.
     """
-    readings = compare(data, visible)
+    readings = compare(data, visible).values()
     a, b, *two = [math.prod(reading.chances[evidence]) for reading in readings]
     ratio = np.maximum(*two) / np.maximum(np.maximum(a, b), 1e-300)
     return float(ratio[0]), *map(float, np.quantile(ratio[1:], (0.025, 0.975)))

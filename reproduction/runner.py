@@ -71,9 +71,13 @@ class Data:
             raise LeftOut(name)
         return self.studies[name].result()
 
-    def at(self, study: str, name: str, ratio: float) -> np.ndarray:
+    def at(self, study: str, name: str, ratio: float, **chosen) -> np.ndarray:
         """Return a variable of a study at one xi_0/h_n."""
-        return self[study][name].sel(correlation_ratio=ratio).values
+        return self[study][name].sel(correlation_ratio=ratio, **chosen).values
+
+    def reading(self, key: str, name: str, ratio: float) -> np.ndarray:
+        """Return a variable of a reading of the modulus at one xi_0/h_n."""
+        return self.at("readings", name, ratio, reading=key)
 
     def stress(self, ratio: float, study: str = "local") -> np.ndarray:
         """Return tau_cr of every sample, Pa."""

@@ -165,13 +165,11 @@ def strength(ratio: float, **changes):
     return dataclasses.replace(FIELD, spectrum=spectrum, **changes)
 
 
-def grid(problem, *, length: float = 1.0, nodes: float = 1.0):
-    """Return the problem with its length and its number of nodes multiplied."""
-    interface = problem.interface
-    changed = st.Interface(
-        length=interface.measure * length, nodes=2 * round(0.5 * interface.size * nodes)
-    )
-    return dataclasses.replace(problem, interface=changed)
+def grid(problem, *, nodes: float):
+    """Return the problem with its number of nodes multiplied."""
+    count = 2 * round(0.5 * problem.interface.size * nodes)
+    interface = st.Interface(length=problem.interface.measure, nodes=count)
+    return dataclasses.replace(problem, interface=interface)
 
 
 def distance(place, reference, period: float = L):
