@@ -253,12 +253,13 @@ def constrain(machine, events):
 def infer(machine, table, peaks, rows):
     """Print what the peaks say of parameters that one would defend beforehand.
 
-    Weakening rates are drawn near those that give the mean peak: others would have no weight.
+    Weakening rates are drawn near those that give the mean peak: others would have no weight. The
+    weight of a draw is the likelihood of the peaks, by a kernel density of simulated peaks.
     """
     rng = np.random.default_rng(2)
     count, samples = (20, 100) if QUICK else (400, 300)
     few, much = (rows[rows.cv == cv].set_index("excess").weakening_rate for cv in CVS)
-    members = []
+    draws, likelihoods = [], []
     for _ in range(count):
         excess, length = rng.uniform(EXCESS[0], EXCESS[-1]), 10.0 ** rng.uniform(-1.0, 0.0)
         whole = 10.0 ** rng.uniform(3.2, 3.8)  # Pa: local scatter times sqrt(length/LENGTH)
@@ -268,22 +269,22 @@ def infer(machine, table, peaks, rows):
         weakening_rate = max(low + weight * (high - low), 1e9) * np.exp(
             rng.uniform(-0.25, 0.25)
         )
-        members.append(
-            st.RandomInterface(
-                strength=strength_of(excess, cv, length),
-                weakening_rate=st.RandomField(
-                    st.Lognormal(mean=weakening_rate, cv=1e-6), st.ExponentialSpectrum(1.0)
-                ),
-            )
+        problem = rig(machine, weakening_rate, nodes=64)
+        simulated = onsets(problem, strength_of(excess, cv, length), samples)[0].critical_stress
+        density = scipy.stats.gaussian_kde(simulated)
+        likelihoods.append(np.log(density(peaks) + 1e-300).sum())
+        draws.append((length, weakening_rate / 1e9))
+    weights = np.exp(np.array(likelihoods) - max(likelihoods))
+    for name, values in zip(("length (m)", "W (GPa/m)"), np.transpose(draws), strict=True):
+        order = np.argsort(values)
+        shares = np.cumsum(weights[order]) / weights.sum()
+        after, before = (
+            np.interp((0.05, 0.95), shares, values[order]),
+            np.quantile(values, (0.05, 0.95)),
         )
-    found = st.infer(
-        rig(machine, weakening_rate=None, nodes=64),
-        members,
-        peaks,
-        method=st.Equilibrium(),
-        samples=samples,
-    )
-    print(found)
+        print(
+            f"{name}: {after[0]:.2f} to {after[1]:.2f}, before {before[0]:.2f} to {before[1]:.2f}"
+        )
     problem, strength = rig(machine, CENTRAL[0]), strength_of(CENTRAL[1], 0.5, 0.2)
     found, _ = onsets(problem, strength)
     for name, some in (("without drift", peaks), ("as measured", table.before)):
