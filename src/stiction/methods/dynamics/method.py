@@ -51,13 +51,9 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
         times, values = (real_array(part) for part in load)
     except (TypeError, ValueError):
         raise InputError("must be two arrays of numbers, (times, values)") from None
-    if times.ndim != 1 or times.shape != values.shape or times.size < 2:
-        shapes = f"{times.shape} and {values.shape}"
-        raise InputError(
-            f"needs two 1-d arrays of equal length, 2 or more, got shapes {shapes}"
-        )
-    if not (np.all(np.isfinite(times)) and np.all(np.isfinite(values))):
-        raise InputError("times and values must be finite")
+    finite = np.isfinite(times).all() and np.isfinite(values).all()
+    if times.ndim != 1 or times.shape != values.shape or times.size < 2 or not finite:
+        raise InputError("needs two arrays of equal length, 2 or more, of finite numbers")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times must begin at 0 s and increase")
     return PiecewiseLinear(times, values)

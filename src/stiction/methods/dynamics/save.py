@@ -185,15 +185,12 @@ class Save:
             nodes = x / interface.spacings
             index = tuple(np.round(nodes).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
-            text = ""
+            text = "is nearer to the first node than to any other"
             if not interface.breakable[index]:
                 text = "lies beyond the extent of the interface, where nothing slips"
-            elif np.any((nodes > NEARLY_ZERO) & (nodes < 0.5)):
-                text = "is nearer to the first node than to any other"
-            if text:
-                warn_user(
-                    f"stations[{name!r}]: {place} {text}. Check its unit (m)", UnitWarning
-                )
+            elif not np.any((nodes > NEARLY_ZERO) & (nodes < 0.5)):
+                continue
+            warn_user(f"stations[{name!r}]: {place} {text}. Check its unit (m)", UnitWarning)
         return np.array(numbers, dtype=np.int64)
 
 

@@ -73,13 +73,8 @@ def write_scec(
     >>> files[-1].name
     'cplot.txt'
     """
-    lacking = [
-        name
-        for variable in STATION_UNITS
-        for name in (variable, f"station_{variable}")
-        if name not in run
-    ]
-    if lacking:
+    needed = [*STATION_UNITS, *(f"station_{name}" for name in STATION_UNITS)]
+    if lacking := [name for name in needed if name not in run]:
         raise InputError(
             f"run: lacks {', '.join(lacking)}. Call st.simulate_rupture with save=st.Save("
             f"{list(STATION_UNITS)}, stations=...)"

@@ -75,8 +75,7 @@ def simulate_event(
     """Return an event of a specimen over time, by default the sliding event."""
     if save.to is not None or save.stations:
         raise InputError(
-            "save: leave 'to' and 'stations' out, as an event on a specimen is kept in memory with"
-            " all nodes"
+            "save: leave 'to' and 'stations' out, as on specimens all is in memory"
         )
     refuse_overstress(rows)
     program: RuptureProgram = method.program(problem)
@@ -90,9 +89,7 @@ def simulate_event(
         if not states:
             raise InputError("problem: the machine is so stiff that no patch becomes unstable")
         if (number or 0) >= len(states):
-            raise InputError(
-                f"event: must be below the number of events, {len(states)}, got {number}"
-            )
+            raise InputError(f"event: must be below {len(states)}, the number of events")
         before = states[-1 if number is None else number]
         trial = program.event(sample, before)  # 2.
         trial.run(method.max_steps)
