@@ -94,6 +94,14 @@ def test_a_plot_refuses_what_it_cannot_draw():
     assert not plt.get_fignums()
 
 
+def test_events_are_not_drawn_if_none_came_to_rest():
+    """Logarithmic scales without a number failed when the figure was saved."""
+    names = ("event_moment", "event_length", "event_area_stress_drop")
+    empty = ("sample", "event"), np.full((2, 3), np.nan), {"units": "N"}
+    with pytest.raises(st.InputError, match="has no events"):
+        st.plot.events(xr.Dataset(dict.fromkeys(names, empty)), problem=PROBLEM)
+
+
 def test_a_sample_that_does_not_exist_is_refused():
     onset = st.onset(JOINT, JOINT_STRENGTH, method=LOCAL)
     for sample in (2, -1, 0.5, "a"):
