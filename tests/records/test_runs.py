@@ -49,7 +49,7 @@ PLAIN = re.compile(
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])", re.ASCII)
 CHANGES = re.compile(
     r"\d+(\.\d+)? (us|ms|s|min|h)\b|(numpy|numba|scipy|stiction|Python) [\d.]+\S*|\S*/tmp\S*"
-    r"|(?<=chunks )\d+|(?<=on the )\d+(?= here)|probed at \d+|\d+ of \d+ (?=probed)"
+    r"|chunks +\d+|(?<=on the )\d+(?= here)|probed at \d+|\d+ of \d+ (?=probed)"
 )
 
 

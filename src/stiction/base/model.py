@@ -14,6 +14,7 @@ import os
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import (
     TYPE_CHECKING,
@@ -70,12 +71,7 @@ def _real(value: Any, info: pydantic.ValidationInfo) -> float:
 
 def in_si(value: Any, name: str) -> Any:
     """Return a quantity as a number in the argument's SI unit. Return other values unchanged."""
-    if not is_quantity(value):
-        return value
-    try:
-        return magnitude_in_one_of(value, units_of_argument(name))[0]
-    except InputError as error:
-        raise ValueError(str(error)) from None
+    return magnitude_in_one_of(value, units_of_argument(name))[0]
 
 
 def as_count(value: Any) -> int:
@@ -89,18 +85,16 @@ def as_count(value: Any) -> int:
 
 def is_whole(value: Any, least: int) -> bool:
     """Return whether a value is a whole number, such as 1e4, and not less than `least`."""
-    try:
+    with suppress(ValueError):
         return as_count(value) >= least
-    except ValueError:
-        return False
+    return False
 
 
 def is_finite(value: Any) -> bool:
     """Return whether a value is a finite number, and neither a string nor a Boolean."""
-    try:
+    with suppress(ValueError):
         return math.isfinite(as_number(value))
-    except ValueError:
-        return False
+    return False
 
 
 def real_array(value: Any) -> Array:

@@ -182,20 +182,6 @@ def is_quantity(value: Any) -> bool:
     return pint or (hasattr(value, "to_value") and hasattr(value, "unit"))
 
 
-def magnitude(value: Any, si: str) -> Any:
-    """Return a quantity as a number in an SI unit. Return other values unchanged."""
-    if not is_quantity(value):
-        return value
-    text = re.sub(r"(-\d)", r"**\1", si).replace(" ", "*")  # Pa m-1: Pa*m**-1
-    text = "" if text == "1" else text
-    try:
-        if hasattr(value, "to_value"):
-            return value.to_value(text)
-        return value.to(text).magnitude
-    except Exception as error:  # each library has its own for 'no such unit'
-        raise InputError(f"cannot be converted to {si}: {error}") from None
-
-
 def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     """Return a quantity as a number in the first SI unit that fits, and the unit.
 
@@ -204,10 +190,10 @@ def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | No
     if not is_quantity(value):
         return value, None
     for si in units:
-        try:
-            return magnitude(value, si), si
-        except InputError:
-            continue
+        text = re.sub(r"(-\d)", r"**\1", "" if si == "1" else si).replace(" ", "*")  # Pa*m**-1
+        with suppress(Exception):  # each library has its own for 'no such unit'
+            number = value.to_value(text) if hasattr(value, "to_value") else value.to(text)
+            return getattr(number, "magnitude", number), si
     stated = getattr(value, "unit", None) or getattr(value, "units", "another unit")
     raise InputError(f"is in {stated}, which cannot be converted to {' or '.join(units)}")
 

@@ -201,7 +201,6 @@ def status(run: RunPath) -> None:
     Examples:
       stiction status run
     """
-
     stored = st.open_run(run)
     state, points = stored.status(), stored.study.points
     samples = state.samples // len(points)
@@ -248,7 +247,6 @@ def export(
       stiction export run samples.csv --partial
       stiction export run events.csv --events
     """
-
     stored = st.open_run(run)
     stored.export(out, partial=partial, events=events)
     state = stored.status()
@@ -652,7 +650,6 @@ def reliability(
 
 def _state_of(out: Path, part: str | None) -> Any:
     """Print how much of a run is stored, and return its state."""
-
     stored = st.open_run(out)
     state = stored.status()
     beginning = f"part {part}: " if part else ""

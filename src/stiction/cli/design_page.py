@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from stiction import plot
@@ -21,6 +22,9 @@ from stiction.ensemble.batches import versions
 from stiction.plot.style import PAGE, paper_style
 from stiction.problem.problem import Problem
 from stiction.reliability.answer import Answer, unseen_batch
+
+MAX_SHOWN_VALUES = 8
+"""Values of an input that are listed."""
 
 
 @checked
@@ -155,18 +159,6 @@ def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
 
 def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
     """Return the constants of a problem by dotted key, with units and sources."""
-    rows: list[list[Any]] = []
-
-    def add(table: Mapping[str, Any], begin: str) -> None:
-        for name, value in table.items():
-            key = f"{begin}{name}"
-            if isinstance(value, Mapping):
-                add(value, f"{key}.")
-            elif value is not None:
-                numbers = isinstance(value, list) and len(value) > 8
-                shown = f"{len(value)} values, mean {np.mean(value):.5g}" if numbers else value
-                rows.append([key, shown, UNITS.get(name, ""), sources.get(key, "assumed")])
-
     # Young's modulus is shown beside the shear modulus, which is stored, with the
     # same source.
     plain = to_plain(problem)
@@ -174,11 +166,16 @@ def _inputs(problem: Problem, sources: Mapping[str, str]) -> list[list[Any]]:
     moduli = "solid.shear_modulus", "solid.youngs_modulus"
     stated = [sources[key] for key in moduli if key in sources]
     sources = dict.fromkeys(moduli, (*stated, "assumed")[0]) | dict(sources)
-    add(plain, "")
-    keys = {row[0] for row in rows}
-    if unknown := [key for key in sources if key not in keys]:
+    inputs = pd.json_normalize(plain).to_dict("records")[0]
+    rows: list[list[Any]] = []
+    for key, value in inputs.items():
+        many = isinstance(value, list) and len(value) > MAX_SHOWN_VALUES
+        shown = f"{len(value)} values, mean {np.mean(value):.5g}" if many else value
+        unit = UNITS.get(str(key).rpartition(".")[2], "")
+        rows.append([key, shown, unit, sources.get(str(key), "assumed")])
+    if unknown := [key for key in sources if key not in inputs]:
         raise InputError(
             f"sources: {unknown[0]!r} is not an input of this problem. The inputs are"
-            f" {', '.join(keys)}"
+            f" {', '.join(map(str, inputs))}"
         )
     return rows

@@ -19,7 +19,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
 from stiction.base.model import FilePath, Number, RealArray, check, checked, describe, is_finite
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, is_in, magnitude
+from stiction.base.units import factor_to, is_in, magnitude_in_one_of
 from stiction.inference.curves import Curves, column_in_si
 from stiction.problem.profiles.files import read_table
 from stiction.problem.profiles.labels import column_of, with_stated_unit, without_missing
@@ -102,7 +102,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             return _of_table(table_of_frame(peaks), None, Options())
     # Lengths may be quantities with a unit.
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
-    groups = {magnitude(length, "m"): values for length, values in groups.items()}
+    groups = {magnitude_in_one_of(key, ["m"])[0]: values for key, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
             "peaks: the keys of a mapping must be lengths (m), such as {0.1: [...], 0.2: [...]}."

@@ -33,7 +33,7 @@ from stiction.base.errors import (
     warn_user,
 )
 from stiction.base.model import as_numbers, describe, real_array
-from stiction.base.units import factor_to, is_in, magnitude, parse, plain
+from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
 from stiction.problem.profiles.files import GREY_VALUE, HEIGHT, heights_of, load
 from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE
@@ -94,7 +94,7 @@ def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     """Return the values of a DataArray in SI, converted from its unit or the unit of the caller."""
     stated = unit_of(array)
     with prefixed(what, " "):
-        values = as_numbers(magnitude(array.data, si))
+        values = as_numbers(magnitude_in_one_of(array.data, [si])[0])
         factor = factor_to(si, given or stated or si)
         known = given and parse(stated)
         if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
