@@ -209,8 +209,7 @@ def private_folder(folder: Path) -> Path:
     except OSError as error:  # nothing can be kept there
         _warn_once(
             f"{folder.parent} cannot be used ({error.strerror or error}), so that kernels are"
-            " compiled in every process, which takes up to half a minute. Set STICTION_CACHE_DIR"
-            " to a folder of your own"
+            " compiled in every process. Set STICTION_CACHE_DIR to a folder of your own"
         )
         return folder
     return _stand_in(weakness, folder.name) if weakness else folder
@@ -236,9 +235,8 @@ def _weakness(folder: Path) -> str:
 def _stand_in(weakness: str, name: str) -> Path:
     """Return a temporary folder for this process, and warn why it is needed."""
     _warn_once(
-        f"{weakness}, so that others could put compiled code there that runs as you. Kernels are"
-        " compiled again in each process. Take write access from others (chmod go-w), or set"
-        " STICTION_CACHE_DIR to an absolute path of a folder of your own"
+        f"{weakness}, so that others could put compiled code there. Each process compiles again."
+        " Run chmod go-w, or set STICTION_CACHE_DIR to an absolute path of a folder of your own"
     )
     folder = _temporary_folder() / name
     folder.mkdir(mode=0o700, exist_ok=True)

@@ -641,9 +641,8 @@ def reliability(
     echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
     if "members" in curve:
         echo(
-            f"probability: the mean over {curve.sizes['member']} equally likely interfaces, to"
-            " decide with. probability_low and _high: its 95 % interval. band_low and _high: 90 %"
-            " of the interfaces"
+            f"probability: the mean over {curve.sizes['member']} equally likely interfaces, with"
+            " its 95 % interval (_low, _high). band_low and band_high: 90 % of the interfaces"
         )
     _state_of(out, part)
 

@@ -114,10 +114,8 @@ class Repetitions:
     ) -> None:
         if any(optional_member(point.method, "counted_only") for point in points):
             raise InputError(
-                "method: st.Rupture cannot compute a failure curve, because its failures can only"
-                " be"
-                " counted. Use st.Equilibrium() or st.LocalCriterion(), or call"
-                " failure_probability(..., algorithm='plain')"
+                "method: failures of st.Rupture can only be counted. Use st.Equilibrium(),"
+                " st.LocalCriterion() or failure_probability(..., algorithm='plain')"
             )
         self.smallest, self._only = settings["smallest"], only
         self.states = [LimitState(point, settings["event"]) for point in points]

@@ -313,8 +313,7 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: has several numbers for each sample and does not fit into a table."
-            " Export a .nc file to keep it, or with --events (in Python events=True) a table of"
-            " events"
+            " Export a .nc file to keep it, or a table of --events (in Python events=True)"
         )
     return _frame_of(result.drop_vars(wide))
 
