@@ -16,7 +16,11 @@ from stiction.base.progress import Meter
 @pytest.fixture
 def hasty(monkeypatch):
     """The same waits, a hundred times shorter."""
-    for name, seconds in {"SILENCE": 0.02, "PIPE_INTERVAL": 0.1}.items():
+    for name, seconds in {
+        "SILENCE": 0.02,
+        "PIPE_INTERVAL": 0.1,
+        "NOTEBOOK_INTERVAL": 0.005,
+    }.items():
         monkeypatch.setattr(progress, name, seconds)
 
 
@@ -84,10 +88,23 @@ def test_one_of_nested_meters_is_shown(hasty, capsys):
     python("-c", code)
 
 
-def test_a_notebook_has_one_line_that_is_overwritten(hasty, monkeypatch, capsys):
+def test_a_notebook_has_one_output_that_is_empty_at_the_end(hasty, monkeypatch):
+    """No widgets, and no line for each update in a saved notebook."""
+    shell = pytest.importorskip("IPython.display")
+    outputs = []
+
+    class Handle:
+        def update(self, data, raw):
+            outputs[-1].append(data)
+
+    def display(data, raw, display_id):
+        outputs.append([data])
+        return Handle()
+
     monkeypatch.setitem(sys.modules, "ipykernel", object())
+    monkeypatch.setattr(shell, "display", display)
     with Meter("outer"):
         work(Meter("by equilibrium", 20))
-    shown = capsys.readouterr().err
-    assert "by equilibrium: " in shown
-    assert "\n" not in shown
+    ((first, *shown, last),) = outputs
+    assert first == last == {}
+    assert any("by equilibrium: " in data["text/plain"] for data in shown)

@@ -194,7 +194,7 @@ def _texts(dataset: Any, budget: list[int]) -> Any:
         texts.append(text.decode(errors="replace") if isinstance(text, bytes) else str(text))
         budget[0] -= max(len(texts[-1]), 1)
         if budget[0] < 0:
-            raise InputError("its strings are larger than the file. Write the file again")
+            raise InputError("its strings need more memory than the whole file. Write it again")
     return np.array(texts, dtype=str)
 
 

@@ -1,7 +1,7 @@
 """Report the progress of long work, with the same mechanism everywhere.
 
-After a second, a terminal shows a bar (rich). A pipe receives a line now and then, and a
-notebook a line that is overwritten. The working code reports its progress with `advance`.
+After a second, a terminal shows a bar (rich), and a notebook shows an output that is updated.
+A pipe receives a line now and then. The working code reports its progress with `advance`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ Show: TypeAlias = bool | Callable[[int, int], None]
 
 SILENCE = 1.0
 """Seconds without a bar, because short work needs none."""
-PIPE_INTERVAL = 10.0
-"""Seconds between lines in a pipe or a notebook, at least."""
+PIPE_INTERVAL, NOTEBOOK_INTERVAL = 10.0, 0.5
+"""Seconds between lines in a pipe, at least, and between updates in a notebook."""
 
 interrupted = threading.Event()
 """Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
@@ -40,7 +40,7 @@ class Meter:
     def __init__(
         self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
     ) -> None:
-        self.unit, self._show = unit, show
+        self.unit, self._show, self._display = unit, show, None
         self.stage(what, total)
         self._begun = time.monotonic()
 
@@ -58,7 +58,7 @@ class Meter:
             self._first = time.monotonic(), self.done
         if callable(self._show):
             self._show(self.done, self.total or 0)
-        elif self in _running and not _in_terminal():
+        elif self in _running and _running[0]._display is None:
             _running[0]._write_line()
 
     @property
@@ -84,30 +84,30 @@ class Meter:
         self._begun, self._line_due = time.monotonic(), PIPE_INTERVAL
         if self._show is True:
             _running.append(self)
-        if _running == [self] and _in_terminal():
-            self._bar = _bar()
-            self._starter = threading.Timer(SILENCE, self._bar.start)
-            self._starter.daemon = True
-            self._starter.start()
+        if _running == [self]:
+            self._display = _display()
+            if self._display is not None:
+                self._starter = threading.Timer(SILENCE, self._display.start)
+                self._starter.daemon = True
+                self._starter.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        if hasattr(self, "_bar"):
+        if self._display is not None:
             self._starter.cancel()
+            self._display.stop()
             self._starter.join()
-            self._bar.stop()
+            self._display.stop()  # if it had just started
         elif _running[:1] == [self] and self._line_due > PIPE_INTERVAL:
             self._write_line(last=True)
         if self in _running:
             _running.remove(self)
 
     def _write_line(self, last: bool = False) -> None:
-        """Write a line for a pipe or a notebook if it is due: few, however long the work takes."""
+        """Write a line for a pipe if it is due: few lines, however long the work takes."""
         if last or self.elapsed >= self._line_due:
             self._line_due = max(self.elapsed + PIPE_INTERVAL, 1.1 * self.elapsed)
-            line, notebook = f"{_shown().what}: {_shown().text}", "ipykernel" in sys.modules
-            end = "\r" if notebook else "\n"  # a notebook shows the last line only
-            print(line.ljust(80 * notebook), end=end, file=sys.stderr, flush=True)
+            print(f"{_shown().what}: {_shown().text}", file=sys.stderr, flush=True)
 
 
 SILENT = Meter("", show=False)
@@ -122,15 +122,15 @@ def _shown() -> Meter:
     return next((meter for meter in _running if meter.total), _running[-1])
 
 
-def _in_terminal() -> bool:
-    return sys.stderr is not None and sys.stderr.isatty()
+def _display() -> Any:
+    """Return what shows a running meter between `start` and `stop`, or None for a pipe."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return _bar()
+    return _Output() if "ipykernel" in sys.modules else None
 
 
 def _bar() -> Any:
-    """Return a bar that shows a running meter and disappears at the end.
-
-    Printed lines appear above the bar.
-    """
+    """Return a bar that disappears at the end. Printed lines appear above the bar."""
     from rich.console import Console
     from rich.live import Live
     from rich.progress_bar import ProgressBar
@@ -144,3 +144,24 @@ def _bar() -> Any:
 
     options: Any = {"transient": True, "redirect_stdout": False}
     return Live(get_renderable=row, console=Console(stderr=True), **options)
+
+
+class _Output:
+    """An output of a notebook, which is empty at the end. Rich would need ipywidgets."""
+
+    def __init__(self) -> None:
+        self._ended = threading.Event()
+
+    def start(self) -> None:
+        """Show a running meter until `stop`."""
+        from IPython.display import display
+
+        handle = display({}, raw=True, display_id=True)
+        while not self._ended.wait(NOTEBOOK_INTERVAL):
+            text = f"{_shown().what}: {_shown().text}"
+            handle.update({"text/plain": text}, raw=True)
+        handle.update({}, raw=True)
+
+    def stop(self) -> None:
+        """End, and leave an empty output."""
+        self._ended.set()

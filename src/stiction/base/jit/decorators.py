@@ -6,6 +6,7 @@ import contextlib
 import hashlib
 import logging
 import math
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
@@ -126,7 +127,9 @@ def _announce(part: list[str], kept: bool) -> None:
     when = "on first use only, then cached" if kept else "for your friction law; not cached"
     for text in {f"{name} ({when})" for name in part} - _announced:
         _announced.add(text)
-        logger.warning("compiling kernels: %s", text)
+        # In a notebook the line would stay.
+        level = logging.INFO if "ipykernel" in sys.modules else logging.WARNING
+        logger.log(level, "compiling kernels: %s", text)
 
 
 def _compile(function: Kernel, options: str) -> Kernel:
