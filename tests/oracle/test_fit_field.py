@@ -102,7 +102,7 @@ def test_the_likelihood_is_that_of_values(noise):
     assert -10.0 < worse - mean_log_likelihood(bounded, values, noise) < -0.02
 
 
-@pytest.mark.parametrize("records", [2, 7])
+@pytest.mark.parametrize("records", [2, pytest.param(7, marks=pytest.mark.slow)])
 def test_levels_alone_predict_the_level_of_another_specimen(records):
     """Scatter drawn from its prior: the next level is as likely in each fifth of its forecast."""
     rng, held, within = np.random.default_rng(records), [], np.full((1, records), 0.04**2)

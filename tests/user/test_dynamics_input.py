@@ -119,6 +119,7 @@ def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
     refuses("file", lambda: simulate(st.Save(to=tmp_path / "file" / "run")), StoreError)
 
 
+@pytest.mark.filterwarnings("ignore:cache:UserWarning")
 def test_fitted_kernels_are_kept_but_need_no_folder(tmp_path, monkeypatch):
     def built():
         """The kernel as a process that begins finds it."""

@@ -38,7 +38,7 @@ def by_hand(peaks, error):
         if error:
             onset = m[:, None] * np.exp(sigma[..., None] * z - 0.5 * sigma[..., None] ** 2)
             density = scipy.stats.norm(onset, error).pdf(peak) * scipy.stats.norm.pdf(z)
-            total += np.log(np.trapezoid(density, z))
+            total += np.log(np.maximum(np.trapezoid(density, z), 1e-300))
         else:
             away = np.log(peak / m) + 0.5 * sigma**2
             total += -0.5 * (away / sigma) ** 2 - np.log(sigma)

@@ -82,10 +82,9 @@ def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
         lines = [call[0].format(call[which]) for call in calls]
         (tmp_path / name).write_text(head + "\n".join(lines))
     config = tmp_path / "pyrightconfig.json"
-    config.write_text('{"include": ["right.py"], "typeCheckingMode": "strict"}')
+    config.write_text('{"typeCheckingMode": "strict"}')
     options = ["-m", "basedpyright", "--level", "error", "--outputjson"]
     options += ["--pythonpath", sys.executable]  # else the first Python of the path
-    right = json.loads(python(*options, "-p", config))["generalDiagnostics"]
-    assert [one["message"] for one in right] == []
-    found = json.loads(python(*options, tmp_path / "wrong.py", code=1))["generalDiagnostics"]
+    found = json.loads(python(*options, "-p", config, code=1))["generalDiagnostics"]
+    assert [one["message"] for one in found if one["file"].endswith("right.py")] == []
     assert {one["range"]["start"]["line"] - 2 for one in found} >= {*range(len(calls))}
