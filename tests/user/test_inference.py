@@ -11,6 +11,8 @@ import xarray as xr
 from setups import LOCAL
 
 import stiction as st
+from stiction.ensemble.experiment import Experiment
+from stiction.inference.infer import UNFINISHED
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
@@ -30,7 +32,34 @@ def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
     return st.infer(problem, random, peaks, prior=prior, **options)
 
 
-@pytest.mark.filterwarnings("ignore:Estimated shape parameter:UserWarning")  # seven peaks
+def test_a_call_after_an_interruption_takes_the_finished_onsets(monkeypatch):
+    solve, solved = Experiment.results, []
+
+    def results(self, first, count):
+        if len(solved) == last:
+            raise stop
+        solved.append(first)
+        return solve(self, first, count)
+
+    monkeypatch.setattr(Experiment, "results", results)
+    given = {"prior": {"correlation_length": (H_N, 2.0 * H_N)}, "workers": 1}
+    stop, last = KeyboardInterrupt, -1
+    uninterrupted = infer(**given)
+    total, last = len(solved), len(solved) + 2
+    with pytest.raises(KeyboardInterrupt):
+        infer(**given)
+    last = -1
+    resumed = infer(**given)
+    assert len(solved) == 2 * total  # no batch is solved twice
+    np.testing.assert_array_equal(resumed.u, uninterrupted.u)
+    infer(**given)
+    assert len(solved) == 3 * total  # a complete call leaves nothing behind
+    stop, last = MemoryError, len(solved) + 2
+    with pytest.raises(MemoryError):
+        infer(**given)
+    assert not UNFINISHED  # an error leaves nothing behind
+
+
 def test_arviz():
     arviz = pytest.importorskip("arviz")
     posterior = infer(prior=PRIOR, samples=400, load_cell_error=5e3)

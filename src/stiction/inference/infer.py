@@ -22,6 +22,8 @@ Steps:
 
 import itertools
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -32,7 +34,7 @@ from scipy.stats import entropy
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, Number, Progress, checked
-from stiction.base.progress import Meter
+from stiction.base.progress import Meter, Show
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
 from stiction.inference.fit import FieldFit
@@ -84,6 +86,24 @@ PRIOR_END, PILED = 0.02, 4.0
 """Share of a prior at either end, and multiple of this share above which the posterior piles up."""
 OUTWARDS = np.array([[-1.0], [1.0]])
 """Directions in which the lower and the upper corner of a box move when it grows."""
+
+
+UNFINISHED: dict[Any, Array] = {}
+"""Onsets from an interrupted call. The next equal call takes them."""
+
+
+@contextmanager
+def _simulating(
+    method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
+) -> Iterator[Simulation]:
+    """Provide a simulation. It keeps its onsets after Ctrl-C, and discards them otherwise."""
+    with Meter("infer", show=progress) as meter:
+        try:
+            yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
+        except Exception:
+            UNFINISHED.clear()
+            raise
+        UNFINISHED.clear()
 
 
 @checked
@@ -186,7 +206,9 @@ def infer(
     the strength need no simulation (`stiction.inference.scaling`). At most four other
     parameters are simulated on a grid, with the same draws at all points, and
     interpolated. The posterior is summed on a grid. For more parameters, give
-    `log_likelihood` and `prior_transform` of the result to emcee or dynesty.
+    `log_likelihood` and `prior_transform` of the result to emcee or dynesty. After an
+    interruption with Ctrl-C, an identical call in the same session continues with the
+    finished onsets.
 
     Mean and scatter between specimens are integrated on a grid, with sixty fields
     within a specimen from the repetitions of the fit
@@ -235,8 +257,7 @@ def infer(
             f"peaks: are of specimens of {length:g} m, but the problem is of {size:g} m. Pass the"
             " problem of the tests. The posterior serves other problems, too"
         )
-    with Meter("infer", show=progress) as meter:
-        simulation = Simulation(method, samples, seed, workers, meter)
+    with _simulating(method, samples, seed, workers, progress) as simulation:
         if prior and {*prior} - {MEAN_KEY, SCATTER_KEY}:
             unknown = make_prior(problem, random, prior)
             posterior = _of_parameters(unknown, simulation, measured, error)
