@@ -86,7 +86,8 @@ def factors(truth, count, rng):
 def smoothed(family, cvs, deviation):
     """Return log densities of log b + a normal number of this deviation at X, (cvs, X)."""
     ends = np.append(X - 0.5 * STEP, X[-1] + 0.5 * STEP)
-    mass = np.array([np.diff(law(family, cv).cdf(np.exp(ends))) for cv in cvs])
+    with np.errstate(over="ignore"):  # powers of values far above the mean
+        mass = np.array([np.diff(law(family, cv).cdf(np.exp(ends))) for cv in cvs])
     away = np.fft.fftfreq(X.size, STEP)
     kernel = np.exp(-2.0 * (np.pi * deviation * away) ** 2)
     found = np.fft.ifft(np.fft.fft(mass, axis=1) * kernel, axis=1).real
