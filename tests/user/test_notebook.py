@@ -120,7 +120,10 @@ def test_a_lambda_in_a_process_pool_is_named():
     )
     field = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum)
     problem, method = st.paper.problem(nodes=256), st.LocalCriterion()
-    with ProcessPoolExecutor(1) as pool, pytest.raises(st.InputError, match="not as a lambda"):
+    with (
+        ProcessPoolExecutor(1) as pool,
+        pytest.raises(st.InputError, match="executor: .*lambda"),
+    ):
         st.monte_carlo(problem, field, method=method, samples=4, executor=pool, progress=False)
 
 
