@@ -10,6 +10,7 @@ from oracles import dense, symbol_of
 from setups import QUARTER, make_problem
 
 import stiction as st
+from stiction.base.errors import StoreError
 from stiction.methods.dynamics.summary import rate_spectrum
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.sample import EquilibriumState
@@ -143,6 +144,8 @@ def test_films_scale_to_what_breaks_and_files_name_their_problem(run, tmp_path):
         run, tmp_path, origin=0.02, normal_stress=-5e6, benchmark="ends"
     )
     assert all(path.read_text().startswith("# problem=ends\n") for path in paths)
+    with pytest.raises(StoreError, match="none/film.gif: cannot be written"):
+        st.plot.film(run, tmp_path / "none/film.gif", frames=2, progress=False)
 
 
 def test_pictures_name_their_parts(run):

@@ -58,6 +58,7 @@ PROFILES = {  # of a line, and what comes of it: values at the nodes, or words o
     "list of astropy": ([v * u.kPa for v in KPA], IN_ORDER),
     "lengths": (KPA * u.m, "Pa"),
     "mixed list": ([KPA[0] * u.kPa, *STRENGTH[1:]], "without a unit"),
+    "400 digits": (np.array([10**400] * NODES, dtype=object), "numbers"),
     "a mask over all": (np.ma.masked_all(NODES), "mask"),
 }  # fmt: skip
 

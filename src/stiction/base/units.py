@@ -227,7 +227,9 @@ def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
         number = np.ma.filled(number.astype(np.float64), np.nan)
     has_none = isinstance(number, list | tuple) and any(item is None for item in number)
     if has_none or (isinstance(number, np.ndarray) and number.dtype == object):
-        with suppress(TypeError, ValueError):  # texts are refused where numbers are checked
+        with suppress(
+            TypeError, ValueError, OverflowError
+        ):  # texts are refused where numbers are checked
             number = np.array(number, dtype=np.float64)  # None becomes NaN
     return number, unit
 

@@ -1,6 +1,7 @@
 """Figures of ruptures: slip rate, front, film, moment rate, and sizes of many events."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from PIL import Image
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
+from stiction.base.files import write_whole
 from stiction.base.model import Count, FilePath, check
 from stiction.base.progress import Meter, Show
 from stiction.base.units import unit_for
@@ -293,6 +295,8 @@ def film(
     ------
     InputError
         If a variable was not kept, or the path does not end in .gif.
+    StoreError
+        If the file cannot be written.
     """
     need(run, "slip_rate", "shear_stress", "peak_strength", hint=KEEP)
     check("frames", frames, Count)
@@ -318,9 +322,11 @@ def film(
             frame = Image.fromarray(np.asarray(canvas.buffer_rgba()).copy()).convert("RGB")
             images.append(frame.quantize(128, Image.Quantize.FASTOCTREE, dither=still))
             meter.advance()
-        images[0].save(
-            target, save_all=True, append_images=images[1:], duration=FRAME_TIME, loop=0
-        )
+    save = partial(
+        images[0].save, format="GIF", save_all=True, append_images=images[1:],
+        duration=FRAME_TIME, loop=0,
+    )  # fmt: skip
+    write_whole(target, save)
     return target
 
 
