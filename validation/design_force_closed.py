@@ -15,8 +15,7 @@ Steps, as in `stiction.inference.specimens`, but for arrays of its own:
 4. The predictive distribution function of a further peak is the mean over the posterior.
 
 Truths of b have s = 0.08: log-normal, Weibull, gamma, normal, two batches of 25 and 75 %, and an
-exponential lower tail. A rare batch, 5 % of the specimens, is weaker by a quarter.
-The right design is a quantile of two million draws.
+exponential lower tail. A rare batch of 5 % is weaker by a quarter. Right designs are quantiles.
 
 Run: ``python validation/design_force_closed.py [CAMPAIGNS [SEED]]``
 """

@@ -8,8 +8,8 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-# The stub lists the public names, and editors read it, too. Each name is imported
-# on first use, so that `import stiction` is quick.
+# The stub lists the public names, and editors read it, too. Each name
+# is imported on first use, so that `import stiction` is quick.
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
     name: home

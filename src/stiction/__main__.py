@@ -1,7 +1,8 @@
 """The command line as ``python -m stiction``.
 
-Python looks for modules in the current folder first, and its files may come from a
-stranger. Therefore the current folder is removed from the path. The command
+Python looks for modules in the current folder first,
+and its files may come from a stranger. Therefore the
+current folder is removed from the path. The command
 ``stiction`` does not search the current folder either.
 """
 

@@ -1,7 +1,7 @@
 """Names for your own packages that add a method, law, load, marginal or spectrum.
 
-`docs/plug-ins.md` shows an example of each. Import these names from this module,
-because the modules that define them may move.
+`docs/plug-ins.md` shows an example of each. Import these names from
+this module, because the modules that define them may move.
 """
 
 from stiction.base.kinds import register

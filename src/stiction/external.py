@@ -54,18 +54,19 @@ def simulator(
     Returns
     -------
     callable
-        ``simulate(theta)`` returns an array (samples,) of peaks, Pa, for an array
-        theta with a number for each parameter. ``simulate(theta, first=k)`` returns
-        the peaks of samples k, k + 1, ... If k >= samples, these peaks are
-        independent of the first call. All theta share the samples, so peaks are
-        smooth functions of theta.
+        ``simulate(theta)`` returns an array (samples,) of
+        peaks, Pa, for an array theta with a number for each
+        parameter. ``simulate(theta, first=k)`` returns the
+        peaks of samples k, k + 1, ... If k >= samples, these
+        peaks are independent of the first call. All theta share
+        the samples, so peaks are smooth functions of theta.
 
     Raises
     ------
     InputError
-        If an argument is invalid or a parameter does not exist. The returned function
-        raises an `InputError` if the values of the parameters give an invalid
-        problem.
+        If an argument is invalid or a parameter does not exist. The
+        returned function raises an `InputError` if the values of the
+        parameters give an invalid problem.
 
     Examples
     --------

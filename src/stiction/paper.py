@@ -1,7 +1,7 @@
 """The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests.
 
-It uses the public names of the package only. They are imported on first use, so that a `Problem`
-does not load random fields.
+It uses the public names of the package only. They are imported on first
+use, so that a `Problem` does not load random fields.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ def __dir__() -> list[str]:  # what completion lists
 def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") -> st.Problem:
     """Return the problem of Albertini, Karrer, Grigoriu and Kammer (2020).
 
-    The problem is in mode II, with G = 1 GPa, nu = 0.33, rho = 1170 kg/m3, L = 0.1 m
-    and W = 0.5 TPa/m. Only the strength above the residual strength affects the
-    onset, so the residual strength is zero.
+    The problem is in mode II, with G = 1 GPa, nu =
+    0.33, rho = 1170 kg/m3, L = 0.1 m and W = 0.5 TPa/m.
+    Only the strength above the residual strength
+    affects the onset, so the residual strength is zero.
 
     Parameters
     ----------
@@ -45,8 +46,9 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
 def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.RandomField:
     """Return the random strength of Albertini et al. (2020, Eqs. 2 to 7).
 
-    The marginal is Beta(1.5, 3) on [0.66, 1.66] MPa. The spectrum is the power law
-    (k^2 + lambda^2)^-4, truncated at 2.5 lambda, without the mean mode.
+    The marginal is Beta(1.5, 3) on [0.66, 1.66] MPa. The spectrum is
+    the power law (k^2 + lambda^2)^-4, truncated at 2.5 lambda, without
+    the mean mode.
 
     Parameters
     ----------

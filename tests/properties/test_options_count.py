@@ -225,7 +225,7 @@ def test_a_complete_list_has_no_error_by_the_list():
     error = np.sqrt(mixed.probability * (1.0 - mixed.probability) / 2000)
     assert abs(np.mean(each) - mixed.probability) < 4.0 * error
     for several in (FIELD, [FIELD]):
-        with pytest.raises(st.InputError, match="mixture: needs a complete list"):
+        with pytest.raises(st.InputError, match="mixture: needs a list of all"):
             st.failure_probability(problem, several, stress, method=LOCAL, mixture=True)
     study = st.Study(
         problem=problem, random=batches, method=LOCAL, ensemble=st.Ensemble(samples=2),

@@ -60,6 +60,7 @@ def test_a_call_after_an_interruption_takes_the_finished_onsets(monkeypatch):
     assert not UNFINISHED  # an error leaves nothing behind
 
 
+@pytest.mark.filterwarnings("ignore:Estimated shape parameter:UserWarning")  # seven peaks
 def test_arviz():
     arviz = pytest.importorskip("arviz")
     posterior = infer(prior=PRIOR, samples=400, load_cell_error=5e3)

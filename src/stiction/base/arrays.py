@@ -20,8 +20,9 @@ _limit: Any = None
 def one_blas_thread() -> Iterator[None]:
     """Keep BLAS at a single thread from the first user's entry to the last user's exit.
 
-    The number of threads belongs to the process. If two limits overlapped, the later exit
-    would otherwise restore the limit of the other user.
+    The number of threads belongs to the process.
+    If two limits overlapped, the later exit would
+    otherwise restore the limit of the other user.
     """
     global _users, _limit
     from threadpoolctl import threadpool_limits

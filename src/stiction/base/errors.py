@@ -28,8 +28,8 @@ class InputError(ValueError):
     Parameters
     ----------
     problems : str or iterable of str
-        A message for each mistake, with the key or argument, the given value and the
-        valid values.
+        A message for each mistake, with the key or argument, the given
+        value and the valid values.
 
     Attributes
     ----------
@@ -141,8 +141,8 @@ _collected: ContextVar[list[Warned] | None] = ContextVar("collected", default=No
 def collect_warnings() -> Iterator[list[Warned]]:
     """Collect the package's warnings in this thread, and in threads that run in its context.
 
-    `warnings.catch_warnings` changes the whole process, so two threads would catch
-    each other's warnings.
+    `warnings.catch_warnings` changes the whole process, so two threads
+    would catch each other's warnings.
     """
     warned: list[Warned] = []
     token = _collected.set(warned)
@@ -167,8 +167,9 @@ def merge_warnings() -> Iterator[list[Warned]]:
 def merged(caught: Iterable[Warned]) -> list[Warned]:
     """Return warnings without repetition.
 
-    Messages that differ only in numbers become a single message with ranges. Warnings
-    about samples become a single warning that counts all samples.
+    Messages that differ only in numbers become a single message with
+    ranges. Warnings about samples become a single warning that counts
+    all samples.
     """
     groups: dict[tuple[str, type[Warning], bool], list[Warned]] = {}
     for warning in caught:
@@ -208,13 +209,14 @@ def _with_ranges(texts: Sequence[str]) -> str:
 def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     """Issue an `AccuracyWarning` about some of the samples that were computed together.
 
-    Call it even if it concerns no sample, because all computed samples are counted.
+    Call it even if it concerns no sample, because all computed samples
+    are counted.
 
     Parameters
     ----------
     text : str
-        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and ``{worst}`` for the
-        largest size.
+        With ``{samples}`` for '3 of 40 samples (1, 4, 7)' and
+        ``{worst}`` for the largest size.
     which : array of bool
         Whether the warning concerns each sample.
     sizes : array, optional

@@ -1,8 +1,8 @@
 """Files that are complete or absent, archives of arrays, folders of the cache and of kernels.
 
-Files may come from strangers. Every reader in the package gets its bytes from
-`read_regular` or `content_of`, and checks the size of its result before it
-allocates memory.
+Files may come from strangers. Every reader in the package gets its
+bytes from `read_regular` or `content_of`, and checks the size of its
+result before it allocates memory.
 """
 
 import atexit
@@ -47,15 +47,15 @@ def read_regular(
 ) -> bytes:
     """Return the content of a regular file.
 
-    Raises an `InputError` if the file is not regular or is too large. Other errors of
-    the system (OSError) are passed on. The steps are:
+    Raises an `InputError` if the file is not regular or is too large.
+    Other errors of the system (OSError) are passed on. The steps are:
 
-    1. Check the type of the file before opening it, because opening a device may act
-       on the device.
-    2. Open the file without waiting, and check again, because the file may have been
-       replaced.
-    3. Read as many bytes as the file had then. Files that the system generates, such
-       as in /proc, have size 0.
+    1. Check the type of the file before opening it, because opening a
+       device may act on the device.
+    2. Open the file without waiting, and check again, because the file
+       may have been replaced.
+    3. Read as many bytes as the file had then. Files that the system
+       generates, such as in /proc, have size 0.
     """
     extra = getattr(os, "O_NONBLOCK", 0)
     if not follow_links:
@@ -117,9 +117,10 @@ def refuse_damage(kind: str) -> Iterator[None]:
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
     """Write a temporary file, sync it and rename it. An old file stays until the new is complete.
 
-    From its first byte on, the new file has the permissions of the old file. The content is
-    bytes, or a function that writes to a given path. If writing fails (a `StoreError`), the
-    unfinished file is removed.
+    From its first byte on, the new file has the
+    permissions of the old file. The content is bytes, or a
+    function that writes to a given path. If writing fails
+    (a `StoreError`), the unfinished file is removed.
     """
     aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
@@ -164,7 +165,8 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
     """Return the arrays in an .npz file from `write_arrays`, or raise an error in `UNREADABLE`.
 
-    Refuses compressed members, and members that together are larger than the archive.
+    Refuses compressed members, and members that together are larger
+    than the archive.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -200,9 +202,10 @@ def _warn_once(text: str) -> None:
 def private_folder(folder: Path) -> Path:
     """Return a folder to which only this user can have written. Make the folder if needed.
 
-    Compiled kernels are pickles, so whoever can replace a kernel can run code as
-    the user who loads it. If the folder is not private, a warning says why, and a
-    temporary folder of this process takes its place. The steps are:
+    Compiled kernels are pickles, so whoever can replace a kernel can
+    run code as the user who loads it. If the folder is not private, a
+    warning says why, and a temporary folder of this process takes its
+    place. The steps are:
 
     1. Resolve links, because their owners could let them lead elsewhere.
     2. Make all missing folders with mode 0700, for any umask.
@@ -273,8 +276,8 @@ _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?",
 def _kernel_sources() -> dict[str, bytes]:
     """Return, by module, the text of every file that may hold a part of a kernel.
 
-    Files that refuse input hold no part of a kernel, unless they hold one themselves: an
-    edited message recompiles nothing.
+    Files that refuse input hold no part of a kernel, unless they hold
+    one themselves: an edited message recompiles nothing.
     """
     package = Path(__file__).parents[1]
     sources = {}
@@ -291,11 +294,13 @@ def _kernel_sources() -> dict[str, bytes]:
 def kernel_folder(module: str, compiler: str) -> Path:
     """Return the folder for a module's kernels that a `compiler` (any name) compiled.
 
-    numba treats a compiled kernel as current if the file of the kernel has not
-    changed. It does not notice changes of functions or constants in other files.
-    Therefore every state of the files that a module imports, directly or not, has a
-    separate folder. Friction laws are resolved by type inside kernels and belong to
-    every state. Kernels are code, so only the package or the environment choose their folder.
+    numba treats a compiled kernel as current if the file of the kernel
+    has not changed. It does not notice changes of functions or
+    constants in other files. Therefore every state of the files that a
+    module imports, directly or not, has a separate folder. Friction
+    laws are resolved by type inside kernels and belong to every state.
+    Kernels are code, so only the package or the environment choose
+    their folder.
     """
     texts = _kernel_sources()
     waiting = [

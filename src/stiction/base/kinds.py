@@ -20,11 +20,13 @@ _registered: dict[str, dict[str, Any]] = {}
 def register(kind: T) -> T:
     """Class decorator: let study files name a class by its `type`.
 
-    The class is a method, or derives from `FrictionLaw`, `LoadShape`, `Marginal` or
-    `SpectralDensity`. Its `type` is a field such as ``type: Literal["band"] = "band"``.
-    Files that name this type can be read when the module of the class is imported. No
-    import is needed if the package has an entry point of the same name in the group
-    ``stiction.methods``, ``.laws``, ``.loads``, ``.marginals`` or ``.spectra``.
+    The class is a method, or derives from `FrictionLaw`, `LoadShape`,
+    `Marginal` or `SpectralDensity`. Its `type` is a field such as
+    ``type: Literal["band"] = "band"``. Files that name this type can be
+    read when the module of the class is imported. No import is needed
+    if the package has an entry point of the same name in the group
+    ``stiction.methods``, ``.laws``, ``.loads``, ``.marginals`` or
+    ``.spectra``.
     """
     name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
     if not isinstance(name, str):
@@ -42,8 +44,8 @@ def register(kind: T) -> T:
 class Kinds(Mapping[str, Any]):
     """The classes of a family, by `type`: in the package, registered, and from entry points.
 
-    `places` ("module:name") lead to classes in the package. Like classes of entry points,
-    they are imported when they are named.
+    `places` ("module:name") lead to classes in the package. Like
+    classes of entry points, they are imported when they are named.
     """
 
     def __init__(self, family: str, places: Mapping[str, str] | None = None) -> None:
@@ -94,10 +96,11 @@ class Kinds(Mapping[str, Any]):
 class OneOf:
     """Annotation of a field whose value belongs to a family of classes.
 
-    `kinds` are the classes by `type`, and `default` is the type of a table without a
-    `type`. `convert` maps a value to such an object. If it returns NotImplemented, a
-    table goes to its class and any other value to the annotated type. With `untyped`,
-    a table without a type also goes to the annotated type.
+    `kinds` are the classes by `type`, and `default` is the type of a
+    table without a `type`. `convert` maps a value to such an object. If
+    it returns NotImplemented, a table goes to its class and any other
+    value to the annotated type. With `untyped`, a table without a type
+    also goes to the annotated type.
     """
 
     kinds: Kinds

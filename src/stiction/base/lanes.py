@@ -1,10 +1,11 @@
 """Four numbers at once in a kernel, so that the order of a sum stands in the source.
 
-A dot product is fast only if it is summed in the lanes of a vector unit. Left to the
-compiler (fast-math), the order changes with the inlined code, and a kernel that was just
-compiled then differs in its last bits from the same kernel loaded from disk. Here the
-lanes are written out: lane l sums the terms l, l + 4, l + 8, ..., for any width of the
-machine's registers.
+A dot product is fast only if it is summed in the lanes of a vector
+unit. Left to the compiler (fast-math), the order changes with the
+inlined code, and a kernel that was just compiled then differs in its
+last bits from the same kernel loaded from disk. Here the lanes are
+written out: lane l sums the terms l, l + 4, l + 8, ..., for any width
+of the machine's registers.
 """
 
 from typing import Any

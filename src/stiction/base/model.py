@@ -1,7 +1,7 @@
 """Frozen, validated parameter objects, and public functions that check their arguments.
 
-The same definition serves Python, TOML and JSON. An `InputError` lists all mistakes at
-once.
+The same definition serves Python, TOML and JSON. An `InputError` lists
+all mistakes at once.
 """
 
 import dataclasses
@@ -127,7 +127,8 @@ def is_unplaced(value: Any) -> bool:
 def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
     """Return a number, a read-only float64 array (*shape), or labelled values for the problem.
 
-    A study file may also give a path, or a table {file, ...} with options of the reader.
+    A study file may also give a path, or a table {file, ...} with
+    options of the reader.
     """
     read = (info.context or {}).get("read")
     if isinstance(value, str) and states_unit(value):
@@ -202,8 +203,8 @@ Given = TypeVar("Given", contravariant=True)
 class Converted(Generic[Held, Given]):
     """Annotation for a field of a model whose stored type differs from the given type.
 
-    Type checkers treat the annotation as a descriptor. At runtime only the stored
-    type, with its validators, remains.
+    Type checkers treat the annotation as a descriptor. At runtime only
+    the stored type, with its validators, remains.
     """
 
     if TYPE_CHECKING:
@@ -275,8 +276,9 @@ def explain(
 ) -> list[str]:
     """Return a message for each mistake that pydantic found in a given value.
 
-    The path in a message begins with `root`. `otherwise` stands in place of an empty path.
-    A union has an item for each of its members. The texts of the members are joined by 'or'.
+    The path in a message begins with `root`. `otherwise` stands in
+    place of an empty path. A union has an item for each of its members.
+    The texts of the members are joined by 'or'.
     """
     members: dict[tuple[str, str], dict[str, None]] = {}
     items = error.errors(include_url=False)
@@ -378,9 +380,9 @@ def model(*, kw_only: bool = ...) -> Callable[[type[T]], type[T]]: ...
 def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     """Class decorator: a frozen pydantic dataclass that reports invalid values as `InputError`.
 
-    Objects, including arrays, are compared and hashed by value. Consistency checks go
-    into a method decorated with ``pydantic.model_validator(mode="after")`` that
-    raises `InputError`.
+    Objects, including arrays, are compared and hashed by value.
+    Consistency checks go into a method decorated with
+    ``pydantic.model_validator(mode="after")`` that raises `InputError`.
     """
     if cls is None:
         return functools.partial(model, kw_only=kw_only)
@@ -398,8 +400,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     def init(self: Any, *args: Any, **kwargs: Any) -> None:
         door.call(functools.partial(validated_init, self), args, kwargs)
 
-    # Validation inside another model must keep calling pydantic's own path, not
-    # this wrapper.
+    # Validation inside another model must keep calling pydantic's own
+    # path, not this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
     wrapped.__init__, wrapped.__repr__, wrapped._repr_html_ = init, brief, html_of
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of
@@ -413,7 +415,8 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
 def to_plain(value: Any) -> Any:
     """Return the object as plain dictionaries, lists and numbers for TOML and JSON.
 
-    Raises an `InputError` for parts that exist only in Python, such as a function.
+    Raises an `InputError` for parts that
+    exist only in Python, such as a function.
     """
     if hasattr(value, "plain"):
         return value.plain()
@@ -432,8 +435,8 @@ def to_plain(value: Any) -> Any:
 def checked(function: Function) -> Function:
     """Decorator for a public function: check its arguments against their annotations.
 
-    A class in an annotation accepts only instances, not tables of a study file. An
-    `InputError` lists all mistakes.
+    A class in an annotation accepts only instances, not tables of a
+    study file. An `InputError` lists all mistakes.
     """
     written = function.__annotations__
     function.__annotations__ = {
@@ -508,7 +511,8 @@ def _instances(hint: Any) -> Any:
 def check(name: str, value: Any, annotation: Any) -> Any:
     """Validate a value by an annotation, or raise an `InputError` that begins with `name`.
 
-    Use this for values that `checked` does not see, such as entries of a mapping.
+    Use this for values that `checked` does
+    not see, such as entries of a mapping.
     """
     try:
         return _adapter(annotation).validate_python(value)

@@ -1,20 +1,25 @@
 """Read NetCDF files from any source: only numbers stored in the file, and of limited size.
 
-A NetCDF-4 file is an HDF5 file. While HDF5 reads, it follows names of other files
-(external storage, external links, virtual datasets), and it unpacks data without
-a limit. The steps are:
+A NetCDF-4 file is an HDF5 file. While HDF5 reads, it follows names of
+other files (external storage, external links, virtual datasets), and it
+unpacks data without a limit. The steps are:
 
-1. Read all bytes of the file first, so that it cannot change between check and use.
-2. Walk through all groups. Refuse links that are not hard, data outside the file, too
-   many values for the size of the file, filters other than shuffle, zlib and
-   checksum, and chunks that unpack to more than their shape states.
-3. Read the attributes, lists of strings and numeric variables at the root. All
-   attributes and strings together must not be larger than the file.
+1. Read all bytes of the file first, so that it cannot change between
+   check and use.
+2. Walk through all groups. Refuse links that are not hard, data outside
+   the file, too many values for the size of the file, filters other
+   than shuffle, zlib and checksum, and chunks that unpack to more than
+   their shape states.
+3. Read the attributes, lists of strings and numeric
+   variables at the root. All attributes and strings
+   together must not be larger than the file.
 4. Name the dimensions as NetCDF does.
-5. Decode the variables as xarray does: missing values, scale and offset, but no times.
+5. Decode the variables as xarray does: missing values, scale and
+   offset, but no times.
 
-The same library, h5py, checks and reads the file, so that the file has a single
-meaning. Files of classic NetCDF contain no names of files, and scipy reads them.
+The same library, h5py, checks and reads the file, so that the file has
+a single meaning. Files of classic NetCDF contain no names of files, and
+scipy reads them.
 """
 
 from __future__ import annotations
@@ -185,8 +190,8 @@ def _check_chunks(dataset: Any) -> None:
 def _texts(dataset: Any, budget: list[int]) -> Any:
     """Return a list of strings, such as names of stations, within the budget for attributes.
 
-    Strings are read one by one, because many of them may refer to one long string in
-    the file.
+    Strings are read one by one, because many of them may refer to one
+    long string in the file.
     """
     texts: list[str] = []
     for number in range(dataset.shape[0]):
@@ -213,8 +218,8 @@ def _dims(
 def _attributes(item: Any, budget: list[int]) -> dict[str, Any]:
     """Return the attributes that are strings or numbers, and deduct their size from the budget.
 
-    Lists of strings are left out, because they may refer to one long string many
-    times.
+    Lists of strings are left out, because they may refer to one long
+    string many times.
     """
     import h5py
 

@@ -1,7 +1,8 @@
 """Report the progress of long work, with the same mechanism everywhere.
 
-After a second, a terminal shows a bar (rich), and a notebook shows an output that is updated.
-A pipe receives a line now and then. The working code reports its progress with `advance`.
+After a second, a terminal shows a bar (rich), and a notebook shows an
+output that is updated. A pipe receives a line now and then. The working
+code reports its progress with `advance`.
 """
 
 from __future__ import annotations

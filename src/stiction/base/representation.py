@@ -1,7 +1,8 @@
 """How objects are shown, compared and converted to JSON.
 
-A model shows its fields. A result shows the requested number with its interval and
-unit, and its basis (`Summary`), as text and as an HTML table.
+A model shows its fields. A result shows the
+requested number with its interval and unit, and its
+basis (`Summary`), as text and as an HTML table.
 """
 
 from __future__ import annotations

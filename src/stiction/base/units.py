@@ -1,6 +1,7 @@
 """Units of measured data, their factors to SI, and quantities from other packages.
 
-A unit is read from its text, and no unit is guessed. The page `docs/measured-profiles.md`
+A unit is read from its text, and no unit is
+guessed. The page `docs/measured-profiles.md`
 has a table of the values that users may pass.
 """
 
@@ -83,8 +84,8 @@ def _symbol(text: str) -> str:
 def parse(text: str) -> Unit | None:
     """Return the unit that `text` names (``MPa``, ``N/mm^2``, ``Pa m-1``), if it is known.
 
-    Blanks or dots separate powers of known units. The first unit after a slash is a
-    divisor.
+    Blanks or dots separate powers of known units. The first unit after
+    a slash is a divisor.
     """
     text = text.strip()
     if text in _KNOWN:
@@ -162,8 +163,8 @@ def in_words(units: str, value: float) -> str:
 def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
     """Return SI values in one suitable unit, with digits that distinguish them, and the unit.
 
-    A value alone has six digits. A value with an interval has two digits more than
-    the interval resolves.
+    A value alone has six digits. A value with an interval has two
+    digits more than the interval resolves.
     """
     factor, unit = unit_for(units, values)
     finite = [value for value in values if math.isfinite(value)]

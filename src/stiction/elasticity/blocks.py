@@ -10,25 +10,29 @@ stress. Then
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 
-K applies to a given force: uniform slip causes no stress. `block_response`
-returns K, q and C.
+K applies to a given force: uniform slip causes no stress.
+`block_response` returns K, q and C.
 
 Algorithm
 ---------
 1. Compute K for two free ends that do not interact, averaged over the cells of the
    nodes (`stiffness_between_ends`).
-2. Add the effect of the top, which is on rollers, and of the other end. This is a
-   smooth function, in closed form except for a few harmonics
+2. Add the effect of the top, which is on rollers, and of the other end.
+   This is a smooth function, in closed form except for a few harmonics
    (`_rollers_correction`).
-3. With a pusher, q and C of a block on rollers also have closed forms (`_pushed`).
-4. With a platen, find the shear traction t that holds the top in place (`glued_top`). With the
-   compliance G of the top and the stress A t on the interface, A' d/2 is the
-   displacement of the top that slip d causes (Betti's theorem). If the platen is held,
+3. With a pusher, q and C of a block on rollers also have closed forms
+   (`_pushed`).
+4. With a platen, find the shear traction t that holds the top in place
+   (`glued_top`). With the compliance G of the top and the stress A t on
+   the interface, A' d/2 is the displacement of the top that slip d
+   causes (Betti's theorem). If the platen is held,
 
        K = K_rollers + A G^-1 A'/2,    q = A G^-1 1 L/C,    C = 1' G^-1 1.
 
-   At a given force, subtract the stress due to the motion of the platen (`_glued`).
-5. Repeat steps 2 to 4 with a coarser resolution. The largest change is the `error`.
+   At a given force, subtract the stress due
+   to the motion of the platen (`_glued`).
+5. Repeat steps 2 to 4 with a coarser resolution. The largest change is
+   the `error`.
 
 Mode III has closed forms throughout.
 """
@@ -61,17 +65,17 @@ RESOLUTION, COARSER_RESOLUTION = Resolution(40.0, 0.28, 1e-11), Resolution(26.0,
 LATTICE_CORRECTION = 1.0 / 12.0
 """Half of the 1/6 with which the symbol would be right to fourth order.
 
-The remaining error of the symbol and the error by a border of slip between nodes have the same
-order and opposite signs. With 1/12 the mean error of onsets vanishes, as measured with random
-strengths.
+The remaining error of the symbol and the error by a border of slip
+between nodes have the same order and opposite signs. With 1/12 the mean
+error of onsets vanishes, as measured with random strengths.
 """
 
 
 class Pushes(NamedTuple):
     """Uniform traction on a side, over a width (m), centred at a height (m) above the interface.
 
-    With two sides, each block is pushed at one end and pulled at the other end, each
-    by half of the force.
+    With two sides, each block is pushed at one end and pulled at the
+    other end, each by half of the force.
     """
 
     sides: tuple[Side, ...]
@@ -90,8 +94,8 @@ class BlockResponse(NamedTuple):
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
     shear: Array  # (n,): q, shear stress of the drive, divided by its mean
     drive_stiffness: float  # C, force per unit depth divided by travel, without slip, Pa
-    # Largest relative error of q, C and K (as a share of its diagonal), without
-    # the lattice's error
+    # Largest relative error of q, C and K (as a share of its diagonal),
+    # without the lattice's error
     error: float = 0.0
 
 
@@ -106,10 +110,11 @@ def block_response(
 ) -> BlockResponse:
     """Return the response of two blocks to slip and to their drive.
 
-    Length L and height H are in m, and the modulus is G (Pa). kappa is Kolosov's constant, 3 - 4 nu
-    in plane strain and (3 - nu)/(1 + nu) in plane stress, or `None` for mode III. A platen (no
-    `pushes`) is glued to the top and moves along the interface. The top of a pushed block lies on
-    rollers, or is free in mode III.
+    Length L and height H are in m, and the modulus is G (Pa). kappa is
+    Kolosov's constant, 3 - 4 nu in plane strain and (3 - nu)/(1 + nu)
+    in plane stress, or `None` for mode III. A platen (no `pushes`) is
+    glued to the top and moves along the interface. The top of a pushed
+    block lies on rollers, or is free in mode III.
     """
     with one_blas_thread():
         response, coarse = (
@@ -148,7 +153,8 @@ def _in_plane(
         top = GluedTop(harmonics, modulus, kappa, resolution.step)
         addition, shear, drive = _glued(top, nodes)
         stiffness += addition
-    # Make uniform slip free of stress, from which it differs by 1e-7 of the diagonal.
+    # Make uniform slip free of stress, from which it differs by 1e-7 of
+    # the diagonal.
     stiffness[np.diag_indices(nodes)] -= stiffness.sum(axis=1)
     return BlockResponse(stiffness, shear / shear.mean(), drive)
 
@@ -156,24 +162,27 @@ def _in_plane(
 def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> Array:
     """Step 2: return K of a block on rollers minus K of two ends without a top, Pa/m².
 
-    The kernel of a block, in units of E*/(4 H), is a sum over k. Two nodes at a distance r
-    contribute k (1 - k r) exp(-k r). Each end subtracts k (1 - k (x + s) + 2 k² x s) exp(-k (x +
-    s)), with the distances x and s of the nodes from this end. The kernels of half-spaces, which
-    are subtracted, are the limits for large H.
+    The kernel of a block, in units of E*/(4 H), is a sum over k. Two
+    nodes at a distance r contribute k (1 - k r) exp(-k r). Each end
+    subtracts k (1 - k (x + s) + 2 k² x s) exp(-k (x + s)), with the
+    distances x and s of the nodes from this end. The kernels of
+    half-spaces, which are subtracted, are the limits for large H.
     """
     spacing, c = harmonics.length / nodes, 0.5 * np.pi / harmonics.height
     x, i = (np.arange(nodes) + 0.5) * spacing, np.arange(nodes)
-    # The direct kernel k (1 - k r) exp(-k r), minus its limit for large H. At r = 0 both are
-    # infinite, and their difference is c/12.
+    # The direct kernel k (1 - k r) exp(-k r), minus its limit for large
+    # H. At r = 0 both are infinite, and their difference is c/12.
     r = spacing * np.arange(1, nodes)
     sums = harmonics.sums(r)
     along = np.append(c / 12.0, sums.first - r * sums.second + 0.5 / (c * r**2))
-    # The reflection at an end: a part that depends on x + s alone, and x s times another.
+    # The reflection at an end: a part that depends on x + s alone, and
+    # x s times another.
     r = spacing * np.arange(1, 2 * nodes)  # x + s
     sums = harmonics.sums(r)
     even = r * sums.second - sums.first - 0.5 / (c * r**2)
     odd = 6.0 / (c * r**4) - 2.0 * sums.third
-    # Nodes i and j have x + s = (i + j + 1) dx from the left end. The right end is its image.
+    # Nodes i and j have x + s = (i + j + 1) dx from the left end. The
+    # right end is its image.
     mirrored = i[:, None] + i
     end = even[mirrored] + np.outer(x, x) * odd[mirrored]
     kernel = along[np.abs(i[:, None] - i)] + end + end[::-1, ::-1]
@@ -187,10 +196,12 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
     spacing = top.harmonics.length / nodes
     on_interface = top.shear((np.arange(nodes) + 0.5) * spacing)
     tractions = top.solve(np.column_stack([np.ones(top.x.size), on_interface.T]))
-    # Tractions for a unit travel, and for the displacements of the top that slip causes.
+    # Tractions for a unit travel, and for the displacements of the top
+    # that slip causes.
     shear, *held = top.step * (on_interface @ tractions).T
     addition = 0.5 * spacing * np.array(held)
-    # At a given force the platen moves, which takes its share of the stress away.
+    # At a given force the platen moves, which takes its share of the
+    # stress away.
     addition -= 0.5 * np.outer(shear, shear) / shear.sum()
     return 0.5 * (addition + addition.T), shear, float(top.step * tractions[:, 0].sum())
 
@@ -200,13 +211,15 @@ def _pushed(
 ) -> tuple[Array, float]:
     """Step 3: return the shear stress in a pushed block at 1 N/m, and 2 G* times the travel.
 
-    The push has the harmonics 2/H `mean_sine`, and phi = mean_sine 2/H/k² at the clamp.
+    The push has the harmonics 2/H `mean_sine`, and phi = mean_sine
+    2/H/k² at the clamp.
     """
     k, length, height = harmonics.k, harmonics.length, harmonics.height
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
     x = (np.arange(nodes) + 0.5) * length / nodes
-    # Single waves from the edges of the push in closed form, and the reflections.
+    # Single waves from the edges of the push in closed form, and the
+    # reflections.
     ends = harmonics.sums(x + 1j * low).plain - harmonics.sums(x + 1j * high).plain
     remainder = harmonics.raised - np.array([1.0, 1.0, 0.0, 0.0])
     waves = np.einsum("mxi,mi,m->x", harmonics.solutions(SLOPE, x), remainder, mean_sine)
@@ -222,8 +235,8 @@ def _pushed(
 def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) -> float:
     """Return the sum over k of m_k²/k, where m_k is the mean of sin(k y) over low < y < high.
 
-    The sum is a double integral of logarithms of y - y' and y + y'. A substitution
-    reduces it to a single integral.
+    The sum is a double integral of logarithms of y - y' and y + y'. A
+    substitution reduces it to a single integral.
     """
     width = high - low
 
@@ -241,7 +254,8 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) 
 def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[Array, float]:
     """Return the stress and travel of a drive from the stress due to a force at the left end.
 
-    `near` and `far` are the displacements at the force and at the same height of the other end.
+    `near` and `far` are the displacements at the force and at the same
+    height of the other end.
     """
     if len(pushes.sides) == 2:
         return 0.5 * (stress + stress[::-1]), 0.5 * (near + far)
@@ -251,16 +265,17 @@ def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[A
 def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Array:
     """Return the pressure (n,) between blocks glued to rigid platens, divided by its mean.
 
-    With rollers the pressure would be uniform, 1, and the top would widen by the
-    share (3 - kappa)/(8 G) of its length. Glue prevents this through a shear traction
-    without resultant.
+    With rollers the pressure would be uniform, 1, and the top would
+    widen by the share (3 - kappa)/(8 G) of its length. Glue prevents
+    this through a shear traction without resultant.
     """
     with one_blas_thread():
         harmonics = Harmonics(length, height, RESOLUTION.max_decay, pressed=True)
         top = GluedTop(harmonics, 1.0, kappa, RESOLUTION.step)
         wider = (3.0 - kappa) / 16.0 * (top.x - top.to_right)
         shifted, narrowed = top.solve(np.column_stack([np.ones(top.x.size), -wider])).T
-        # Remove the resultant: the platens are not loaded along the interface.
+        # Remove the resultant: the platens
+        # are not loaded along the interface.
         traction = narrowed - narrowed.sum() / shifted.sum() * shifted
         pressure = (
             1.0 - top.step * top.normal((np.arange(nodes) + 0.5) * length / nodes) @ traction
@@ -279,8 +294,9 @@ def _anti_plane(
 ) -> BlockResponse:
     """Return the response in mode III: cosines on the interface, sines on the sides.
 
-    K has the symbol (G/2) k coth(k H) below a platen, without k = 0 at a given force, and
-    (G/2) k tanh(k H) below a free top. A push has the same harmonics as in mode II on rollers.
+    K has the symbol (G/2) k coth(k H) below a platen, without k = 0 at
+    a given force, and (G/2) k tanh(k H) below a free top. A push has
+    the same harmonics as in mode II on rollers.
     """
     spacing = length / nodes
     k = np.pi / length * np.arange(1, nodes)
@@ -297,8 +313,8 @@ def _anti_plane(
     low, high = pushes.edges(height)
     mean_sine = (np.cos(k * low) - np.cos(k * high)) / (k * (high - low))
     ends = harmonics.sums(x + 1j * low).inverse - harmonics.sums(x + 1j * high).inverse
-    # Reflections between the ends. The closed forms hold the waves before the
-    # first reflection.
+    # Reflections between the ends. The closed forms hold the waves
+    # before the first reflection.
     once = -np.expm1(-2.0 * k * length)
     waves = np.exp(-np.outer(2.0 * length + x, k)) + np.exp(-np.outer(2.0 * length - x, k))
     stress = 2.0 / height * (ends.real / (high - low) + waves @ (mean_sine / once))
@@ -327,7 +343,8 @@ def lattice_symbol(angle: Array) -> Array:
 def lattice_entries(count: int) -> Array:
     """Return the entries of `lattice_symbol` at distances 0, ..., count - 1 on an endless line.
 
-    2 s has the entries -1/(pi (j² - 1/4)), and s² has 1/2 at distance 0 and -1/4 at distance 1.
+    2 s has the entries -1/(pi (j² - 1/4)), and s² has 1/2 at distance 0
+    and -1/4 at distance 1.
     """
     j = np.arange(-1.0, count + 1.0)
     entries = -1.0 / (np.pi * (j * j - 0.25))
@@ -338,11 +355,13 @@ def lattice_entries(count: int) -> Array:
 def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     """Return K (n, n), Pa/m, for an interface with two free ends that do not interact.
 
-    Nodes lie at (i + 1/2) dx. A free end x = 0 adds (G*/2 pi)(12 x s/(x + s)^4 - 1/(x + s)²) to
-    the shear stress of slip at s (N. Muskhelishvili, Some Basic Problems of the Mathematical Theory
-    of Elasticity, 1953). The lattice and its mirror images at both ends account for 1/(x +
-    s)². The remaining term is averaged over the cells of x and s: it is the mixed
-    derivative of (G*/pi) x s/(x + s)².
+    Nodes lie at (i + 1/2) dx. A free end x = 0 adds (G*/2
+    pi)(12 x s/(x + s)^4 - 1/(x + s)²) to the shear stress of
+    slip at s (N. Muskhelishvili, Some Basic Problems of the
+    Mathematical Theory of Elasticity, 1953). The lattice and
+    its mirror images at both ends account for 1/(x + s)².
+    The remaining term is averaged over the cells of x and s:
+    it is the mixed derivative of (G*/pi) x s/(x + s)².
     """
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i

@@ -1,18 +1,20 @@
 """Two blocks and the machine that drives them: stiffness, shear profile, travel and windows.
 
-The block with its drive and the machine are springs in series. With the force F
-per unit depth, the drive's travel U, the travel X at the machine's far end, and
-the machine's stiffness k,
+The block with its drive and the machine are springs in series. With the
+force F per unit depth, the drive's travel U, the travel X at the
+machine's far end, and the machine's stiffness k,
 
     F = k (X - U),    U = F/C + (dx/2L) <q, d>.
 
-The second equation is Betti's theorem. C is the stiffness of the block against its
-drive without slip. Slip d at the interface moves the drive by the average of d
-weighted by q. Eliminating U gives
+The second equation is Betti's theorem. C is the stiffness of the block
+against its drive without slip. Slip d at the interface moves the drive
+by the average of d weighted by q. Eliminating U gives
 
-    tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,   F/L = D - h <q, d>/n,
+    tau = D q - K d,   D = k C X/((k + C) L),   K = K_dead + h/n q q^T,
+    F/L = D - h <q, d>/n,
 
-with h = (k/(k + C)) C/(2 L). Under a dead load h = 0, and for a rigid machine h = C/(2 L).
+with h = (k/(k + C)) C/(2 L). Under a dead load h = 0, and for a rigid
+machine h = C/(2 L).
 """
 
 from dataclasses import dataclass
@@ -87,14 +89,14 @@ def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
 def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
 
-    The lowest eigenvalue of a block of K rises if the block shrinks. Therefore a
-    shortest run that begins later also ends later, and a single pass over the
-    nodes finds all of them:
+    The lowest eigenvalue of a block of K rises if the block shrinks.
+    Therefore a shortest run that begins later also ends later, and a
+    single pass over the nodes finds all of them:
 
     1. Lengthen the run until it is unstable.
     2. Shorten it from its end as long as it remains unstable, and keep it.
-    3. Move on by a share of the width, and go to step 1. The last run ends with the
-       specimen.
+    3. Move on by a share of the width, and go to step 1. The last run
+       ends with the specimen.
     """
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
@@ -121,8 +123,8 @@ def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
 def _windows_at(blocks: Driven, weakening_rate: float) -> Windows:
     matrix = blocks.stiffness
     runs = shortest_runs(matrix, weakening_rate)
-    # The weights of a window must be positive. The lowest eigenvector has a single sign if K has
-    # no positive entry off its diagonal.
+    # The weights of a window must be positive. The lowest eigenvector
+    # has a single sign if K has no positive entry off its diagonal.
     modes = np.zeros((len(runs), max((end - begin for begin, end in runs), default=1)))
     for row, (begin, end) in zip(modes, runs, strict=True):
         _, vectors = scipy.linalg.eigh(
@@ -148,20 +150,22 @@ def driven(
 ) -> Driven:
     """Return the response of blocks with a machine. For arguments see `block_response`.
 
-    If the blocks are `glued` while they are pressed, the pressure is not uniform.
-    `machine` is the stiffness of the machine per unit depth (Pa), for one block,
-    which is half of the specimen.
+    If the blocks are `glued` while they are pressed, the pressure is
+    not uniform. `machine` is the stiffness of the machine per unit
+    depth (Pa), for one block, which is half of the specimen.
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)
-    # Far from a pusher q falls to round-off, and a load profile must be positive.
+    # Far from a pusher q falls to round-off,
+    # and a load profile must be positive.
     shear, floor = response.shear, MIN_SHEAR * response.shear.max()
     if np.abs(shear).min() < floor:
         shear = np.where(np.abs(shear) < floor, floor, shear)
         shear /= shear.mean()
     pressure = glued_pressure(length, nodes, height, kappa) if glued else np.ones(nodes)
     drive = response.drive_stiffness
-    # k/(k + C) without overflow for a rigid machine. Without a machine the load is dead.
+    # k/(k + C) without overflow for a rigid machine. Without a machine
+    # the load is dead.
     share = 1.0 / (1.0 + drive / machine) if machine > 0.0 else 0.0
     relief = 0.5 * share * drive / length
     stiffness = response.stiffness

@@ -8,21 +8,23 @@ traction t(s) on the top with
     int G(x, s) t(s) ds = u(x),   0 < x < L,                                                   (1)
 
 where G is the compliance of a block on rollers, known in closed form
-(`harmonics`). At the corners t has singularities x^(lambda - 1) with many
-exponents, most of them complex (M. L. Williams, Journal of Applied Mechanics 19,
-1952).
+(`harmonics`). At the corners t has singularities x^(lambda - 1) with
+many exponents, most of them complex (M. L. Williams, Journal of Applied
+Mechanics 19, 1952).
 
 Algorithm
 ---------
 1. Map the line -inf < z < inf to the top so that x falls as exp(z) towards the corner and grows
-   evenly between corners (`GluedTop`). For any exponents, t dx/dz is smooth and falls
-   exponentially at both ends, so that trapezoidal sums converge exponentially (F. Stenger,
-   Numerical Methods Based on Sinc and Analytic Functions, 1993).
-2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|, where P is the range of z. Its
-   integrals with trigonometric polynomials are known (R. Kress, Linear Integral
-   Equations, 2014, section 12.3).
-3. Solve (1) at the points. The matrix is symmetric, and well conditioned for an equation of the
-   first kind.
+   evenly between corners (`GluedTop`). For any exponents, t dx/dz is
+   smooth and falls exponentially at both ends, so that trapezoidal sums
+   converge exponentially (F. Stenger, Numerical Methods Based on Sinc
+   and Analytic Functions, 1993).
+2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|,
+   where P is the range of z. Its integrals with trigonometric
+   polynomials are known (R. Kress, Linear Integral Equations, 2014,
+   section 12.3).
+3. Solve (1) at the points. The matrix is symmetric, and well
+   conditioned for an equation of the first kind.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ HEIGHTS_PER_UNIT = 0.5
 class GluedTop:
     """Points on a glued top, and the response of the block to shear traction at these points.
 
-    Between the corners of a flat block, dx/dz is `HEIGHTS_PER_UNIT` heights, because
-    the kernels vary over a height.
+    Between the corners of a flat block, dx/dz is `HEIGHTS_PER_UNIT`
+    heights, because the kernels vary over a height.
 
     Parameters
     ----------
@@ -53,8 +55,8 @@ class GluedTop:
     modulus : float
         G, Pa.
     kappa : float
-        Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane
-        stress.
+        Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu)
+        in plane stress.
     step : float
         Distance between the points in z.
     """
@@ -87,18 +89,20 @@ class GluedTop:
         distance = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         apart = np.abs(np.subtract.outer(self.x, self.x))
         from_right = np.abs(np.subtract.outer(self.to_right, self.to_right))
-        # Near the right corner only distances from the right end keep their
-        # relative precision.
+        # Near the right corner only distances from the right end keep
+        # their relative precision.
         apart = np.where(np.add.outer(self.x, self.x) < harmonics.length, apart, from_right)
         np.fill_diagonal(apart, self.stretch)
         sums = harmonics.sums(apart)
         kernel = kappa * sums.inverse + apart * sums.plain
-        # Step 2. The sum of exp(-k r)/k is -(H/pi) log(r) + a constant near r = 0.
+        # Step 2. The sum of exp(-k r)/k is
+        # -(H/pi) log(r) + a constant near r = 0.
         weight, period = kappa * harmonics.height / np.pi, self.step * count
         sine = 2.0 * np.sin(np.pi * distance / count)
         np.fill_diagonal(sine, 2.0 * np.pi / period)
         constant = np.log((1.0 if harmonics.pressed else 4.0) * harmonics.height / np.pi)
-        # The sum of both logarithms is smooth. On the diagonal it has this limit.
+        # The sum of both logarithms is smooth.
+        # On the diagonal it has this limit.
         kernel += weight * np.log(sine)
         kernel[np.diag_indices(count)] = harmonics.height / np.pi + weight * (
             constant + np.log(2.0 * np.pi / period / self.stretch)

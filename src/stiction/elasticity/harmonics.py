@@ -9,15 +9,15 @@ Elasticity, article 24) as a sum of independent harmonics,
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
 
-If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead. Then sin
-and cos are exchanged, and k = pi/H, 2 pi/H, ... At free sides Phi_k is clamped:
-Phi_k and its slope vanish. All fields follow from a function g_k(x, s), the
-deflection of a clamped beam,
+If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead.
+Then sin and cos are exchanged, and k = pi/H, 2 pi/H, ... At free sides
+Phi_k is clamped: Phi_k and its slope vanish. All fields follow from a
+function g_k(x, s), the deflection of a clamped beam,
 
     (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
 
-For example, slip d on the interface causes the shear stress -(E*/H) sum k² int
-(d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).
+For example, slip d on the interface causes the shear stress -(E*/H) sum
+k² int (d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
@@ -25,15 +25,17 @@ Algorithm
    minus two parts: the single reflection at each clamp, (1 + k (x + s) + 2 k² x s)
    exp(-k (x + s))/(4 k³) for the left clamp, and a `remainder`, the reflections
    between the clamps.
-2. Sum the beam without ends and the single reflections over k in closed form (`sums`).
-3. The remainder falls as exp(-k L), so that few harmonics give it to round-off
-   (`reflected`). The remainder is a combination of the four solutions of (2)
-   without load: exp(-k x), k x exp(-k x) and the same functions of L - x. The
-   conditions at the clamps determine the coefficients.
+2. Sum the beam without ends and the single reflections over k in closed
+   form (`sums`).
+3. The remainder falls as exp(-k L), so that few harmonics give it to
+   round-off (`reflected`). The remainder is a combination of the four
+   solutions of (2) without load: exp(-k x), k x exp(-k x) and the same
+   functions of L - x. The conditions at the clamps determine the
+   coefficients.
 
-Derivatives of the four solutions follow from polynomials. An operator P(d/dx), in
-units of k, turns exp(-k x) into P(-1) exp(-k x), and k x exp(-k x) into (P'(-1) + k
-x P(-1)) exp(-k x).
+Derivatives of the four solutions follow from polynomials. An operator
+P(d/dx), in units of k, turns exp(-k x) into P(-1) exp(-k x), and k x
+exp(-k x) into (P'(-1) + k x P(-1)) exp(-k x).
 """
 
 from __future__ import annotations
@@ -81,8 +83,8 @@ class Harmonics:
         count = int(max_decay * height / (np.pi * length)) + 2
         self.k = (np.arange(count) + (1.0 if pressed else 0.5)) * np.pi / height
         self.at_top = (-1.0) ** (np.arange(count) + pressed)  # cos(k H), or sin(k H)
-        # Step 3. Values and slopes of the four solutions at the left and the
-        # right clamp.
+        # Step 3. Values and slopes of the four solutions at the left
+        # and the right clamp.
         kl, decay = self.k * length, np.exp(-self.k * length)
         zero, unit = np.zeros_like(kl), np.ones_like(kl)
         clamps = np.array(
@@ -93,7 +95,8 @@ class Harmonics:
                 [-decay, (1.0 - kl) * decay, unit, -unit],
             ]
         ).transpose(2, 0, 1)
-        # The same of the beam without ends, as combinations of the four solutions in s.
+        # The same of the beam without ends, as combinations of the four
+        # solutions in s.
         endless = [
             [1.0, 1.0, 0.0, 0.0],
             [0.0, 1.0, 0.0, 0.0],
@@ -109,7 +112,8 @@ class Harmonics:
 
     def sums(self, z: Array) -> Sums:
         """Step 2: return the sums of k^j exp(-k z) over k, for z with a positive real part."""
-        # Geometric series and their derivatives. `expm1` keeps the digits near z = 0.
+        # Geometric series and their derivatives. `expm1` keeps the
+        # digits near z = 0.
         c = 0.5 * np.pi / self.height
         q, w = np.exp(-c * z), -np.expm1(-2.0 * c * z)
         coth, square = (2.0 - w) / w, 4.0 * q * q / (w * w)  # and 1/sinh²

@@ -7,22 +7,23 @@ its Fourier series gives, for an even number n of nodes, the first column
 
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 
-and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice versa, which
-halves the cost of products. A window is a run of nodes on which the smallest
-eigenvalue of the block of K is at most the weakening rate W. If all other nodes are
-held, the window is unstable. Its eigenvector bounds the load of the first
-instability (`protocol.Windows`), and the narrowest window gives the closest bound.
+and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice
+versa, which halves the cost of products. A window is a run of nodes on
+which the smallest eigenvalue of the block of K is at most the weakening
+rate W. If all other nodes are held, the window is unstable. Its
+eigenvector bounds the load of the first instability
+(`protocol.Windows`), and the narrowest window gives the closest bound.
 
 Algorithm
 ---------
 1. Find the widths for rates between two values (`widths_between`). At one rate W, start from the
-   width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R. Rice, J.
-   Geophys. Res. 108, 2003), and move to the narrowest unstable width. If rates
-   vary, use a ladder of widths.
+   width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R.
+   Rice, J. Geophys. Res. 108, 2003), and move to the narrowest unstable
+   width. If rates vary, use a ladder of widths.
 2. Compute the smallest eigenvalue and its eigenvector for each width
-   (`window_mode`), with a dense matrix up to `MAX_DENSE_WIDTH` nodes, and above by
-   inverse iteration with a solver for Toeplitz matrices. The results are cached,
-   because all samples use them.
+   (`window_mode`), with a dense matrix up to `MAX_DENSE_WIDTH` nodes,
+   and above by inverse iteration with a solver for Toeplitz matrices.
+   The results are cached, because all samples use them.
 """
 
 import bisect
@@ -63,8 +64,8 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     column = np.zeros(nodes)
     odd = np.arange(1, nodes, 2)
     column[odd] = -scale / (nodes * np.sin(np.pi * np.minimum(odd, nodes - odd) / nodes) ** 2)
-    # Equal to scale * nodes / 4 up to round-off, so that uniform slip is exactly
-    # free of stress.
+    # Equal to scale * nodes / 4 up to round-off, so that uniform slip
+    # is exactly free of stress.
     column[0] = -column[odd].sum()
     return column
 
@@ -102,7 +103,8 @@ def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
 def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     """Step 2: return the smallest eigenvalue and eigenvector of a block in K.
 
-    The unit of K is (G*/2)(2 pi/L). The eigenvector is positive, with unit sum.
+    The unit of K is (G*/2)(2 pi/L). The
+    eigenvector is positive, with unit sum.
     """
     column = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= MAX_DENSE_WIDTH:
@@ -112,9 +114,9 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
     else:
-        # Start from sqrt(x (w - x)), the shape of slip in a crack under uniform stress.
-        # Inverse iteration converges fast, as the next eigenvalue is more than
-        # twice as large.
+        # Start from sqrt(x (w - x)), the shape of slip in a crack under
+        # uniform stress. Inverse iteration converges fast, as the next
+        # eigenvalue is more than twice as large.
         mode = np.sqrt(np.arange(1.0, width + 1.0) * np.arange(width, 0.0, -1.0))
         mode /= mode.sum()
         for _ in range(MAX_INVERSE_ITERATIONS):
@@ -131,8 +133,8 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
 
 def _narrowest(nodes: int, widths: Sequence[int], W: float) -> int:
     """Step 1: return the index of the first unstable width, or the number of widths."""
-    # The width in the continuum is off by about a node, or more on a large part
-    # of the circle.
+    # The width in the continuum is off by about a node, or more on a
+    # large part of the circle.
     i = min(bisect.bisect_left(widths, _continuous_width(nodes, W)), len(widths) - 1)
     while i < len(widths) and window_mode(nodes, widths[i])[0] > W:
         i += 1
@@ -150,15 +152,16 @@ def _continuous_width(nodes: int, weakening_rate: float) -> int:
 def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]:
     """Step 1: return the widths for weakening rates from `lowest` to `highest`.
 
-    The last width is the first that is unstable at `lowest`. For a single rate there
-    is a single width, or no width if it would be much larger than `MAX_WIDTH`.
-    Otherwise the widths come from a ladder, which is the same for all samples.
+    The last width is the first that is unstable at `lowest`. For a
+    single rate there is a single width, or no width if it would be much
+    larger than `MAX_WIDTH`. Otherwise the widths come from a ladder,
+    which is the same for all samples.
     """
     widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)
     if lowest < highest:
-        # A ladder is the same for all samples, so that its eigenvectors are
-        # computed once.
+        # A ladder is the same for all samples, so that its eigenvectors
+        # are computed once.
         ladder = [1]
         while ladder[-1] < min(nodes // 2, MAX_WIDTH):
             ladder.append(max(ladder[-1] + 1, int(ladder[-1] * WIDTH_RATIO)))

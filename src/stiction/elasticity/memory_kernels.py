@@ -8,39 +8,44 @@ Breitenfeld and P. H. Geubelle, International Journal of Fracture 93, 1998):
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 
-The kernel C follows from the Laplace symbol D(s) of the traction per slip, in
-units of G|k|/2, with s in units of |k| c_s (P. H. Geubelle and J. R. Rice,
-Journal of the Mechanics and Physics of Solids 43, 1995): its transform is (D(0) +
-s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode III, in mode II
+The kernel C follows from the Laplace symbol D(s) of the traction per
+slip, in units of G|k|/2, with s in units of |k| c_s (P. H. Geubelle and
+J. R. Rice, Journal of the Mechanics and Physics of Solids 43, 1995):
+its transform is (D(0) + s - D(s))/s, with D(s) = sqrt(1 + s^2) in mode
+III, in mode II
 
-    [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 + s^2)), eta = c_d/c_s. (2)
+    [(2 + s^2)^2 - 4 sqrt(1 + s^2) sqrt(1 + s^2/eta^2)] / (s^2 sqrt(1 +
+    s^2)), eta = c_d/c_s. (2)
 
-Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p exp(s_p T) to
-a tolerance on 0 <= T <= `T_MAX`. The pairs turn the convolution with the whole
-history into a recursion for each pair.
+Find few pairs of poles s_p and weights w_p with C(T) = Re sum_p w_p
+exp(s_p T) to a tolerance on 0 <= T <= `T_MAX`. The pairs turn the
+convolution with the whole history into a recursion for each pair.
 
 Algorithm (`fit_exponentials`)
 ------------------------------
 1. Compute the inverse transform along arcs in Re s < 0 that join the branch points
-   -i a and i a, a = 1 and eta. The integrand is smooth there and decays, so that
-   the same tanh-sinh nodes (H. Takahasi and M. Mori, Publications of RIMS 9, 1974)
-   are accurate for every T (`arc_quadrature`). The result is a sum of some 280
-   exponentials. (The closed forms with Bessel functions lose digits by cancellation
+   -i a and i a, a = 1 and eta. The integrand is smooth there and
+   decays, so that the same tanh-sinh nodes (H. Takahasi and M. Mori,
+   Publications of RIMS 9, 1974) are accurate for every T
+   (`arc_quadrature`). The result is a sum of some 280 exponentials.
+   (The closed forms with Bessel functions lose digits by cancellation
    above T = 7.)
-2. Shorten the sum by balanced truncation (B. C. Moore, IEEE Transactions on Automatic Control
-   26, 1981). The Gramians are Cauchy matrices, which are factorised to high relative
-   accuracy (J. Demmel, Accurate Singular Value Decompositions of Structured Matrices,
-   1999). First, all poles are damped by a common decay, which is removed afterwards
-   (`balanced_truncation`).
-3. Polish the poles by variable projection: the poles move by Levenberg-Marquardt, and the
-   weights follow by linear least squares (G. H. Golub and V. Pereyra, SIAM Journal on
-   Numerical Analysis 10, 1973).
-4. Level the error: increase the weight of times with a large error, as in Lawson's
-   algorithm (J. R. Rice and K. H. Usow, The Lawson Algorithm and Extensions, 1968),
-   and polish again (`_attempt`).
-5. Accept the fit only if its error at a denser set of times is below the tolerance,
-   and its terms do not cancel (`_acceptable`). Otherwise try a different common
-   decay, and then one more pair.
+2. Shorten the sum by balanced truncation (B. C. Moore, IEEE
+   Transactions on Automatic Control 26, 1981). The Gramians are Cauchy
+   matrices, which are factorised to high relative accuracy (J. Demmel,
+   Accurate Singular Value Decompositions of Structured Matrices, 1999).
+   First, all poles are damped by a common decay, which is removed
+   afterwards (`balanced_truncation`).
+3. Polish the poles by variable projection: the poles
+   move by Levenberg-Marquardt, and the weights follow
+   by linear least squares (G. H. Golub and V. Pereyra,
+   SIAM Journal on Numerical Analysis 10, 1973).
+4. Level the error: increase the weight of times with a large error, as
+   in Lawson's algorithm (J. R. Rice and K. H. Usow, The Lawson
+   Algorithm and Extensions, 1968), and polish again (`_attempt`).
+5. Accept the fit only if its error at a denser set of times is below
+   the tolerance, and its terms do not cancel (`_acceptable`). Otherwise
+   try a different common decay, and then one more pair.
 """
 
 import contextlib
@@ -66,20 +71,21 @@ Complex = NDArray[np.complex128]
 Floats = NDArray[np.float64]
 
 _RULE_STEP = 0.025  # of the tanh-sinh rule; with 0.05 the kernel is off by 6e-11 at T = 1e5
-# End of the rule: the outermost node lies 1e-55 from the branch point, and its
-# weight underflows.
+# End of the rule: the outermost node lies 1e-55 from the branch point,
+# and its weight underflows.
 _RULE_END = 4.4
 _TIMES_PER_CHUNK = 2048
 T_MAX = 1e5  # the error holds on 0 <= T <= T_MAX; after T_MAX the sum decays
 MAX_WEIGHT = 10.0  # larger weights cancel, and lose digits in the recursion
 MAX_PAIRS = 60  # enough for 1e-9 in mode II
 MAX_LEVELLINGS = 14  # a fit that is not level by then gets a further pair
-# Smallest exponent by which each pole decays over T_MAX, so that sums decay after
-# T_MAX.
+# Smallest exponent by which each pole decays over T_MAX, so that sums
+# decay after T_MAX.
 _MIN_DECAY = 0.3
 _MIN_DECAY_RATE = _MIN_DECAY / T_MAX
-# Common decays over T_MAX for balanced truncation, in the order of trials. They
-# are good starts for polishing at loose and at tight tolerances.
+# Common decays over T_MAX for balanced truncation,
+# in the order of trials. They are good starts for
+# polishing at loose and at tight tolerances.
 _LOOSE_DECAYS, _TIGHT_DECAYS = (10.0, 1.0), (1.0, 0.3)
 _FILE_FORMAT = 2  # raise it when the fit or the file layout changes, to ignore old files
 
@@ -101,13 +107,14 @@ def _half_arc() -> tuple[Floats, Floats]:
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     """Step 1: return nodes s, Re s < 0, and weights w with C(T) = Re sum w exp(s T).
 
-    An arc has about 140 nodes. Only the parts of the transform that are odd across an
-    arc contribute: the shear root at |s| = 1 and the dilatational root at |s| = eta.
+    An arc has about 140 nodes. Only the parts of the transform that are
+    odd across an arc contribute: the shear root at |s| = 1 and the
+    dilatational root at |s| = eta.
     """
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)
-    # sqrt(1 + s^2) at s = i rotation, in a form without cancellation beside the
-    # branch point.
+    # sqrt(1 + s^2) at s = i rotation, in a form without cancellation
+    # beside the branch point.
     root = np.sqrt(2.0 * np.sin(angle)) * np.exp(1j * (0.5 * angle - 0.25 * np.pi))
     factor = rotation * weight * (2.0 / (np.pi * 1j))
     s = 1j * rotation
@@ -139,8 +146,8 @@ def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats
 def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
     """Return the kernel C(T) of the velocity form at times T >= 0 (any shape), to about 2e-15.
 
-    C(0) = G*/G. The kernel falls so slowly, like T^-1/2 in mode II and T^-3/2 in mode III, that it
-    must not be truncated.
+    C(0) = G*/G. The kernel falls so slowly, like T^-1/2 in mode II and
+    T^-3/2 in mode III, that it must not be truncated.
     """
     return exponential_sum(time, *arc_quadrature(mode, eta))
 
@@ -149,8 +156,9 @@ def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
 class ExponentialSum:
     """Poles and weights of a fit, with the measured error.
 
-    `poles` (Re s < 0) and `weights` are (pairs,) arrays in units of |k| c_s. `error`
-    is the largest measured |C - sum| for 0 <= T = |k| c_s t <= T_MAX.
+    `poles` (Re s < 0) and `weights` are (pairs,)
+    arrays in units of |k| c_s. `error` is the largest
+    measured |C - sum| for 0 <= T = |k| c_s t <= T_MAX.
     """
 
     poles: Complex
@@ -165,7 +173,8 @@ class ExponentialSum:
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
     """Return times on [0, T_MAX]. They are dense at first, with random phases on later scales."""
     rng = np.random.default_rng(seed)
-    # The kernel oscillates with periods of up to 2 pi, so scatter the times over a period.
+    # The kernel oscillates with periods of up to 2 pi, so scatter the
+    # times over a period.
     scale = np.geomspace(0.3, T_MAX, round(per_decade * np.log10(T_MAX / 0.3)))
     late = scale[:, None] + 2.0 * np.pi * rng.random((scale.size, cluster))
     times = np.concatenate([np.linspace(0.0, 8.0, 8 * per_decade + 1), late.ravel(), [T_MAX]])
@@ -175,8 +184,8 @@ def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
 def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
     """Step 2: return the pivoted Cholesky factor of b_i conj(b_j) / -(s_i + conj(s_j)).
 
-    Updates consist only of products, so that small pivots keep their relative
-    accuracy.
+    Updates consist only of products, so that small pivots keep their
+    relative accuracy.
     """
     a, columns = b.copy(), []
     diagonal = np.abs(a) ** 2 / (-2.0 * s.real)
@@ -195,7 +204,8 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
     """Step 2: return the poles of a short model for sum w exp(s T), from balanced truncation."""
-    # Equal input and output vectors make both Gramians equal up to conjugation.
+    # Equal input and output vectors make both Gramians equal up to
+    # conjugation.
     b = np.sqrt(w)
     factor = _cauchy_cholesky(s, b, 1e-24)
     left, sigma, right = np.linalg.svd(factor.T @ factor)
@@ -241,7 +251,8 @@ class _Polish:
             slope = modes * (self.times[:, None] * weights)
             decay = -np.exp(parameters[: weights.size])
             jacobian = np.hstack([slope.real * decay, -slope.imag]) * emphasis[:, None]
-            # Weights follow the poles, so only the part outside the span of the basis counts.
+            # Weights follow the poles, so only the part outside the
+            # span of the basis counts.
             jacobian -= q @ (q.T @ jacobian)
             normal, gradient = jacobian.T @ jacobian, jacobian.T @ residual
             # Raise the damping until the step lowers the cost.
@@ -301,19 +312,20 @@ def _attempt(
 def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     """Return a short sum of exponentials with a measured error below the tolerance.
 
-    `eta` is c_d/c_s. Mode III does not use it. The tolerance is absolute, and C(0) =
-    G*/G.
+    `eta` is c_d/c_s. Mode III does not use it. The tolerance is
+    absolute, and C(0) = G*/G.
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
-    # 1. The long sum, and the times at which short sums are fitted and checked.
+    # 1. The long sum, and the times at which
+    # short sums are fitted and checked.
     arcs = arc_quadrature(mode, eta)
     fit_times = _sample_times(40 if tolerance > 3e-8 else 80, 8, seed=0)
     fit = _Polish(fit_times, exponential_sum(fit_times, *arcs))
     check_times = _sample_times(150, 12, seed=1)
     check = exponential_sum(check_times, *arcs)
-    # The first number of pairs, which proved to be just too small for every
-    # Poisson's ratio.
+    # The first number of pairs, which proved to be just too small for
+    # every Poisson's ratio.
     digits = -np.log10(tolerance)
     pairs = max(3, round(1.7 * digits - 2.0 if mode == "III" else 5.3 * digits - 9.7))
     starts = _LOOSE_DECAYS if tolerance > 1e-7 else _TIGHT_DECAYS

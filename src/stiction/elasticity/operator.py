@@ -9,26 +9,29 @@ S. Two problems are solved without a matrix in memory:
     (A + spring phi phi')_SS x_S = right_S,                                                   (1)
     A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
 
-In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1). With a stiff
-spring the matrix is positive definite even if A has a single direction of
-negative curvature, close to phi. In this way, states at and beyond the turning
-point of the load can be computed (`turning_point`). Kernels take flat arrays, so
-that the same code serves lines and planes.
+In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1).
+With a stiff spring the matrix is positive definite even if A has a
+single direction of negative curvature, close to phi. In this way,
+states at and beyond the turning point of the load can be computed
+(`turning_point`). Kernels take flat arrays, so that the same code
+serves lines and planes.
 
 Algorithm for (1), `solve_inside`
 ---------------------------------
 Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimization, 2006,
 algorithm 5.3) with the textbook's r, alpha and beta. z is the preconditioned residual.
 
-1. Precondition the residual: z = M r, restricted to S. M is 1/(K(k) + W/2) on
-   Fourier modes, with the mean W. If a soft mode y is given, with y'Ay about 1, add
-   y y' to M. Close to a turning point, one eigenvalue of A is much smaller than the
-   others. If y is its eigenvector, no extra iterations are needed.
-2. The new direction is z + beta times the previous direction. Multiply it by the
-   matrix.
-3. If the curvature along the direction is not positive, stop: A is not positive definite on S.
-4. Step to the minimum along the direction, and go to step 1. Stop when no residual
-   exceeds the tolerance.
+1. Precondition the residual: z = M r, restricted to S. M is 1/(K(k) +
+   W/2) on Fourier modes, with the mean W. If a soft mode y is given,
+   with y'Ay about 1, add y y' to M. Close to a turning point, one
+   eigenvalue of A is much smaller than the others. If y is its
+   eigenvector, no extra iterations are needed.
+2. The new direction is z + beta times the previous direction. Multiply
+   it by the matrix.
+3. If the curvature along the direction is not positive, stop: A is not
+   positive definite on S.
+4. Step to the minimum along the direction, and go to step 1. Stop when
+   no residual exceeds the tolerance.
 
 Departure: the residual is measured by its largest entry, which is a stress.
 
@@ -36,11 +39,12 @@ Algorithm for (2), `lowest_eigenvector`
 ---------------------------------------
 LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific Computing 23, 2001).
 
-1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x - lambda x| is small.
+1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x -
+   lambda x| is small.
 2. Make x, the preconditioned residual and the last direction orthonormal.
-3. Solve the eigenproblem in the space of these three. The combination with the
-   smallest lambda is the next x. Its part without x is the next direction. Go to
-   step 1.
+3. Solve the eigenproblem in the space of these three. The combination
+   with the smallest lambda is the next x. Its part without x is the
+   next direction. Go to step 1.
 """
 
 import math
@@ -256,10 +260,11 @@ def solve_inside(
 ) -> tuple[int, int]:
     """Solve (1) by conjugate gradients.
 
-    On entry x is a guess, and on return the solution. `residual` is the residual of
-    x, as in `residual_of`. Both are zero outside the set. Returns SOLVED (no residual
-    above the tolerance, Pa), NEGATIVE_CURVATURE (along `operator.direction`) or
-    EXHAUSTED, and the number of iterations.
+    On entry x is a guess, and on return the solution. `residual` is the
+    residual of x, as in `residual_of`. Both are zero outside the set.
+    Returns SOLVED (no residual above the tolerance, Pa),
+    NEGATIVE_CURVATURE (along `operator.direction`) or EXHAUSTED, and
+    the number of iterations.
     """
     z, direction, image = operator.z, operator.direction, operator.image
     restrict(residual, inside)
@@ -278,7 +283,8 @@ def solve_inside(
         beta = r_z / r_z_before if r_z_before > 0.0 else 0.0
         r_z_before = r_z
         for i in range(direction.size):
-            # The first direction is z alone, whatever a former solution left there.
+            # The first direction is z alone,
+            # whatever a former solution left there.
             former = beta * direction[i] if beta > 0.0 else 0.0
             direction[i] = z[i] + former if inside[i] else 0.0
         product(operator, direction, image)
@@ -303,8 +309,8 @@ def solve_inside(
 def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
     """Step 3: combine the vectors of a basis into the next x and the next direction.
 
-    basis[0] becomes the combination of all vectors. basis[2] and `out` become the
-    combination without the first vector.
+    basis[0] becomes the combination of all vectors. basis[2] and `out`
+    become the combination without the first vector.
     """
     for i in range(out.size):
         total = 0.0
@@ -320,16 +326,16 @@ def lowest_eigenvector(
 ) -> tuple[float, int]:
     """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m) and iterations.
 
-    On entry the vector is a guess. On return it is the eigenvector, with unit norm
-    and positive sum, and is zero outside the set. The search stops when the norm of A
-    y - lambda y is below the tolerance.
+    On entry the vector is a guess. On return it is the eigenvector,
+    with unit norm and positive sum, and is zero outside the set. The
+    search stops when the norm of A y - lambda y is below the tolerance.
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction
     images = np.empty((3, nodes))  # A times these
     work = np.empty(nodes)
-    # The norm of a small guess may underflow. Scaling by a power of two does not
-    # change its digits.
+    # The norm of a small guess may underflow. Scaling by a power of two
+    # does not change its digits.
     exponent = math.frexp(largest_inside(vector, inside))[1]
     set_scaled(basis[0], math.ldexp(1.0, min(-exponent, 1000)), vector)
     restrict(basis[0], inside)

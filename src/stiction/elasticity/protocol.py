@@ -1,17 +1,20 @@
 """The elasticity of the solids on both sides of an interface, as methods need it.
 
-`Line` (half-spaces that meet on a line) and `Driven` (two blocks and their machine)
-are complete. `HalfSpaces` on a plane provide only the symbol of K, because K would
-not fit in memory, and slip does not relieve the load. This file defines records.
-The kernels for these records are in `stiffness` and `weakest`.
+`Line` (half-spaces that meet on a line) and `Driven` (two blocks and
+their machine) are complete. `HalfSpaces` on a plane provide only the
+symbol of K, because K would not fit in memory, and slip does not
+relieve the load. This file defines records. The kernels for these
+records are in `stiffness` and `weakest`.
 
-Slip has one component, along x, the direction of the load. For a wave vector (kx,
-ky) with length k and a = (kx/k)^2, the stiffness between half-spaces is
+Slip has one component, along x, the direction of the load. For a wave
+vector (kx, ky) with length k and a = (kx/k)^2, the stiffness between
+half-spaces is
 
     K(k) = (G* a + G (1 - a)) k/2,
 
-with mode II along x and mode III along y (P. Geubelle and J. Rice, Journal of the
-Mechanics and Physics of Solids 43, 1995). A line has the modulus of its mode.
+with mode II along x and mode III along y (P. Geubelle and J. Rice,
+Journal of the Mechanics and Physics of Solids 43, 1995). A line has the
+modulus of its mode.
 """
 
 import functools
@@ -66,12 +69,13 @@ def _symbol(
 class Windows(NamedTuple):
     """Runs of nodes that are just unstable in isolation.
 
-    On a run, the smallest eigenvalue of the block of K is at most the weakening rate
-    W. If K has no positive off-diagonal entry, the eigenvector y is positive, and K y
-    <= W y. Therefore <s, y>/<p, y> bounds the load of the first instability from
-    above. Here s is the strength minus initial stress, and p is the load profile.
-    This is the criterion of Uenishi and Rice (2003) in a form that is strict on the
-    grid.
+    On a run, the smallest eigenvalue of the block of K is at
+    most the weakening rate W. If K has no positive off-diagonal
+    entry, the eigenvector y is positive, and K y <= W y.
+    Therefore <s, y>/<p, y> bounds the load of the first
+    instability from above. Here s is the strength minus initial
+    stress, and p is the load profile. This is the criterion of
+    Uenishi and Rice (2003) in a form that is strict on the grid.
     """
 
     weakening_rates: Array  # (count,): smallest that is unstable, Pa/m, never rising
@@ -97,7 +101,8 @@ class CircularEntries(NamedTuple):
 class DenseEntries(NamedTuple):
     """K of two blocks, row by row in a flat array, and the relief by slip.
 
-    Slip d lowers the mean stress by relief <q, d>/n. `relief` is in Pa/m, and 0 under a dead load.
+    Slip d lowers the mean stress by relief <q, d>/n. `relief` is in
+    Pa/m, and 0 under a dead load.
     """
 
     rows: Array
@@ -133,6 +138,6 @@ class Elasticity(Protocol):
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m.
 
-        For a single rate the windows are exact. Otherwise they give a bound, and are
-        the same for all samples.
+        For a single rate the windows are exact. Otherwise they give a
+        bound, and are the same for all samples.
         """

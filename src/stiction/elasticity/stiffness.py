@@ -14,18 +14,19 @@ Algorithm: our own
 `apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so
 even nodes act only on odd nodes, and vice versa.
 
-1. For each parity, take the slipping nodes with this parity. They act on n/2
-   targets, which are the nodes with the other parity.
-2. The entries of K from a node to its targets are n/2 consecutive numbers of `strip`, the odd
-   entries of the first column three times over. Add them, times the slip, for
-   four nodes at once, so that each target is read and written once for four
-   nodes.
+1. For each parity, take the slipping nodes with this parity. They act
+   on n/2 targets, which are the nodes with the other parity.
+2. The entries of K from a node to its targets are n/2 consecutive
+   numbers of `strip`, the odd entries of the first column three times
+   over. Add them, times the slip, for four nodes at once, so that each
+   target is read and written once for four nodes.
 3. Join the two halves, and add the diagonal.
 
 `_apply_rows` does the same with rows of a dense matrix, which is symmetric.
 """
 
-# numba compares the names of arguments with their annotations, so overloads have no annotations.
+# numba compares the names of arguments with their annotations, so
+# overloads have no annotations.
 # mypy: disable-error-code="no-untyped-def"
 
 from collections.abc import Callable
@@ -71,8 +72,8 @@ def apply_outside(
 ) -> None:
     """Multiply as `apply` does, but for blocks write only the nodes that do not slip.
 
-    On a line, a part of the product costs as much as the whole product, so all nodes
-    are written.
+    On a line, a part of the product costs as much as the whole product,
+    so all nodes are written.
     """
     raise NotImplementedError
 
@@ -121,8 +122,9 @@ def apply_circular(
             node = nodes[t]
             if (node & 1) != parity or values[t] == 0.0:
                 continue
-            # 2. Target q lies at the odd distance 2 (q - (node >> 1)) + 1 - 2 parity.
-            # Names instead of arrays let the compiler keep the four nodes in registers.
+            # 2. Target q lies at the odd distance 2 (q - (node >> 1)) +
+            # 1 - 2 parity. Names instead of arrays let the compiler
+            # keep the four nodes in registers.
             p0, p1, p2, p3 = half - (node >> 1) - parity, p0, p1, p2
             z0, z1, z2, z3 = values[t], z0, z1, z2
             n_waiting += 1
@@ -174,7 +176,8 @@ def _apply_rows_outside(
     product: Array,
 ) -> None:
     """Write K times a field at the nodes that do not slip, run by run."""
-    # Runs of nodes at rest alternate with runs of slipping nodes, which are skipped.
+    # Runs of nodes at rest alternate with runs of slipping nodes, which
+    # are skipped.
     end = ZERO
     while end < entries.n_nodes:
         start = end

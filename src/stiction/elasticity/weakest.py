@@ -10,14 +10,16 @@ profile. Find the lowest bound over all windows and all places.
 Algorithm: our own
 ------------------
 1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
-   weakening rate than any node has. Stop if a narrower window is unstable anywhere, because
-   wider windows give a looser bound.
-2. If the rate varies, count for each node how many nodes in a row weaken fast enough.
-3. A window with a fixed place (on blocks) has a single bound. A window that may lie
-   anywhere (on a line) is first tried at steps of a sixteenth of its width, because
-   a weighted mean hardly changes over this distance. It is then tried at all nodes
-   around the best place. The lowest minimum may be missed, but every place gives a
-   valid bound.
+   weakening rate than any node has. Stop if a narrower window is
+   unstable anywhere, because wider windows give a looser bound.
+2. If the rate varies, count for each node how many nodes in a row
+   weaken fast enough.
+3. A window with a fixed place (on blocks) has a single bound.
+   A window that may lie anywhere (on a line) is first tried
+   at steps of a sixteenth of its width, because a weighted
+   mean hardly changes over this distance. It is then tried at
+   all nodes around the best place. The lowest minimum may be
+   missed, but every place gives a valid bound.
 4. Compare with sliding of the whole interface: y = 1 everywhere.
 """
 
@@ -42,7 +44,8 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 @jit_inside
 def _count_fast(W: Array, threshold: float, length: Array) -> None:
     """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
-    # Twice around the circle from the end, so that runs across the first node are complete.
+    # Twice around the circle from the end, so that runs across the
+    # first node are complete.
     n = W.shape[0]
     run = 0.0
     for q in range(2 * n - 1, -1, -1):
@@ -57,8 +60,8 @@ def weakest_window(
 ) -> tuple[float, int, int]:
     """Steps 1 to 3: return the lowest bound (Pa), its window, and the first node of the window.
 
-    If no window gives a bound below `bound`, return `bound`, `NO_WINDOW` and 0.
-    `allowed` (n,) is a workspace.
+    If no window gives a bound below `bound`, return `bound`,
+    `NO_WINDOW` and 0. `allowed` (n,) is a workspace.
     """
     n = W.shape[0]
     best, window, start = bound, NO_WINDOW, 0

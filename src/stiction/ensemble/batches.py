@@ -1,15 +1,17 @@
 """Compute samples in batches, in threads or any executor, with the same results.
 
-Problem. Solve spans of samples in bounded memory, on workers that come and go.
-Results must not depend on the workers.
+Problem. Solve spans of samples in bounded memory, on workers that come
+and go. Results must not depend on the workers.
 
 Steps:
 
-1. While a worker is free, cut a piece from the first waiting span. It should take
-   about half a second at the pace of the latest piece (`piece_size`).
-2. Submit the piece. An executor that runs it at once returns a finished future. In
-   this case, yield its table before the next piece begins.
-3. Wait for the first futures, but at most a second, because workers come and go.
+1. While a worker is free, cut a piece from the first waiting span. It
+   should take about half a second at the pace of the latest piece
+   (`piece_size`).
+2. Submit the piece. An executor that runs it at once returns a finished
+   future. In this case, yield its table before the next piece begins.
+3. Wait for the first futures, but at most a second, because workers
+   come and go.
 4. Yield each table, and measure its pace.
 """
 
@@ -83,7 +85,8 @@ class Failure(NamedTuple):
 class Table(NamedTuple):
     """Samples at any points of a sweep, and the failures among them.
 
-    A row holds `POINT`, `NUMBER` and the variables of the method for a solved sample.
+    A row holds `POINT`, `NUMBER` and the variables of the method for a
+    solved sample.
     """
 
     rows: NDArray[Any]
@@ -140,7 +143,8 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             with one_blas_thread(), collect_warnings() as caught:
                 parts.append(_rows(span.point, first, experiment.results(first, count)))
         except Exception as error:
-            # One bad sample makes its batch fail. Solve each sample of the batch alone.
+            # One bad sample makes its batch fail. Solve each sample of
+            # the batch alone.
             if count > 1:  # find the sample that failed
                 waiting.extendleft((first + i, 1) for i in reversed(range(count)))
                 continue
@@ -163,8 +167,8 @@ def piece_size(
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
     if pace:
         size = int(PIECE_SECONDS / max(pace, 1e-9))
-    # A fair share of the remaining samples, but at least a block, which is drawn
-    # as a whole.
+    # A fair share of the remaining samples, but at least a block, which
+    # is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MAX_PIECE_BYTES / experiment.sample_bytes), span.samples))
     end = span.first + size
@@ -201,10 +205,11 @@ def solve_spans(
 ) -> Generator[tuple[Span, Table], None, None]:
     """Solve spans of items. Yield their pieces with their tables (steps 1 to 4).
 
-    At most two pieces per worker are in progress, so that memory stays bounded.
-    Closing the generator cancels the pieces that have not begun. A lost worker, or a
-    worker with different versions, raises a `WorkerError`. Only experiments can have
-    spans with more than one item.
+    At most two pieces per worker are in progress, so that
+    memory stays bounded. Closing the generator cancels the
+    pieces that have not begun. A lost worker, or a worker
+    with different versions, raises a `WorkerError`. Only
+    experiments can have spans with more than one item.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)

@@ -63,8 +63,8 @@ def within(numbers: NDArray[Any], ends: Any) -> bool:
 class Gathered:
     """The results of all samples in one or more experiments, in memory.
 
-    `only` names the variables to gather. `done`, with shape (points, samples), marks
-    the gathered samples.
+    `only` names the variables to gather. `done`, with shape (points,
+    samples), marks the gathered samples.
     """
 
     def __init__(
@@ -86,7 +86,8 @@ class Gathered:
         """Return why a table cannot belong to these points, or '' if it can."""
         pairs = [failure[:2] for failure in table.failures]
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
-        # Numbers of failures may be anything in a stranger's file, so they are objects.
+        # Numbers of failures may be anything in a stranger's file, so
+        # they are objects.
         for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
             if not within(points, len(self.points)) or np.any(samples < self.first):
                 return "a point or a sample is not in the study"
@@ -115,7 +116,8 @@ class Gathered:
         for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
             if self._only is None or name in self._only:
                 values = table.rows[name][inside]
-                # The type and the shape of a variable are known from its first table.
+                # The type and the shape of a variable are known from
+                # its first table.
                 if name not in self._arrays:
                     self._types[name] = values.dtype
                     self._arrays[name] = np.full(self.done.shape + values.shape[1:], np.nan)
@@ -136,14 +138,15 @@ class Gathered:
     ) -> xr.Dataset:
         """Return a dataset over the axes of the sweep, the samples and the nodes.
 
-        Missing values are NaN. The attributes 'failed_samples' and 'cut_short' state
-        the cause.
+        Missing values are NaN. The attributes 'failed_samples' and
+        'cut_short' state the cause.
         """
         variables, values = variables_in(self.points), {}
         for name in variables:
             if name in self._arrays:
                 array, kind = self._arrays[name], self._types[name]
-                # Whole numbers and flags cannot be NaN. They remain floats if any is missing.
+                # Whole numbers and flags cannot be NaN. They remain
+                # floats if any is missing.
                 if kind.kind == "f" or not np.isnan(array).any():
                     array = array.astype(kind, copy=False)
                 values[name] = array

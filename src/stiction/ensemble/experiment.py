@@ -48,8 +48,8 @@ MOST_NUMBERS = 1 << 20
 class Experiment:
     """A problem, its random properties and a method, which are checked together once.
 
-    Sample i depends only on the experiment and i, not on the batch. An `InputError`
-    lists all mistakes.
+    Sample i depends only on the experiment and i, not on the batch. An
+    `InputError` lists all mistakes.
     """
 
     problem: Problem
@@ -161,7 +161,8 @@ class Experiment:
                         UnitWarning,
                     )
             check_residual(self.problem, member)
-            # Stresses and slips of a solid lie in known ranges. Others are in another unit.
+            # Stresses and slips of a solid lie in known ranges. Others
+            # are in another unit.
             means = {name: mean_in_stress(self.problem, member, name) for name in member.names}
             friction = self.problem.friction
             residual = float(friction.residual(np.array(means["strength"])).mean())
@@ -202,8 +203,8 @@ class Experiment:
     def sample(self, profiles: Mapping[str, Array]) -> Sample:
         """Return profiles by name as a sample, or raise an `InputError` if it does not fit.
 
-        The resolution, and nodes that do not weaken, are checked before, by
-        `check_fields`.
+        The resolution, and nodes that do not weaken, are checked
+        before, by `check_fields`.
         """
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
@@ -246,7 +247,8 @@ class Experiment:
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
         """Divide samples, beginning with `first`, into (first, count) at multiples of a size."""
         size, end = size or self.batch, first + count
-        # Batches begin at multiples of the size, so that blocks of draws are whole.
+        # Batches begin at multiples of the size, so that blocks of
+        # draws are whole.
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))
 
@@ -277,8 +279,9 @@ class Ensemble:
     first : int
         Number of the first sample.
     keep : str or tuple of str
-        Random fields whose profiles are kept, such as ``"strength"``. Other profiles
-        are kept by options of the method, such as ``slip=True`` in `Equilibrium`.
+        Random fields whose profiles are kept, such as ``"strength"``.
+        Other profiles are kept by options of the method, such as
+        ``slip=True`` in `Equilibrium`.
 
     Examples
     --------

@@ -39,9 +39,10 @@ MIN_THREAD_SECONDS = 2e-3
 class LimitState:
     """Stress at onset as a function of draws. See `stiction.external.limit_state`.
 
-    Stresses may be taken relative to the normal pressure. If the pressure is random,
-    each stress is multiplied by the mean pressure over the pressure of its sample. A
-    given stress then corresponds to a given friction coefficient.
+    Stresses may be taken relative to the normal pressure. If the
+    pressure is random, each stress is multiplied by the mean pressure
+    over the pressure of its sample. A given stress then corresponds to
+    a given friction coefficient.
     """
 
     experiment: Experiment
@@ -98,11 +99,12 @@ class LimitState:
     def __call__(self, draws: Array) -> Array:
         """Return the stress at onset, Pa, for draws (samples, dimension) or (dimension,).
 
-        The stress is infinite if the event does not happen, because such a sample
-        survives any stress.
+        The stress is infinite if the event does not happen, because
+        such a sample survives any stress.
         """
         rows, experiment = np.atleast_2d(draws), self.experiment
-        # Parts of at least `MIN_THREAD_SECONDS`, one for each thread, and at most a batch.
+        # Parts of at least `MIN_THREAD_SECONDS`, one for each thread,
+        # and at most a batch.
         size = max(int(MIN_THREAD_SECONDS / experiment.seconds), -(-len(rows) // self.workers))
         size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
@@ -164,14 +166,15 @@ class LimitState:
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:
         """Return bounds for one interface.
 
-        With the load profile p, the strength tau_p and the initial stress tau_0, the
-        first node fails at the load min((tau_p - tau_0)/p). The lower bound is the
-        mean stress at this load.
+        With the load profile p, the strength tau_p and the initial
+        stress tau_0, the first node fails at the load min((tau_p -
+        tau_0)/p). The lower bound is the mean stress at this load.
         """
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
             negligible = 0.0  # measured values may be rarer
-        # Each factor at each node takes an equal part of the negligible probability.
+        # Each factor at each node takes an equal part of the negligible
+        # probability.
         chance = negligible / (MAX_FACTORS * problem.interface.size)
         low, high = support_in_stress(problem, random, "strength", chance)
         profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
@@ -179,13 +182,15 @@ class LimitState:
         most: Any = least
         if "initial_stress" in random.varying:
             least, most = support_in_stress(problem, random, "initial_stress", chance)
-        # The mean of a random initial stress is random itself. Take its lowest value.
+        # The mean of a random initial stress is random itself. Take its
+        # lowest value.
         initial = np.mean(np.broadcast_to(least, profile.shape))
         low = float(initial + np.min((low - most) / profile) * np.mean(profile))
         if self._random_pressure:
             ends = support_in_stress(problem, random, "normal_pressure", chance)
             mean = self.experiment.pressure
-            # Stresses are multiplied by the mean pressure over the pressure of the sample.
+            # Stresses are multiplied by the mean pressure over the
+            # pressure of the sample.
             ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
             low, high = low * ratios[low < 0.0], high * ratios[1]
         bounded = optional_member(self.experiment.method, "bounded_by_strength")
@@ -196,9 +201,10 @@ class LimitState:
 def weakest_first(state: LimitState) -> LimitState:
     """Return the same limit state, with equally likely interfaces sorted, the weakest first.
 
-    Neighbours are then alike, and a chain moves from one interface to the next as it
-    goes down. The order is the order of a low quantile of a few samples, which are
-    the same for each interface. The first stage solves them if it applies.
+    Neighbours are then alike, and a chain moves from one interface to
+    the next as it goes down. The order is the order of a low quantile
+    of a few samples, which are the same for each interface. The first
+    stage solves them if it applies.
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
@@ -206,11 +212,13 @@ def weakest_first(state: LimitState) -> LimitState:
         return state
     by = state if isinstance(state.guide, str) else state.guide
     ranked = int(np.clip(RANKINGS // count, 4, MAX_RANKED))
-    # Each sample once for each member, selected by the middle of its interval of the first draw.
+    # Each sample once for each member, selected by the middle of its
+    # interval of the first draw.
     draws = np.repeat(state.draws(0, 0, ranked), count, axis=0)
     draws[:, 0] = np.tile(ndtri((np.arange(count) + 0.5) / count), ranked)
     onset = by(draws).reshape(ranked, count)
-    # A sample that survives counts as the strongest, so that means are finite.
+    # A sample that survives counts as the
+    # strongest, so that means are finite.
     onset = np.minimum(onset, onset.max(where=np.isfinite(onset), initial=0.0))
     lowest = np.array(state.bounds_of_members())[:, 0]
     weak = np.maximum(onset.mean(axis=0) - LOW_QUANTILE_SIGMAS * onset.std(axis=0), lowest)
@@ -222,8 +230,9 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
     """Return whether the onset is proportional to the strength. See `inference.scaling`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
-    # See the derivation in `inference.scaling`: the weakening rate is given, and the initial
-    # stress is uniform. It must be zero if the load varies.
+    # See the derivation in `inference.scaling`: the weakening rate is
+    # given, and the initial stress is uniform. It must be zero if the
+    # load varies.
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales
     return bool(
         scaling != "none"
@@ -259,10 +268,10 @@ def limit_state(
     Returns
     -------
     LimitState
-        A callable that maps independent standard normal draws with shape (samples,
-        `dimension`) to stresses, Pa, with shape (samples,). `draws(seed, first,
-        samples)` returns the draws that `monte_carlo` uses. `profiles(draws)` returns
-        their profiles.
+        A callable that maps independent standard normal draws with
+        shape (samples, `dimension`) to stresses, Pa, with shape
+        (samples,). `draws(seed, first, samples)` returns the draws that
+        `monte_carlo` uses. `profiles(draws)` returns their profiles.
 
     Raises
     ------

@@ -87,9 +87,9 @@ def complete(
 ) -> None:
     """Compute spans of items, and pass each finished table to memory and to the store.
 
-    `items` accepts tables (`add`) and marks finished items in `done`, with shape
-    (points, items). `solve` returns the table for a span at a point. Warnings that
-    several tables share are issued once.
+    `items` accepts tables (`add`) and marks finished items in `done`,
+    with shape (points, items). `solve` returns the table for a span at
+    a point. Warnings that several tables share are issued once.
     """
     lost, total = 0, sum(span.samples for span in spans)
     with ExitStack() as stack:
@@ -106,7 +106,8 @@ def complete(
             # Several points have samples with equal numbers.
             warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
             meter.advance(span.samples)
-            # If nothing succeeds from the start, later samples would fail for the same reason.
+            # If nothing succeeds from the start, later samples would
+            # fail for the same reason.
             lost += len(table.failures)
             if lost >= min(MAX_FAILED_FROM_START, total) and not items.done.any():
                 failure = table.failures[0]
@@ -129,9 +130,9 @@ def gather(
 ) -> xr.Dataset:
     """Compute an ensemble at every point of a sweep. Stored samples are not computed again.
 
-    Finished samples go to the `store`. `elsewhere`, with shape (points, samples),
-    marks samples that a different job computes. See `monte_carlo` for the other
-    arguments.
+    Finished samples go to the `store`. `elsewhere`, with shape (points,
+    samples), marks samples that a different job computes. See
+    `monte_carlo` for the other arguments.
     """
     rows, cores = Gathered(points, ensemble), workers or usable_cores()
     # Samples that are stored, or that another job computes, are not missing.
@@ -147,7 +148,8 @@ def gather(
         rows, points, spans_of(missing, ensemble.first), solve_span,
         Meter(label, int(missing.sum()), progress), store=store, executor=executor, workers=cores,
     )  # fmt: skip
-    # A stored run is compared once, by the first process that finishes its part.
+    # A stored run is compared once, by the
+    # first process that finishes its part.
     comparison = store.pilot if store else None
     if comparison is None and pilot:
         show = progress is True
@@ -186,59 +188,65 @@ def monte_carlo(
 ) -> xr.Dataset:
     """Compute the onset of many random interfaces.
 
-    Sample i depends only on (seed, i), not on the number of samples, the workers or
-    the executor.
+    Sample i depends only on (seed, i), not on the number of samples,
+    the workers or the executor.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField or list of them
-        The random properties. A field alone is the peak strength, Pa. The members of
-        a list are equally likely, and every sample uses one of them.
+        The random properties. A field alone is the peak strength, Pa.
+        The members of a list are equally likely, and every sample uses
+        one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
-        As in `Ensemble`. To see the profiles of a few samples, repeat them: a
-        call with the same seed and fewer samples gives the same samples.
+        As in `Ensemble`. To see the profiles of a few
+        samples, repeat them: a call with the same
+        seed and fewer samples gives the same samples.
     workers : int, optional
-        Number of threads, by default one for each core. The compiled kernels release
-        the interpreter lock.
+        Number of threads, by default one for each core. The compiled
+        kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
-        Any object with a method `submit`, such as a process pool or a Dask executor.
-        It replaces the threads.
+        Any object with a method `submit`, such as a process pool or a
+        Dask executor. It replaces the threads.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable receives
-        (done, total).
+        True shows progress on standard error after a second. A callable
+        receives (done, total).
     pilot : bool
-        Whether to check an approximate method with the first samples (32 on a
-        line, 8 on a plane) and the weakest of the first thousand. If a quick test
-        leaves a doubt, `Equilibrium` also solves these samples, and the difference is
-        reported. The ensemble does not change.
+        Whether to check an approximate method with the first samples
+        (32 on a line, 8 on a plane) and the weakest of the first
+        thousand. If a quick test leaves a doubt, `Equilibrium` also
+        solves these samples, and the difference is reported. The
+        ensemble does not change.
 
     Returns
     -------
     xarray.Dataset
-        Results of `onset` over 'sample'. The attributes contain the version, the
-        study as JSON and the seed, so that the ensemble can be computed again.
-        Samples that could not be solved are NaN. The attribute 'failed_samples' lists
-        them (point, sample, seed, message, whether the sample does not fit the
-        problem). If the pilot solved samples with `Equilibrium`, 'pilot_bias' and
-        'pilot_scatter' are the mean and the standard deviation of the difference in
-        `critical_stress`, relative to the mean from `Equilibrium`. For the weakest
-        samples, these values are 'pilot_weakest_bias' and 'pilot_weakest_scatter'.
+        Results of `onset` over 'sample'. The attributes contain the
+        version, the study as JSON and the seed, so that the ensemble
+        can be computed again. Samples that could not be solved are NaN.
+        The attribute 'failed_samples' lists them (point, sample, seed,
+        message, whether the sample does not fit the problem). If the
+        pilot solved samples with `Equilibrium`, 'pilot_bias' and
+        'pilot_scatter' are the mean and the standard deviation of the
+        difference in `critical_stress`, relative to the mean from
+        `Equilibrium`. For the weakest samples, these values are
+        'pilot_weakest_bias' and 'pilot_weakest_scatter'.
 
     Raises
     ------
     InputError
-        If any argument is invalid (the message lists every problem), or no sample
-        is valid.
+        If any argument is invalid (the message lists every problem), or
+        no sample is valid.
     RunError
-        If the solver fails on all samples. The message names a sample with its seed.
+        If the solver fails on all samples. The message names a sample
+        with its seed.
 
     Warns
     -----
     AccuracyWarning
-        If samples could not be solved, or the pilot differs from the local
-        criterion by more than 1 %.
+        If samples could not be solved, or the pilot differs from the
+        local criterion by more than 1 %.
 
     Examples
     --------
@@ -250,8 +258,9 @@ def monte_carlo(
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
 
-    A table for pandas has a row for each sample. Kept profiles have a separate table,
-    ``found[["strength"]].to_dataframe()``, with a row for each node.
+    A table for pandas has a row for each sample. Kept profiles have a
+    separate table, ``found[["strength"]].to_dataframe()``, with a row
+    for each node.
 
     >>> len(found.drop_dims("x", errors="ignore").to_dataframe())
     50

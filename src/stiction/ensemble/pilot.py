@@ -1,17 +1,17 @@
 """A pilot: solve some samples of an approximate method also with its exact counterpart.
 
-Problem. How much do the onsets from an approximate method, such as the local
-criterion, differ from the exact onsets of the same samples?
+Problem. How much do the onsets from an approximate method, such as the
+local criterion, differ from the exact onsets of the same samples?
 
 Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
 
-1. Select the first samples that have an onset, and the weakest among the first
-   `MAX_RANKED_SAMPLES` of them.
-2. Test quickly, with the method, whether their onsets may differ from the exact
-   onsets. If not, stop.
-3. Solve these samples exactly. The difference divided by the mean exact onset has a
-   mean (bias) and a standard deviation (scatter). Report the largest values over
-   all points.
+1. Select the first samples that have an onset, and the weakest among
+   the first `MAX_RANKED_SAMPLES` of them.
+2. Test quickly, with the method, whether their onsets may differ from
+   the exact onsets. If not, stop.
+3. Solve these samples exactly. The difference divided by the mean exact
+   onset has a mean (bias) and a standard deviation (scatter). Report
+   the largest values over all points.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,9 +45,10 @@ def compare(
 ) -> dict[str, Any]:
     """Return the bias and scatter of an approximate method for the first and weakest samples.
 
-    `onsets` (points, samples) has the critical stresses from sample `first` on, or NaN. By
-    default a few samples are solved. The result is empty if there is no exact
-    counterpart, or if no point leaves a doubt.
+    `onsets` (points, samples) has the critical stresses
+    from sample `first` on, or NaN. By default a few
+    samples are solved. The result is empty if there is
+    no exact counterpart, or if no point leaves a doubt.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}
@@ -73,7 +74,8 @@ def _differences(
 ) -> dict[str, Array]:
     """Return differences from the exact onset over its mean, for the first and weakest samples.
 
-    The result is empty without an exact counterpart, or if the quick test leaves no doubt.
+    The result is empty without an exact counterpart, or if the quick
+    test leaves no doubt.
     """
     problem, method = experiment.problem, experiment.method
     exact = exact_counterpart(problem, method)

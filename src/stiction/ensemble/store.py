@@ -1,18 +1,20 @@
 """The store: a folder of self-describing chunks.
 
-Problem. Many processes write samples to a folder, and any process may be killed at
-any moment. A written sample must not be lost, and damage must be detected.
+Problem. Many processes write samples to a folder, and any process may
+be killed at any moment. A written sample must not be lost, and damage
+must be detected.
 
-Solution. ``study.json`` identifies the study, and ``chunks/`` holds the samples.
-A chunk is a table of samples with a mark that identifies its study. The name of a
-chunk is a digest of its content. A chunk is written completely or not at all.
-Chunks never change, and no file lists them.
+Solution. ``study.json`` identifies the study, and
+``chunks/`` holds the samples. A chunk is a table of samples
+with a mark that identifies its study. The name of a chunk
+is a digest of its content. A chunk is written completely or
+not at all. Chunks never change, and no file lists them.
 
-Limits. A digest reveals damage, but not forgery, because anyone who can write to
-the folder can write other numbers with a new digest. A folder may come from a
-stranger. If a link, a pipe, a device or a folder stands in place of a file, an
-`InputError` is raised. Content that does not fit the study counts as damage, even
-if the digest fits.
+Limits. A digest reveals damage, but not forgery, because anyone who can
+write to the folder can write other numbers with a new digest. A folder
+may come from a stranger. If a link, a pipe, a device or a folder stands
+in place of a file, an `InputError` is raised. Content that does not fit
+the study counts as damage, even if the digest fits.
 """
 
 from __future__ import annotations
@@ -63,8 +65,8 @@ class Damaged(StoreError):
 class Store:
     """The folder of a run. It holds the samples of a study, which is given in plain form.
 
-    After reading, `damage` holds the defects of damaged chunks by name. `seconds` (on
-    one core) and `versions` describe the intact chunks.
+    After reading, `damage` holds the defects of damaged chunks by name.
+    `seconds` (on one core) and `versions` describe the intact chunks.
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
@@ -98,7 +100,8 @@ class Store:
         except Damaged:
             if list(store._tables()) or STUDY in names:
                 store.warn(f"{STUDY} is damaged or missing. It is rebuilt from the given study")
-        # The same study with another title or more samples replaces the description.
+        # The same study with another title or more samples replaces the
+        # description.
         if before != study:
             # A pilot of fewer samples is no longer valid.
             if before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES:
@@ -109,9 +112,9 @@ class Store:
     def read_into(self, rows: Any) -> None:
         """Pass on the intact chunks, and record the defects of damaged chunks in `damage`.
 
-        `rows` accepts tables (`add`), and says why a table does not fit (`misfit`).
-        A file that exists but cannot be read may be intact. Such a file raises a
-        `StoreError`.
+        `rows` accepts tables (`add`), and says why a table does not fit
+        (`misfit`). A file that exists but cannot be read may be intact.
+        Such a file raises a `StoreError`.
         """
         self.damage, self.seconds, self.versions = {}, [], {}
         for name, table in self._tables():
@@ -152,7 +155,8 @@ class Store:
         """Pass on the stored samples, warn about different versions, and delete damaged chunks."""
         self.read_into(rows)
         for name, text in self.damage.items():
-            # The samples are missing in `rows`, so the run computes them again.
+            # The samples are missing in `rows`,
+            # so the run computes them again.
             self.warn(f"{CHUNKS}/{name}: {text}. Its samples are computed again")
             (self.path / CHUNKS / name).unlink(missing_ok=True)
         for version in sorted({*self.versions} - {versions()}):
@@ -176,7 +180,8 @@ class Store:
     def add(self, table: Table) -> None:
         """Collect a table. Store the collected tables if they are large or it is time."""
         self._taken.append(table)
-        # Few large chunks are read faster, but a kill may lose the last seconds of work.
+        # Few large chunks are read faster, but a kill may lose the last
+        # seconds of work.
         size = sum(table.rows.nbytes for table in self._taken)
         if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
@@ -184,7 +189,8 @@ class Store:
     def save(self) -> None:
         """Store the collected tables, as a chunk for each set of variables."""
         _check_folder(self.path / CHUNKS)
-        # An array of rows has one type, and a chunk one version of the packages.
+        # An array of rows has one type, and a
+        # chunk one version of the packages.
         groups: dict[Any, list[Table]] = {}
         for table in self._taken:
             groups.setdefault((table.rows.dtype, table.versions), []).append(table)
@@ -219,7 +225,8 @@ def _table_in(data: bytes) -> tuple[str, Table]:
     numbers = [number for failure in failures for number in failure[:3]]
     rows, long = arrays["rows"], np.dtype(np.int64)
     fields: Any = rows.dtype.fields or {}
-    # Types are checked before any value is used, because the folder may be a stranger's.
+    # Types are checked before any value is used, because the folder may
+    # be a stranger's.
     valid = (
         all(isinstance(text, str) for text in texts)
         and all(isinstance(number, int) for number in numbers)

@@ -8,30 +8,32 @@ distances:
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
 
-Sources. Permutation tests, and their p-value (1 + number as far)/(1 + replicates),
-are described by Davison and Hinkley, Bootstrap Methods and their Application
-(1997), sections 4.2 and 4.3. The sum for W^2 is given by Anderson and Darling
+Sources. Permutation tests, and their p-value (1 + number as
+far)/(1 + replicates), are described by Davison and Hinkley,
+Bootstrap Methods and their Application (1997), sections 4.2
+and 4.3. The sum for W^2 is given by Anderson and Darling
 (1952), Annals of Mathematical Statistics 23, 193.
 
 Steps for a predicted sample:
 
-1. Under the hypothesis, each choice of n values from all measured and predicted values
-   together is equally likely. This is exact for any numbers of values, and for
-   equal values. F is then the distribution of the remaining values, and the
-   integral is over all values.
-2. Choose n values at random, and compute both distances between these and the
-   remaining values.
-3. The p-value is the share of choices whose distance is at least the distance of
-   the measured values.
+1. Under the hypothesis, each choice of n values from all measured and
+   predicted values together is equally likely. This is exact for any
+   numbers of values, and for equal values. F is then the distribution
+   of the remaining values, and the integral is over all values.
+2. Choose n values at random, and compute both distances between these
+   and the remaining values.
+3. The p-value is the share of choices whose distance is at least the
+   distance of the measured values.
 
 Steps for a posterior. The peaks of one campaign share the unknown parameters.
 
-4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of the posterior.
-5. Draw each simulated campaign from one of these distributions, and compute its
-   distances from their mean. If a campaign has several kinds of specimens, add W^2
-   over the kinds and take the largest D.
-6. The p-value is the share of campaigns whose distance is at least the distance of
-   the measured campaign.
+4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of
+   the posterior.
+5. Draw each simulated campaign from one of these distributions, and
+   compute its distances from their mean. If a campaign has several
+   kinds of specimens, add W^2 over the kinds and take the largest D.
+6. The p-value is the share of campaigns whose distance is at least the
+   distance of the measured campaign.
 """
 
 from collections.abc import Mapping
@@ -74,22 +76,24 @@ class Agreement(Result):
     peaks : Peaks
         The measured peaks.
     cramer_von_mises, largest_deviation : float
-        The two distances. W^2 is the sum over the tests of the squared differences
-        between measured and predicted shares. The largest difference is multiplied by
-        the square root of the number of tests.
+        The two distances. W^2 is the sum over the tests of
+        the squared differences between measured and
+        predicted shares. The largest difference is
+        multiplied by the square root of the number of tests.
     p_values : dict of str to float
-        For each distance, by name: the probability of a distance at least as large if
-        the prediction is right.
+        For each distance, by name: the probability of a distance at
+        least as large if the prediction is right.
     predicted : tuple of (values, share)
-        Predicted distribution function for each kind of specimen: rising values in the
-        unit of the peaks, and the share of peaks up to each value.
+        Predicted distribution function for each kind of specimen:
+        rising values in the unit of the peaks, and the share of peaks
+        up to each value.
     band : float
         The largest deviation stays below this value in 90 % of campaigns.
     precursors : dict of str to (measured, predicted) arrays
-        Given if curves were compared. For each test there is the ``number`` of
-        precursors, the ``size`` (N or Pa) of the largest precursor, or 0, and
-        ``first_load``, the force at the first precursor, or else the peak. `p_values`
-        also has these names.
+        Given if curves were compared. For each test there is the
+        ``number`` of precursors, the ``size`` (N or Pa) of the largest
+        precursor, or 0, and ``first_load``, the force at the first
+        precursor, or else the peak. `p_values` also has these names.
     """
 
     peaks: Peaks
@@ -143,19 +147,21 @@ def agreement(
     Parameters
     ----------
     prediction : Dataset or Posterior
-        Result of `stiction.monte_carlo` or `stiction.infer`. The test includes the
-        uncertainty of a posterior. The prediction must not have been fitted to these
-        peaks.
+        Result of `stiction.monte_carlo` or `stiction.infer`. The test
+        includes the uncertainty of a posterior. The prediction must not
+        have been fitted to these peaks.
     peaks : array, mapping of arrays, Peaks or Curves
-        As in `stiction.infer`. If curves are given and the prediction has events, for
-        example from ``Equilibrium(events=20)``, precursors are also compared.
+        As in `stiction.infer`. If curves are given and the prediction
+        has events, for example from ``Equilibrium(events=20)``,
+        precursors are also compared.
     unit : str
         Unit of the peaks and the load-cell error.
     load_cell_error : float
-        Standard deviation of the error of a peak. Needed for a dataset only, because
-        a posterior contains its load-cell error.
+        Standard deviation of the error of a peak. Needed for a dataset
+        only, because a posterior contains its load-cell error.
     replicates : int
-        Number of simulated campaigns. A p-value is at least 1/(replicates + 1).
+        Number of simulated campaigns. A p-value is at least
+        1/(replicates + 1).
     seed : int
         Not negative.
 
@@ -167,10 +173,10 @@ def agreement(
     Raises
     ------
     InputError
-        If the prediction lacks the measured quantity, is a sweep, or has one kind of
-        specimen although several kinds were tested. Also if peaks differ from the
-        prediction by a factor of fifty, or if the posterior was fitted to these
-        peaks.
+        If the prediction lacks the measured quantity, is a sweep, or
+        has one kind of specimen although several kinds were tested.
+        Also if peaks differ from the prediction by a factor of fifty,
+        or if the posterior was fitted to these peaks.
 
     Warns
     -----
@@ -223,9 +229,9 @@ def agreement(
 def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
     """Return the number, largest size and first load of precursors, measured and predicted.
 
-    Predicted drops follow from the force before and after each event. Drops below the
-    largest threshold of the tests do not count, because a load cell could not
-    distinguish them from noise.
+    Predicted drops follow from the force before and after each event.
+    Drops below the largest threshold of the tests do not count, because
+    a load cell could not distinguish them from noise.
     """
     names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
     event, peak = names.get(curves.unit, ("", ""))
@@ -246,8 +252,9 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array
     for row in np.flatnonzero(np.isfinite(peaks)):
         force = np.stack([high[row], low[row]], axis=1).ravel()
         force = np.append(force[np.isfinite(force)], peaks[row])
-        # The peak is the force at the onset, or at an earlier event. Between an event and the
-        # next event the force rises, so the two forces of each event give the turning points.
+        # The peak is the force at the onset, or at an earlier event.
+        # Between an event and the next event the force rises, so the
+        # two forces of each event give the turning points.
         predicted.append(summary_of(force, threshold))
     measured = [summary_of(curve.force, threshold) for curve in curves]
     pairs = zip(np.transpose(measured), np.transpose(predicted), strict=True)
@@ -287,8 +294,8 @@ def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
         # 2.
         chosen = rng.choice(total, size, replace=False) if row else np.arange(size)
         reached = np.cumsum(np.bincount(place[chosen], minlength=at.size)) / size
-        # The remaining values have the distribution of all values less the chosen
-        # ones.
+        # The remaining values have the distribution of all values less
+        # the chosen ones.
         away = (reached - np.cumsum(share)) * total / values.size
         distances[row] = size * (share @ away**2), np.sqrt(size) * np.abs(away).max()
     return distances
@@ -311,7 +318,8 @@ def _with_posterior(
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])
-    # All kinds of a campaign share the draw, because they share the unknown parameters.
+    # All kinds of a campaign share the draw, because they share the
+    # unknown parameters.
     u = posterior.u[rng.choice(len(posterior.u), POSTERIOR_POINTS)]
     chosen = rng.integers(POSTERIOR_POINTS, size=replicates)
     distances, predicted = np.zeros((replicates + 1, 2)), []
@@ -322,7 +330,8 @@ def _with_posterior(
         uniform = rng.random((replicates, peaks.size))
         drawn = [np.interp(p, shares[i], at) for p, i in zip(uniform, chosen, strict=True)]
         law = at, shares.mean(axis=0)
-        # Values of the mean distribution are uniform if the peaks come from it.
+        # Values of the mean distribution are
+        # uniform if the peaks come from it.
         squares, most = _distances(np.interp(np.sort([peaks, *drawn]), *law))
         distances[:, 0] += squares
         distances[:, 1] = np.maximum(distances[:, 1], most)
@@ -337,7 +346,8 @@ def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[
     margin = RANGE_MARGIN * (high - low)
     at = np.linspace(max(low - margin, 0.5 * low), high + margin, LAW_VALUES)
     density = np.exp(posterior.likelihood.of([at], [kind]).parts(u))
-    # The distribution is the integral of the density, by the trapezoidal rule.
+    # The distribution is the integral of the density, by the
+    # trapezoidal rule.
     between = 0.5 * (density[:, 1:] + density[:, :-1])
     share = np.cumsum(np.pad(between, ((0, 0), (1, 0))), axis=1)
     return at, share / np.maximum(share[:, -1:], 1e-300)

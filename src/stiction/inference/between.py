@@ -1,22 +1,24 @@
 """Estimate the scatter between specimens, and remove it from records.
 
-Problem. Records k = 1, ..., n from different specimens have means with logarithms
-L_k. The field alone gives L_k the variance v_k. Estimate the variance s between
-specimens, and scale the records as if all came from one specimen.
+Problem. Records k = 1, ..., n from different specimens have means with
+logarithms L_k. The field alone gives L_k the variance v_k. Estimate the
+variance s between specimens, and scale the records as if all came from
+one specimen.
 
-Sources. Paule and Mandel (1982), Journal of Research of the National Bureau of
-Standards 87, 377. Viechtbauer (2007), Statistics in Medicine 26, 37.
+Sources. Paule and Mandel (1982), Journal of Research
+of the National Bureau of Standards 87, 377.
+Viechtbauer (2007), Statistics in Medicine 26, 37.
 
 Steps:
 
-1. With weights 1/(s + v_k), take the mean m(s) of the logarithms and Q(s) = sum (L_k -
-   m(s))^2/(s + v_k). At the true s, Q has a chi-square distribution with n - 1 degrees
-   of freedom.
-2. Estimate s from Q(s) = n - 1, the mean of this distribution. Use s = 0 if Q(0) is
-   smaller.
-3. Reduce the differences between the logarithms until Q(0) = n - 1, and scale the
-   records to these means. Equal means would lack the variance that the field alone
-   causes between records.
+1. With weights 1/(s + v_k), take the mean m(s) of the logarithms and
+   Q(s) = sum (L_k - m(s))^2/(s + v_k). At the true s, Q has a
+   chi-square distribution with n - 1 degrees of freedom.
+2. Estimate s from Q(s) = n - 1, the mean of this distribution. Use s =
+   0 if Q(0) is smaller.
+3. Reduce the differences between the logarithms until Q(0) = n - 1, and
+   scale the records to these means. Equal means would lack the variance
+   that the field alone causes between records.
 """
 
 import math

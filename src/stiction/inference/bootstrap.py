@@ -1,33 +1,37 @@
 """Intervals for a fit, and fields as likely as the fit, from fits to simulated records.
 
-Problem. A fit estimates parameters theta from records. Find intervals that contain
-the true theta with a given probability. Also find fields that are as likely as the
-estimate.
+Problem. A fit estimates parameters theta from records. Find intervals
+that contain the true theta with a given probability. Also find fields
+that are as likely as the estimate.
 
-Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods and their
-Application (1997), section 5.2. Ends by test inversion: Carpenter (1999), Journal
-of the Royal Statistical Society B 61, 159.
+Sources. Studentised intervals: Davison and Hinkley, Bootstrap Methods
+and their Application (1997), section 5.2. Ends by test inversion:
+Carpenter (1999), Journal of the Royal Statistical Society B 61, 159.
 
 Steps:
 
-1. Simulate records from the estimate, and fit them. Each fit starts from the
-   estimate.
-2. Transform each parameter to a scale on which its error is about normal (`Scale`).
-3. The error of a repetition is (estimate of the repetition - estimate)/width. The
-   width is proportional to the square root of the correlation length, because a
+1. Simulate records from the estimate, and fit them. Each fit starts
+   from the estimate.
+2. Transform each parameter to a scale on which its error is about
+   normal (`Scale`).
+3. The error of a repetition is (estimate of the
+   repetition - estimate)/width. The width is proportional
+   to the square root of the correlation length, because a
    record contains only few correlation lengths.
-4. Subtract the quantiles of the error, times the width, from the estimate: a first
-   interval.
-5. Repeat steps 1 and 3 for fields whose correlation length lies at either end of its
-   first interval. Take the upper end of each interval from the field with the longer
-   length, and the lower end from the other field. Exchange them for parameters whose
-   estimates fall with the correlation length.
-6. Limit the intervals: bounds of the marginal lie outside the values, and other
-   parameters lie within their ranges.
-7. A likely field is the estimate minus the error of one repetition times the width.
+4. Subtract the quantiles of the error, times the width, from the
+   estimate: a first interval.
+5. Repeat steps 1 and 3 for fields whose correlation length lies at
+   either end of its first interval. Take the upper end of each interval
+   from the field with the longer length, and the lower end from the
+   other field. Exchange them for parameters whose estimates fall with
+   the correlation length.
+6. Limit the intervals: bounds of the marginal lie outside the values,
+   and other parameters lie within their ranges.
+7. A likely field is the estimate minus the error of one repetition
+   times the width.
 
-Departures. Only one step of the inversion is made, and the correlation length is
-varied for all parameters.
+Departures. Only one step of the inversion is made, and the correlation
+length is varied for all parameters.
 """
 
 import math
@@ -85,14 +89,15 @@ def bootstrapped(
 ) -> tuple[list[Refits], list[Refits]]:
     """Fit records simulated from an estimate, and from fields `at_ends` (steps 1 and 5).
 
-    The second list holds fits from `further` estimates, with other numbers of
-    repetitions. Records to which the family cannot be fitted are left out.
+    The second list holds fits from `further` estimates, with other
+    numbers of repetitions. Records to which the family cannot be fitted
+    are left out.
     """
 
     def repeat(truth: BestFit, count: int = count) -> Refits:
         def refit(number: int) -> BestFit | None:
-            # The same random numbers for each field, so that differences between fields are
-            # not due to chance.
+            # The same random numbers for each field, so that
+            # differences between fields are not due to chance.
             rng = np.random.default_rng([seed, number])
             try:
                 again = estimate(truth.simulate(rng), truth.setting, truth)
@@ -101,7 +106,8 @@ def bootstrapped(
             meter.advance()
             return again
 
-        # More threads would wait for each other, as most of the time is in Python's own code.
+        # More threads would wait for each other, as most of the time is
+        # in Python's own code.
         results = in_threads(refit, range(count), workers=1)
         fits = [result for result in results if result is not None]
         if len(fits) < MIN_REPETITIONS:
@@ -135,9 +141,10 @@ def at_ends(around: Refits, confidence: float) -> list[BestFit]:
 class Scale(NamedTuple):
     """Scale on which the error of a parameter is about normal: logarithmic unless `linear`.
 
-    For a bound of a marginal, the scale is the logarithm of the distance from the
-    mean. For noise, it is the variance. The variance may be negative, because
-    estimates cut off at zero would seem to have no error.
+    For a bound of a marginal, the scale is the logarithm of the
+    distance from the mean. For noise, it is the variance. The variance
+    may be negative, because estimates cut off at zero would seem to
+    have no error.
     """
 
     name: str
@@ -218,7 +225,8 @@ def intervals(
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
-        # If clipping leaves almost no interval, the data say nothing about the parameter.
+        # If clipping leaves almost no interval, the data say nothing
+        # about the parameter.
         least = MIN_WIDTH * high if np.isfinite(ends).all() else 0.0
         if high - low <= least:
             low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
@@ -231,7 +239,8 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
     estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
-    # Noise may move values beyond the bounds, which lie outside the shrunken values.
+    # Noise may move values beyond the bounds, which lie outside the
+    # shrunken values.
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
     # Positive values have no negative bound.
     below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least

@@ -1,26 +1,28 @@
 """Measured curves of force against travel or time, with peak, precursors and plateau.
 
-Problem. Readings F_i contain white noise with standard deviation s. Find the peak,
-the drops before the peak and the plateau after the peak. The drops are called
-precursors: a part of the interface slips and comes to rest.
+Problem. Readings F_i contain white noise with standard
+deviation s. Find the peak, the drops before the peak and
+the plateau after the peak. The drops are called precursors:
+a part of the interface slips and comes to rest.
 
-Source. David and Nagaraja, Order Statistics (2003), section 10.5, give the range of
-white noise. The choice of thresholds and turning points is our own.
+Source. David and Nagaraja, Order Statistics (2003),
+section 10.5, give the range of white noise. The
+choice of thresholds and turning points is our own.
 
 Steps:
 
-1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a straight line,
-   and noise gives them the variance 6 s^2. Their median yields s, because drops are
-   too rare to change a median. If a load cell reads in steps of q, s is at least
-   q/sqrt(12).
-2. Threshold. n readings of a constant force have a range of about 2 s sqrt(2 ln n).
-   Only a larger fall counts as a drop.
-3. Turning points. Keep the highest reading since the last drop. A drop begins at this
-   reading when the force lies more than the threshold below it. Then keep the lowest
-   reading. The drop ends at this reading when the force lies more than the threshold
-   above it.
-4. The peak is the largest force. Drops that begin before the peak are precursors. The
-   plateau follows the drop at the peak.
+1. Noise. Second differences F_(i-1) - 2 F_i + F_(i+1) vanish on a
+   straight line, and noise gives them the variance 6 s^2. Their median
+   yields s, because drops are too rare to change a median. If a load
+   cell reads in steps of q, s is at least q/sqrt(12).
+2. Threshold. n readings of a constant force have a range of about 2 s
+   sqrt(2 ln n). Only a larger fall counts as a drop.
+3. Turning points. Keep the highest reading since the last drop. A drop
+   begins at this reading when the force lies more than the threshold
+   below it. Then keep the lowest reading. The drop ends at this reading
+   when the force lies more than the threshold above it.
+4. The peak is the largest force. Drops that begin before the peak are
+   precursors. The plateau follows the drop at the peak.
 """
 
 from __future__ import annotations
@@ -89,8 +91,8 @@ class Curve(Result):
     peak, peak_travel : float
         Largest force and its travel.
     drops : Drops
-        Precursors: drops before the peak. The error of each size is about twice
-        the noise.
+        Precursors: drops before the peak. The error of each size is
+        about twice the noise.
     plateau : float
         Mean force after the drop at the peak. NaN if the record ends there.
     """
@@ -184,22 +186,24 @@ def read_curve(
     Parameters
     ----------
     source : path, DataFrame or (travel, force)
-        A text file or workbook, a folder of such files, a pandas table, or two
-        arrays. A table needs a column with force, stress or friction coefficient
-        and a column with travel or time. A file may hold several tests, either
-        numbered in a column ``test`` or separated by empty lines.
+        A text file or workbook, a folder of such files, a pandas table,
+        or two arrays. A table needs a column with force, stress or
+        friction coefficient and a column with travel or time. A file
+        may hold several tests, either numbered in a column ``test`` or
+        separated by empty lines.
     force, travel : str or int, optional
-        Column, given by its name, heading or number from 0. By default the force
-        is the column called force, load, friction, ... and the travel is the
-        column called travel, displacement, extension, position, ... or else time.
+        Column, given by its name, heading or number from 0. By default
+        the force is the column called force, load, friction, ... and
+        the travel is the column called travel, displacement, extension,
+        position, ... or else time.
     unit, travel_unit : str, optional
         Units of force and travel if the source states no units.
     speed : float, optional
         Speed of the crosshead, m/s. It turns time into travel.
     noise : float, optional
-        Standard deviation of a reading of the load cell, in SI. By default it is
-        estimated from neighbouring readings, which needs a load cell without a
-        filter.
+        Standard deviation of a reading of the load cell, in SI. By
+        default it is estimated from neighbouring readings, which needs
+        a load cell without a filter.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`.
 
@@ -211,14 +215,14 @@ def read_curve(
     Raises
     ------
     InputError
-        If a file cannot be read, a unit is missing or unknown, columns are
-        ambiguous, or travel or time goes back.
+        If a file cannot be read, a unit is missing or unknown, columns
+        are ambiguous, or travel or time goes back.
 
     Warns
     -----
     AccuracyWarning
-        If readings are missing, all forces are negative, or a record ends at its
-        peak.
+        If readings are missing, all forces are negative, or a record
+        ends at its peak.
 
     Examples
     --------
@@ -355,7 +359,8 @@ def _tests_of(table: Any, readings: Readings) -> Iterator[tuple[str, Any]]:
             yield f"{label:g}", number.values == label
         return
     blocks = np.asarray(table.attrs.get("blocks", np.zeros(readings.travel.size)))
-    # A new test begins after an empty line only if the travel goes back there.
+    # A new test begins after an empty line
+    # only if the travel goes back there.
     restarts = np.diff(readings.travel, prepend=0.0) < 0
     begins = (np.diff(blocks, prepend=blocks[:1]) > 0) & restarts
     block = np.cumsum(begins)
@@ -373,7 +378,8 @@ def _curve(name: str, readings: Readings, rows: Array, noise: float | None) -> C
         travel, force, lines = travel[known], force[known], lines[known]
     if force.size < MIN_READINGS:
         raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
-    # Time never goes back. A position may tremble, but a new cycle is another test.
+    # Time never goes back. A position may tremble, but a new cycle is
+    # another test.
     allowed = 0.0 if readings.travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
     back = np.flatnonzero(np.maximum.accumulate(travel) - travel > allowed)
     if back.size:
@@ -395,7 +401,8 @@ def _curve(name: str, readings: Readings, rows: Array, noise: float | None) -> C
     threshold = max(white_range, MIN_DROP_SHARE * force[top])
     # 3. and 4.
     starts, ends = turning_points(force, threshold)
-    # The plateau begins where the drop at the peak ends, and is empty without such a drop.
+    # The plateau begins where the drop at the peak ends, and is empty
+    # without such a drop.
     after = force[ends[starts == top].min(initial=force.size) :]
     starts, ends = starts[starts < top], ends[starts < top]
     return Curve(

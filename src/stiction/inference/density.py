@@ -1,34 +1,36 @@
 """Density of a measured peak: the density of the onset, convolved with the load-cell error.
 
-Problem. Onsets T_1, ..., T_N, all above the bound b, were simulated. Compute the
-density
+Problem. Onsets T_1, ..., T_N, all above the bound b, were simulated.
+Compute the density
 
     p(y) = int f(T) phi((y - T)/e)/e dT
 
-of a peak y = T + error. Here f is the density of onsets, e the standard deviation
-of the load-cell error, and phi the standard normal density.
+of a peak y = T + error. Here f is the density of onsets, e the standard
+deviation of the load-cell error, and phi the standard normal density.
 
-Sources. Wand, Marron and Ruppert (1991), Journal of the American Statistical
-Association 86, 343, introduced transformed kernels. Silverman, Density Estimation
-(1986), gives the kernel width in section 3.4.2, and kernels that keep the variance
-in section 6.1.2.
+Sources. Wand, Marron and Ruppert (1991), Journal of the American
+Statistical Association 86, 343, introduced transformed kernels.
+Silverman, Density Estimation (1986), gives the kernel width in section
+3.4.2, and kernels that keep the variance in section 6.1.2.
 
 Steps:
 
-1. Use v = log(T - b). If the correlation length is long, many onsets lie just above
-   b, and kernels on T itself would leak below b. If there is no bound, choose b so
-   far below the onsets that the logarithm is nearly linear.
-2. Standardise v to mean 0 and variance 1. The density of v then hardly changes
-   between nodes.
-3. Replace the sorted sample by the means of at most `GROUPS` groups. Groups are
-   smaller in the tails.
+1. Use v = log(T - b). If the correlation length is long, many onsets
+   lie just above b, and kernels on T itself would leak below b. If
+   there is no bound, choose b so far below the onsets that the
+   logarithm is nearly linear.
+2. Standardise v to mean 0 and variance 1. The density of v then hardly
+   changes between nodes.
+3. Replace the sorted sample by the means of at most `GROUPS` groups.
+   Groups are smaller in the tails.
 4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres
    multiplied by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the
    logarithm in steps of `STEP`.
-5. Interpolate this logarithm between steps and between nodes. Beyond the table it
-   falls like a parabola.
-6. Integrate over v with the midpoint rule. It converges faster than any power of
-   the step if the step is smaller than the widths of the error and the density.
+5. Interpolate this logarithm between steps and between nodes. Beyond
+   the table it falls like a parabola.
+6. Integrate over v with the midpoint rule. It converges faster than any
+   power of the step if the step is smaller than the widths of the error
+   and the density.
 """
 
 import math
@@ -73,9 +75,9 @@ class Densities(NamedTuple):
 def grouped(ordered: Array) -> tuple[Array, Array]:
     """Return the means and shares of groups of neighbouring values, which are sorted (step 3).
 
-    Groups end at equal steps of a normal variable, so that every group in a nearly
-    normal sample is narrow compared with the kernel. A value at an end is divided
-    between both groups.
+    Groups end at equal steps of a normal variable, so that every group
+    in a nearly normal sample is narrow compared with the kernel. A
+    value at an end is divided between both groups.
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -161,7 +163,8 @@ def _with_error(
         v = first + (k + 0.5) * step
         away = (y - bound - math.exp(v)) / error
         value = _interpolated(table, near, share, (v - mean) / spread) - 0.5 * away * away
-        # Sum exponentials relative to the largest, so that they neither overflow nor vanish.
+        # Sum exponentials relative to the largest, so that they neither
+        # overflow nor vanish.
         if value > top:
             total = total * math.exp(top - value) + 1.0
             top = value
@@ -183,8 +186,8 @@ def log_likelihoods(
 ) -> None:
     """Write log densities (1/Pa) of peaks at points to `out`, with shape (points, peaks).
 
-    `of_v` comes from `Densities.between`. `scales` holds shift and stretch, with
-    shape (2, points).
+    `of_v` comes from `Densities.between`. `scales` holds shift and
+    stretch, with shape (2, points).
     """
     for i in range(index.shape[0]):
         bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]

@@ -1,37 +1,44 @@
 """Designs of tests: what further tests will tell, before any test is made.
 
-Problem. Two questions are answered. With a prior of parameters theta: how much
-information about each parameter will a design, such as ten tests, give? It is the mean
-over campaigns of the divergence of the posterior from the prior,
+Problem. Two questions are answered. With a prior of parameters theta:
+how much information about each parameter will a design, such as ten
+tests, give? It is the mean over campaigns of the divergence of the
+posterior from the prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
-After measurements, with a fit or a posterior: how wide will the intervals of mean and
-scatter be after further tests, and how large the design stress?
+After measurements, with a fit or a posterior: how wide will the
+intervals of mean and scatter be after further tests, and how large the
+design stress?
 
-Source. Lindley (1956), Annals of Mathematical Statistics 27, 986, defined this
-information. It is computed by nested Monte Carlo. The expected widths are means over the
-same kind of campaigns.
+Source. Lindley (1956), Annals of Mathematical Statistics 27, 986,
+defined this information. It is computed by nested Monte Carlo. The
+expected widths are means over the same kind of campaigns.
 
 Steps for the information, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
 2. Draw the peaks from the simulated onsets that also give the likelihood.
-3. Compute the posterior of the unknown parameters on a grid (`stiction.inference.grid`).
-   Known parameters keep their drawn values. If the posterior lies between the points of
-   a coarse grid, make the box smaller around the true parameters.
-4. Compute the divergence of each marginal posterior. I is the mean over campaigns.
+3. Compute the posterior of the unknown parameters on a grid
+   (`stiction.inference.grid`). Known parameters keep their drawn
+   values. If the posterior lies between the points of a coarse grid,
+   make the box smaller around the true parameters.
+4. Compute the divergence of each marginal
+   posterior. I is the mean over campaigns.
 
 Steps for the widths, for each design and each simulated campaign:
 
-5. Draw true values (field, family, s and mean) from the posterior given the present
-   measurements.
+5. Draw true values (field, family, s and mean) from the posterior given
+   the present measurements.
 6. Draw further peaks, and levels of further profiles, with these values.
-7. Compute the posterior given all measurements (`stiction.inference.specimens`).
-8. Compute the width of the 90 % interval for each parameter, and the design stress
-   from the predictive distribution. The result holds their means over campaigns.
+7. Compute the posterior given all measurements
+   (`stiction.inference.specimens`).
+8. Compute the width of the 90 % interval for each parameter, and the
+   design stress from the predictive distribution. The result holds
+   their means over campaigns.
 
-Departure. Steps 5 to 8 keep only the `MAX_FIELDS` fields with the largest mass.
+Departure. Steps 5 to 8 keep only the `MAX_FIELDS` fields with the
+largest mass.
 """
 
 import math
@@ -102,10 +109,11 @@ def design_of_tests(
 ) -> xr.Dataset:
     """Estimate how much each design of tests will tell, as information or as narrower intervals.
 
-    If `random` is a fit or a posterior from `infer`, the result holds the expected
-    widths of the intervals for the mean and the scatter between specimens, and the
-    expected design stress. If a `prior` of other parameters is given, the result
-    holds the expected information about each parameter.
+    If `random` is a fit or a posterior from `infer`, the result holds
+    the expected widths of the intervals for the mean and the scatter
+    between specimens, and the expected design stress. If a `prior` of
+    other parameters is given, the result holds the expected information
+    about each parameter.
 
     Parameters
     ----------
@@ -123,20 +131,22 @@ def design_of_tests(
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit`.
     unit : str
-        Unit of the peaks, as in `infer`. Use "N" if the prior varies the area.
+        Unit of the peaks, as in `infer`. Use
+        "N" if the prior varies the area.
     repetitions : int
         Number of simulated campaigns for each design.
 
     Returns
     -------
     xarray.Dataset
-        Over 'design' and 'parameter': `information` is the expected divergence of the
-        posterior of a parameter from its prior (nats, NaN if the parameter is known),
-        with its `standard_error`. For a fit or a posterior, `width` is instead the
-        expected width of the 90 % interval, with its `standard_error`. Over 'design',
-        `design_stress` is then the expected design stress, Pa, and 90 % of the
-        designs lie between `design_low` and `design_high`. The first design, 'now',
-        stands for the present measurements.
+        Over 'design' and 'parameter': `information` is the expected
+        divergence of the posterior of a parameter from its prior (nats,
+        NaN if the parameter is known), with its `standard_error`. For a
+        fit or a posterior, `width` is instead the expected width of the
+        90 % interval, with its `standard_error`. Over 'design',
+        `design_stress` is then the expected design stress, Pa, and 90 %
+        of the designs lie between `design_low` and `design_high`. The
+        first design, 'now', stands for the present measurements.
 
     Raises
     ------
@@ -265,8 +275,9 @@ def _information(
             u[:, free] = v
             return of(u)
 
-        # 3. Many precise tests leave a posterior that is narrower than a cell, and then no
-        # point of the grid has a likelihood above zero.
+        # 3. Many precise tests leave a posterior that
+        # is narrower than a cell, and then no point
+        # of the grid has a likelihood above zero.
         grid = grid_of(given, box, CAMPAIGN_GRID_POINTS)
         while grid is None and np.ptp(box, axis=0).min() > MIN_BOX_WIDTH:
             box = 0.75 * truth[free] + 0.25 * box
@@ -301,7 +312,8 @@ def _present(
 ) -> Tables:
     """Return the present measurements, for the fields with the largest posterior mass.
 
-    Specimens of the problem come first. Further tests and the design are for them.
+    Specimens of the problem come first. Further tests and the design
+    are for them.
     """
     if isinstance(random, SpecimenPosterior):
         if problem != random.problem:
@@ -320,7 +332,8 @@ def _present(
         no_peaks = Peaks((None,), (np.zeros(0),), si_of(unit))
         tables = tables_of(problem, profiles, simulation, no_peaks, error)
         mass = np.ones(len(profiles.fields))  # given the profiles, fields are equally likely
-    # Each campaign needs a posterior, whose cost grows with the number of fields.
+    # Each campaign needs a posterior, whose
+    # cost grows with the number of fields.
     order = np.argsort(-mass, kind="stable")[:MAX_FIELDS]
     profiles = tables.profiles
     fields = tuple(profiles.fields[place] for place in order)
@@ -383,8 +396,8 @@ def _after(
     peaks = tables.predicted(0, np.repeat(truth, tests, axis=0), int(rng.integers(2**31)))
     field, family, cv, log_mean = truth[0]
     law = factor_of_family(profiles.families[int(family)], float(cv)).distribution
-    # A further profile is as long as the present profiles, so its level scatters within the
-    # field as much as their levels do on average.
+    # A further profile is as long as the present profiles, so its level
+    # scatters within the field as much as their levels do on average.
     scanned = max(profiles.within.shape[1], 1)
     within = profiles.within.sum(axis=1, keepdims=True) / scanned
     within = within.repeat(levels, axis=1)

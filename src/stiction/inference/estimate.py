@@ -1,30 +1,33 @@
 """Fit a marginal, a spectrum and noise to records, and compare families.
 
-Problem. Values y = v(z) + e were measured along records. Here z is a correlated
-Gaussian field, v maps it to a marginal, and e is white normal noise. Find the
-marginal, the spectrum and the noise.
+Problem. Values y = v(z) + e were measured along records. Here z is a
+correlated Gaussian field, v maps it to a marginal, and e is white
+normal noise. Find the marginal, the spectrum and the noise.
 
-Sources. The composite likelihood follows Varin, Reid and Firth (2011), Statistica
-Sinica 21, 5. The criterion is due to Akaike (1974), IEEE Transactions on Automatic
-Control 19, 716. Steps 3, 5 and 6 are our own.
+Sources. The composite likelihood follows Varin, Reid and Firth (2011),
+Statistica Sinica 21, 5. The criterion is due to Akaike (1974), IEEE
+Transactions on Automatic Control 19, 716. Steps 3, 5 and 6 are our own.
 
 Steps:
 
-1. Fit the marginal to the values, as if they were independent (`marginal_fit`).
-2. Fit spectrum and noise to the periodograms with the map of this marginal (`whittle`).
-   Noise increases the scatter of the values, so repeat both steps once with the
-   estimated noise.
-3. Increase the variance of the marginal by the amount that removal of the mean and
-   the trend takes from the values on average.
-4. The score of a family is its mean log likelihood times the number of independent
-   values (step 5), minus the number of estimated parameters.
-5. Families fitted to the same values have the same mean and variance. The log ratio
-   of their densities therefore begins with Hermite order 3 in z. For N values with
-   correlations rho_ij, the sum of the log ratios has the mean and variance of a sum
-   over N^2/sum rho_ij^3 independent values.
-6. If records come from different specimens, scale them as if they came from one
-   specimen (`between`). This requires the scatter of means that the field alone
-   causes, so repeat the fit `ROUNDS` times.
+1. Fit the marginal to the values, as if they were independent
+   (`marginal_fit`).
+2. Fit spectrum and noise to the periodograms with the map of this
+   marginal (`whittle`). Noise increases the scatter of the values, so
+   repeat both steps once with the estimated noise.
+3. Increase the variance of the marginal by the amount that removal of
+   the mean and the trend takes from the values on average.
+4. The score of a family is its mean log likelihood
+   times the number of independent values (step 5),
+   minus the number of estimated parameters.
+5. Families fitted to the same values have the same mean and variance.
+   The log ratio of their densities therefore begins with Hermite order
+   3 in z. For N values with correlations rho_ij, the sum of the log
+   ratios has the mean and variance of a sum over N^2/sum rho_ij^3
+   independent values.
+6. If records come from different specimens, scale them as if they came
+   from one specimen (`between`). This requires the scatter of means
+   that the field alone causes, so repeat the fit `ROUNDS` times.
 """
 
 import math
@@ -186,7 +189,8 @@ def estimate(
         if not setting.between:
             fitted = _estimate(rows, setting, start)
         else:
-            # 6. In the first round the scatter of means by the field alone is unknown.
+            # 6. In the first round the scatter of means by the field
+            # alone is unknown.
             fitted = start or _estimate(as_of_one(rows, np.zeros(len(rows))), setting, None)
             for _ in range(ROUNDS):
                 fitted = _estimate(fitted.as_of_one(rows), setting, fitted)
@@ -211,7 +215,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
     for _ in range(2):
         # 1.
         marginal = setting.marginal.fit(values, noise, marginal)
-        # 2. The coarse grid takes most of the time of a fit, and a repetition skips it.
+        # 2. The coarse grid takes most of the time of a fit, and a
+        # repetition skips it.
         likelihood = Whittle(family, hermite_shares(marginal), observed)
         vector, state = likelihood.fit(likelihood.coarse() if vector is None else vector)
         model = state[0]
@@ -241,8 +246,9 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     """Return the expected share of the field's variance that remains about mean and trend.
 
-    For N values with correlation R, the share is tr(M R)/N. The projection M removes
-    the trend of each record, and the mean of all records, from the values.
+    For N values with correlation R, the share is tr(M R)/N. The
+    projection M removes the trend of each record, and the mean of all
+    records, from the values.
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -259,7 +265,8 @@ def bands(group: Observed, expected: Array) -> Array:
     k = np.broadcast_to(np.sqrt(sum(v**2 for v in group.window.wave_vectors)), weights.shape)
     kept = weights > 0.0
     k = k[kept]
-    # Single ordinates scatter by their own size. Averages of a band hide this scatter.
+    # Single ordinates scatter by their own size. Averages of a band
+    # hide this scatter.
     band = np.unique(np.round(BANDS_PER_OCTAVE * np.log2(k / k.min())), return_inverse=True)[1]
     sums = [np.bincount(band, weights=w) for w in (k, group.average[kept], expected[kept])]
     return np.transpose(sums) / np.bincount(band)[:, None]
@@ -268,12 +275,14 @@ def bands(group: Observed, expected: Array) -> Array:
 class Goodness(NamedTuple):
     """How well a family of marginals fits: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's distance. `score` is the score (step 4) minus the score of
-    the best family: 0 for the best family, negative for others. Differences below 2 do not
-    distinguish families. `weight` is the share of fields that `FieldFit.interfaces` draws
-    from the family. It is proportional to the likelihood of these fields. Because the
-    fields scatter about the estimate, their log likelihood is on average below the maximum
-    by half a unit for each parameter.
+    `distance` is Kolmogorov's distance. `score` is the score
+    (step 4) minus the score of the best family: 0 for the best
+    family, negative for others. Differences below 2 do not
+    distinguish families. `weight` is the share of fields that
+    `FieldFit.interfaces` draws from the family. It is
+    proportional to the likelihood of these fields. Because the
+    fields scatter about the estimate, their log likelihood is on
+    average below the maximum by half a unit for each parameter.
     """
 
     marginal: Any
@@ -303,8 +312,8 @@ def ranking(
 ) -> tuple[list[BestFit], dict[str, Goodness], float]:
     """Return estimates (best family first), their qualities, and the number of values (step 5).
 
-    Families that cannot be fitted are left out. If all families fail, an `InputError`
-    is raised.
+    Families that cannot be fitted are left out. If all families fail,
+    an `InputError` is raised.
     """
     fitted: list[tuple[float, BestFit]] = []
     problems: list[str] = []
@@ -322,12 +331,14 @@ def ranking(
         )
     if not fitted:
         raise InputError(problems)
-    # 4. and 5. All families share the number of independent values of the likeliest family.
+    # 4. and 5. All families share the number of independent values of
+    # the likeliest family.
     independent = max(fitted, key=lambda one: one[0])[1].independent
     costs = np.array([len(one.setting.marginal.parameters(one.of_values)) for _, one in fitted])
     scores = independent * np.array([mean for mean, _ in fitted]) - costs
     scores -= scores.max()
-    # Without the penalty of Akaike's criterion, and half a unit less for each parameter.
+    # Without the penalty of Akaike's criterion, and half a unit less
+    # for each parameter.
     weights = np.exp(scores + 0.5 * costs) * (scores > -DRAWN)
     weights /= weights.sum()
     best_first = np.argsort(-scores, kind="stable").tolist()

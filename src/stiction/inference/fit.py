@@ -1,29 +1,32 @@
 """Fit a random field to measured profiles, with intervals and doubts.
 
-Problem. Records are samples of one random field, with noise. Find the field, and
-how well the records determine the field.
+Problem. Records are samples of one random field, with noise. Find the
+field, and how well the records determine the field.
 
-Sources. The parts, and their sources, are described in `records`, `window`,
-`whittle`, `marginal_fit`, `estimate`, `bootstrap`, `between` and `specimens`.
+Sources. The parts, and their sources, are described in `records`,
+`window`, `whittle`, `marginal_fit`, `estimate`, `bootstrap`, `between`
+and `specimens`.
 
 Steps:
 
-1. Turn profiles into records at equal distances, and refuse white noise (`records`,
-   `window`).
-2. Fit each family of marginals together with the spectrum, and sort the families by
-   score (`estimate`).
-3. Fit records that are simulated from the best family, and from other families that
-   may be true (`bootstrap`). If a family cannot be fitted to records simulated from
+1. Turn profiles into records at equal distances, and refuse white noise
+   (`records`, `window`).
+2. Fit each family of marginals together with the spectrum, and sort the
+   families by score (`estimate`).
+3. Fit records that are simulated from the best family,
+   and from other families that may be true (`bootstrap`).
+   If a family cannot be fitted to records simulated from
    it, leave the family out and repeat from step 2.
-4. Compute intervals from the repetitions. If records come from different specimens,
-   compute the intervals of mean and scatter from the posterior given the levels of
-   the records (`specimens`).
-5. Compare the distances of the data from marginal and spectrum with the distances
-   of the repetitions. The logarithms of these distances are about normal, so
-   p-values follow from Student's distribution.
-6. Draw likely fields from the families in proportion to their weights. The draws
-   follow a sequence of Niederreiter, which is evenly spread (Random Number
-   Generation and Quasi-Monte Carlo Methods, 1992, chapter 3).
+4. Compute intervals from the repetitions. If records come from
+   different specimens, compute the intervals of mean and scatter from
+   the posterior given the levels of the records (`specimens`).
+5. Compare the distances of the data from marginal and spectrum with the
+   distances of the repetitions. The logarithms of these distances are
+   about normal, so p-values follow from Student's distribution.
+6. Draw likely fields from the families in proportion to their
+   weights. The draws follow a sequence of Niederreiter, which
+   is evenly spread (Random Number Generation and Quasi-Monte
+   Carlo Methods, 1992, chapter 3).
 """
 
 import math
@@ -118,38 +121,42 @@ class FieldFit(Result):
     Attributes
     ----------
     field : RandomField
-        The fitted field, for simulations, without measurement noise and with the mean
-        mode.
+        The fitted field, for simulations, without measurement noise and
+        with the mean mode.
     parameters : dict of str to float
         Estimates in SI. ``efolding_length`` (m) is the lag at which the
-        correlation of z falls to 1/e. ``mean`` and ``standard_deviation`` describe
-        the field. ``marginal.*``, ``spectrum.*`` and ``anisotropy`` have the same
-        names as in study files. ``noise`` is the standard deviation of the
-        measurement noise, and ``between`` is the coefficient of variation between
-        specimens.
+        correlation of z falls to 1/e. ``mean`` and
+        ``standard_deviation`` describe the field. ``marginal.*``,
+        ``spectrum.*`` and ``anisotropy`` have the same names as in
+        study files. ``noise`` is the standard deviation of the
+        measurement noise, and ``between`` is the coefficient of
+        variation between specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval for each parameter. The interval for the noise may begin at
-        zero. Intervals for bounds of the marginal end outside the values. Intervals
-        for exponent (0.65 to 16) and anisotropy (0.05 to 20) end at the searched
-        ranges. With `between`, the intervals for ``mean`` and ``between`` come from
+        Bootstrap interval for each parameter. The interval for the
+        noise may begin at zero. Intervals for bounds of the marginal
+        end outside the values. Intervals for exponent (0.65 to 16) and
+        anisotropy (0.05 to 20) end at the searched ranges. With
+        `between`, the intervals for ``mean`` and ``between`` come from
         the posterior given the levels of the records.
     confidence : float
         Confidence level of the intervals.
     repetitions : tuple of RandomField
-        Fits to records simulated from `field`, which a repeated measurement might
-        have given.
+        Fits to records simulated from `field`, which a repeated
+        measurement might have given.
     families : dict of str to Goodness
-        Quality of the fit for each requested family. The best family comes first.
+        Quality of the fit for each requested family. The best family
+        comes first.
     independent : float
         Number of independent values in the scores of families.
     p_values : dict of str to float
-        Probability that records with the fitted ``marginal`` and ``spectrum`` differ
-        from their fits as much as the data do. A small probability means that the
-        family does not fit. For several records without `between`, ``level`` is the
-        probability that their means scatter as much.
+        Probability that records with the fitted ``marginal`` and
+        ``spectrum`` differ from their fits as much as the data do. A
+        small probability means that the family does not fit. For
+        several records without `between`, ``level`` is the probability
+        that their means scatter as much.
     missing : (int, int)
-        Number of points without a value, which are left out, and total number of
-        points.
+        Number of points without a value, which are left out, and total
+        number of points.
     doubts : tuple of str
         Reasons not to trust the fit. Empty if there are no such reasons.
     """
@@ -199,18 +206,19 @@ class FieldFit(Result):
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
         """Return equally likely random interfaces, over which failure probabilities are averaged.
 
-        Each interface is the estimate minus the error of a repetition, so the
-        interfaces have the bias and scatter of the intervals. Families of the
-        marginal are drawn in proportion to their `weight`. With `between`, each
-        interface has a mean and a factor between specimens, drawn from their
-        posterior (`stiction.inference.specimens`). With the same seed, a longer list
-        begins with the shorter list.
+        Each interface is the estimate minus the error of a repetition,
+        so the interfaces have the bias and scatter of the intervals.
+        Families of the marginal are drawn in proportion to their
+        `weight`. With `between`, each interface has a mean and a factor
+        between specimens, drawn from their posterior
+        (`stiction.inference.specimens`). With the same seed, a longer
+        list begins with the shorter list.
 
         Parameters
         ----------
         count : int
-            Number of interfaces. A family has at most one different field for each
-            repetition.
+            Number of interfaces. A family has at most one different
+            field for each repetition.
         seed : int
             Not negative.
 
@@ -233,7 +241,8 @@ class FieldFit(Result):
         chosen = self._chosen(count, seed)
         if not self._families:
             return [RandomInterface(strength=field) for field in chosen]
-        # The mean and the factor follow from the posterior given the chosen field.
+        # The mean and the factor follow from the posterior given the
+        # chosen field.
         numbers = {field: number for number, field in enumerate(self._every)}
         rng = np.random.default_rng([seed, 6])
         drawn = self._posterior.draws(count, rng, [numbers[field] for field in chosen])
@@ -247,11 +256,13 @@ class FieldFit(Result):
                 f" of `fit.repetitions` to st.RandomInterface(strength=..., {self.quantity}=...)"
             )
         rng = np.random.default_rng([seed, 5])
-        # Evenly spread places divide the draws between families more exactly than random places.
+        # Evenly spread places divide the draws between families more
+        # exactly than random places.
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
         places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
         family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
-        # Each family runs through its fields in a random order, and repeats it if necessary.
+        # Each family runs through its fields in a random order, and
+        # repeats it if necessary.
         orders = [cycle(rng.permutation(len(fields))) for fields in self._likely]
         return [self._likely[number][next(orders[number])] for number in family.tolist()]
 
@@ -276,12 +287,13 @@ class FieldFit(Result):
         length = truth.field(self.quantity).spectrum.efolding_length
         cvs = np.array([one.standard_deviation / one.mean for one in fields])
         lengths = np.array([one.spectrum.efolding_length for one in fields])
-        # The variance of a mean grows with the variance of the field and its
-        # correlation length.
+        # The variance of a mean grows with the variance of the field
+        # and its correlation length.
         share = np.minimum(cvs**2 * lengths / ((deviation / mean) ** 2 * length), 1e3)
         within = np.minimum(np.outer(share, truth.within), np.log1p(cvs**2)[:, None])
         if not self._families:
-            # All records are of one specimen. Their weighted mean is a single level, whose
+            # All records are of one specimen. Their
+            # weighted mean is a single level, whose
             # variance is the variance of a weighted mean.
             weight = 1.0 / np.maximum(truth.within, 1e-300)
             levels = np.atleast_1d(weight @ levels / weight.sum())
@@ -342,57 +354,64 @@ def fit_field(
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points,
-        such as `stiction.read_profile` returns. Missing values (NaN, missing
-        points, filled values) are left out. Plain arrays in SI have a value at each
-        node of `interface`, with shape (nodes,) or (samples, nodes), or on a plane
-        (nx, ny) or (samples, nx, ny). Several profiles are samples of one field. They
-        may differ in length.
+        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced
+        points, such as `stiction.read_profile` returns. Missing values
+        (NaN, missing points, filled values) are left out. Plain arrays
+        in SI have a value at each node of `interface`, with shape
+        (nodes,) or (samples, nodes), or on a plane (nx, ny) or
+        (samples, nx, ny). Several profiles are samples of one field.
+        They may differ in length.
     interface : Interface, optional
-        Needed for arrays without coordinates. A warning is issued if it is too
-        short, or its nodes too coarse, for the fitted field.
+        Needed for arrays without coordinates. A warning is issued if it
+        is too short, or its nodes too coarse, for the fitted field.
     marginal : str, dict or sequence of them
         Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
-        continuous distribution of `scipy.stats`. If several families are given, the
-        best is chosen, and `families` in the result compares them. A table fixes
-        parameters: ``{"type": "beta", "low": 0, "high": 2e6}``. By default both
-        bounds of 'beta' are estimated, and other families have the lower bound 0.
+        continuous distribution of `scipy.stats`. If several families
+        are given, the best is chosen, and `families` in the result
+        compares them. A table fixes parameters: ``{"type": "beta",
+        "low": 0, "high": 2e6}``. By default both bounds of 'beta' are
+        estimated, and other families have the lower bound 0.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'. A table fixes
-        parameters, such as ``{"type": "power_law", "exponent": 4.0}``. If the table
-        has ``"truncation"`` or ``"power_kept"``, the spectrum of the record is
-        truncated there. Otherwise only the spectrum of the resulting field is
-        truncated, by default values.
+        'power_law', 'squared_exponential' or 'exponential'. A
+        table fixes parameters, such as ``{"type": "power_law",
+        "exponent": 4.0}``. If the table has ``"truncation"``
+        or ``"power_kept"``, the spectrum of the record is
+        truncated there. Otherwise only the spectrum of the
+        resulting field is truncated, by default values.
     detrend : int
-        Degree of the removed polynomial trend, 0 to 3. The mean is kept. Removing
-        mean and trend reduces the scatter of the values. The average reduction is
-        added to the estimate, except for families of `scipy.stats` with a fixed loc
-        or scale.
+        Degree of the removed polynomial trend, 0 to 3. The mean is
+        kept. Removing mean and trend reduces the scatter of the values.
+        The average reduction is added to the estimate, except for
+        families of `scipy.stats` with a fixed loc or scale.
     noise : bool or float
-        Whether to estimate white, normal measurement noise together with the field.
-        If the standard deviation (SI) of the noise is known, pass it.
+        Whether to estimate white, normal measurement noise together
+        with the field. If the standard deviation (SI) of the noise is
+        known, pass it.
     anisotropy : bool or float
-        For maps, the correlation length along y divided by the length along x. False
-        means 1, and True estimates the ratio.
+        For maps, the correlation length along y divided by the length
+        along x. False means 1, and True estimates the ratio.
     between : bool, str or sequence of str
-        Whether records come from different specimens, each of which has a factor. The
-        mean of the factor is 1, and its coefficient of variation ``between`` is
-        estimated. The family of the factor is 'lognormal', 'normal' (above zero) or
-        'weibull'. Several families, or all families if True, are averaged. With fewer
-        than five specimens, a warning states that they determine the scatter poorly.
+        Whether records come from different specimens, each of
+        which has a factor. The mean of the factor is 1, and its
+        coefficient of variation ``between`` is estimated. The
+        family of the factor is 'lognormal', 'normal' (above
+        zero) or 'weibull'. Several families, or all families if
+        True, are averaged. With fewer than five specimens, a
+        warning states that they determine the scatter poorly.
     prior : mapping, optional
-        Priors for the mean, ``"strength.mean"``, and for the coefficient of
-        variation, ``"between.strength"``, as in `infer`. By default the prior for the
-        mean is flat in its logarithm, and the prior for the coefficient of variation
-        is half-Cauchy with scale 0.1.
+        Priors for the mean, ``"strength.mean"``, and for the
+        coefficient of variation, ``"between.strength"``, as
+        in `infer`. By default the prior for the mean is flat
+        in its logarithm, and the prior for the coefficient
+        of variation is half-Cauchy with scale 0.1.
     quantity : str
-        Measured quantity, which sets the unit: 'strength', 'normal_pressure',
-        'friction_coefficient', ... A fitted field of friction coefficients has
-        ``of="friction_coefficient"``.
+        Measured quantity, which sets the unit: 'strength',
+        'normal_pressure', 'friction_coefficient', ... A fitted field of
+        friction coefficients has ``of="friction_coefficient"``.
     bootstrap : int
-        Number of repetitions, at least 20, for each of three fields: the fitted
-        field, and two fields whose correlation lengths are the ends of a first
-        interval.
+        Number of repetitions, at least 20, for each of three fields:
+        the fitted field, and two fields whose correlation lengths are
+        the ends of a first interval.
     confidence : float
         Confidence level of the intervals.
     seed : int
@@ -403,25 +422,27 @@ def fit_field(
     Returns
     -------
     FieldFit
-        With `field`, `parameters` and `interval`. `stiction.plot.fit` draws the fit.
+        With `field`, `parameters` and `interval`. `stiction.plot.fit`
+        draws the fit.
 
     Raises
     ------
     InputError
         If units are unknown, points repeat or are not equally spaced,
-        neighbouring points are not correlated, records are constant or short, or
-        values lie outside the bounds of the marginal.
+        neighbouring points are not correlated, records are constant or
+        short, or values lie outside the bounds of the marginal.
 
     Warns
     -----
     AccuracyWarning
-        If there are outliers, dropouts or repeated profiles, or if a family is left
-        out because it cannot be fitted to records simulated from it. Also for each of
-        the `doubts`: records hold fewer than ten correlation lengths, a p-value is
-        below 1 % (for ``level``, this suggests different specimens without
-        `between`), the noise hides the cut-off of the spectrum, a parameter lies at
-        the end of the searched range, or there are fewer than five specimens for the
-        scatter between specimens.
+        If there are outliers, dropouts or repeated profiles, or if a
+        family is left out because it cannot be fitted to records
+        simulated from it. Also for each of the `doubts`: records hold
+        fewer than ten correlation lengths, a p-value is below 1 % (for
+        ``level``, this suggests different specimens without `between`),
+        the noise hides the cut-off of the spectrum, a parameter lies at
+        the end of the searched range, or there are fewer than five
+        specimens for the scatter between specimens.
 
     Notes
     -----
@@ -431,12 +452,12 @@ def fit_field(
     Guillaumin et al., 2022). Correlations of values follow from correlations of the
     Gaussian field z by Hermite expansion (Grigoriu, 1995).
 
-    Families are compared with Akaike's criterion. N values with correlations rho_ij
-    count as N^2/sum rho_ij^3 independent values.
+    Families are compared with Akaike's criterion. N values with
+    correlations rho_ij count as N^2/sum rho_ij^3 independent values.
 
-    Intervals come from a studentised bootstrap (Davison and Hinkley, 1997, section
-    5.2). Their upper and lower ends come from fields with longer and shorter
-    correlation lengths (Carpenter, 1999).
+    Intervals come from a studentised bootstrap (Davison and Hinkley,
+    1997, section 5.2). Their upper and lower ends come from fields with
+    longer and shorter correlation lengths (Carpenter, 1999).
 
     Examples
     --------
@@ -537,8 +558,9 @@ def _judged(
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
     if fitted.setting.between:
-        # The bootstrap scales records as if all came from one specimen, so its means and
-        # scatter lack the scatter between specimens. The levels hold it.
+        # The bootstrap scales records as if all came from one specimen,
+        # so its means and scatter lack the scatter between specimens.
+        # The levels hold it.
         interfaces = (RandomInterface(strength=fitted.field("strength")),)
         mean, within = parameters["mean"], fitted.within[None]
         grid, _ = grid_of_profiles(Profiles(interfaces, mean, levels, within, families, prior))
@@ -603,5 +625,6 @@ def _power_at_cutoff(fitted: BestFit, window: RecordWindow) -> float:
         return math.inf
     power = model.variance * (1.0 - model.noise_share) * model.signal(window)
     power = power[window.weights > 0.0]
-    # The correlation length follows from the wavenumbers at which the power falls.
+    # The correlation length follows from the wavenumbers at which the
+    # power falls.
     return float(power[power >= 0.25 * power.max()].min())

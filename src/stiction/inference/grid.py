@@ -1,21 +1,23 @@
 """Compute a posterior on a grid that closes in on the mass, and draw from it.
 
-Problem. The prior is uniform in the unit cube. Compute the posterior density
-L(u)/Z of the parameters u from the likelihood L, with the evidence Z = int L du.
-L may be narrow.
+Problem. The prior is uniform in the unit cube. Compute the posterior
+density L(u)/Z of the parameters u from the likelihood L, with the
+evidence Z = int L du. L may be narrow.
 
-Source. Gelman and others, Bayesian Data Analysis (2013), section 10.1, describe
-posteriors on a grid. Closing in is our own.
+Source. Gelman and others, Bayesian Data Analysis (2013), section 10.1,
+describe posteriors on a grid. Closing in is our own.
 
 Steps:
 
-1. Divide a box into equal cells, and compute log L at the centre of each cell.
-2. The mass of a cell is L over the sum of L. Z is the sum of L times the volume of a cell
-   (midpoint rule). The part outside the box is neglected.
+1. Divide a box into equal cells, and
+   compute log L at the centre of each cell.
+2. The mass of a cell is L over the sum of L. Z is
+   the sum of L times the volume of a cell (midpoint
+   rule). The part outside the box is neglected.
 3. Shrink the box. For each parameter, cut off cells with a mass up to
    `OUTSIDE_MASS` on either side, but keep one more cell on either side.
-4. Repeat, at most `MAX_GRID_ZOOMS` times, until no side of the box shrinks by a
-   tenth.
+4. Repeat, at most `MAX_GRID_ZOOMS` times, until no side of the box
+   shrinks by a tenth.
 """
 
 from collections.abc import Callable
@@ -71,8 +73,9 @@ def grid_of(
 ) -> PosteriorGrid | None:
     """Return the posterior from a log density at points (points, parameters) in a box, or None.
 
-    The result is None if the density is zero at all points. If a cell is narrower
-    than the density, the midpoint rule converges faster than any power of the step.
+    The result is None if the density is zero at all points. If a cell
+    is narrower than the density, the midpoint rule converges faster
+    than any power of the step.
     """
     dimension = box.shape[1]
     along = int(min(MOST_ALONG, max(8, points ** (1.0 / dimension))))

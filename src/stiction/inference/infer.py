@@ -1,23 +1,28 @@
 """Infer parameters of a random interface from the peaks of repeated tests.
 
-Problem. Find the posterior p(theta | y) of parameters theta with a prior from
-measured peaks y.
+Problem. Find the posterior p(theta | y) of parameters theta with a
+prior from measured peaks y.
 
-Source. Bayes' theorem is evaluated on a grid, as in Gelman and others, Bayesian
-Data Analysis (2013), section 10.1. The choice of the box is our own.
+Source. Bayes' theorem is evaluated on a grid, as in
+Gelman and others, Bayesian Data Analysis (2013),
+section 10.1. The choice of the box is our own.
 
 Steps:
 
-1. If only the mean and the scatter between specimens are unknown, use the grid of
-   `stiction.inference.specimens`. Compare the peaks with the prediction from the
-   profiles alone. The other steps are for parameters with a prior.
-2. Refuse peaks that lie beyond the bounds of the onset everywhere in the prior.
-3. If the method is expensive and the local criterion applies, first find the
-   posterior by the local criterion. The box of this posterior, slightly widened, is
-   the relevant part of the prior. Otherwise use the whole prior.
-4. Simulate onsets in this box (`likelihood`), and sum the posterior on a grid (`grid`).
-5. If the posterior reaches an end of the box, widen the box on this side and repeat
-   step 4.
+1. If only the mean and the scatter between specimens are unknown, use
+   the grid of `stiction.inference.specimens`. Compare the peaks with
+   the prediction from the profiles alone. The other steps are for
+   parameters with a prior.
+2. Refuse peaks that lie beyond the bounds
+   of the onset everywhere in the prior.
+3. If the method is expensive and the local criterion applies, first
+   find the posterior by the local criterion. The box of this posterior,
+   slightly widened, is the relevant part of the prior. Otherwise use
+   the whole prior.
+4. Simulate onsets in this box (`likelihood`), and sum the posterior on
+   a grid (`grid`).
+5. If the posterior reaches an end of the box, widen the box on this
+   side and repeat step 4.
 """
 
 import itertools
@@ -124,80 +129,88 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
 
-    There are two uses. With a fit, or with interfaces and no `prior` of other
-    parameters, the mean strength and its scatter between specimens are inferred.
-    With a `prior` of other parameters, these parameters are inferred.
+    There are two uses. With a fit, or with interfaces and no `prior` of
+    other parameters, the mean strength and its scatter between
+    specimens are inferred. With a `prior` of other parameters, these
+    parameters are inferred.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        For mean and scatter: a fit, whose records are combined with the peaks, or
-        equally likely interfaces, of which only the fields within a specimen are
-        used. For other parameters: one interface, in which the parameters in `prior`
-        are replaced.
+        For mean and scatter: a fit, whose records are combined with the
+        peaks, or equally likely interfaces, of which only the fields
+        within a specimen are used. For other parameters: one interface,
+        in which the parameters in `prior` are replaced.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress or force at which each specimen slid, in `unit`. For
         specimens of several lengths, map each length (m) to its peaks, ``{0.1:
         [...], 0.2: [...]}``. The node spacing is the spacing of the problem. The
         result of `read_peaks` is also accepted.
     prior : mapping, optional
-        For mean and scatter: ``"strength.mean"``, by default flat in its logarithm,
-        and ``"between.strength"``, the coefficient of variation between specimens, by
-        default half-Cauchy with scale 0.1. For other parameters, independent priors:
-        a frozen continuous `scipy.stats` distribution, a range ``(low, high)``, or
-        ``{"low": ..., "high": ..., "spacing": "log"}``. The keys are the same as in a
-        sweep, such as ``"correlation_length"`` or ``"marginal.low"`` for the
-        strength, and ``"residual_strength.marginal.high"`` or
+        For mean and scatter: ``"strength.mean"``, by default flat in
+        its logarithm, and ``"between.strength"``, the coefficient of
+        variation between specimens, by default half-Cauchy with scale
+        0.1. For other parameters, independent priors: a frozen
+        continuous `scipy.stats` distribution, a range ``(low, high)``,
+        or ``{"low": ..., "high": ..., "spacing": "log"}``. The keys are
+        the same as in a sweep, such as ``"correlation_length"`` or
+        ``"marginal.low"`` for the strength, and
+        ``"residual_strength.marginal.high"`` or
         ``"problem.friction.weakening_rate"``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`. They have equal
-        prior weights. By default the families of the fit, or else all families.
+        Families of the factor between specimens, as in `fit_field`.
+        They have equal prior weights. By default the families of the
+        fit, or else all families.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. If it is expensive, the local criterion first
-        finds the relevant part of the prior. This part grows until it contains the
-        posterior.
+        Method that computes the onset. If it is expensive, the local
+        criterion first finds the relevant part of the prior. This part
+        grows until it contains the posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`. If `Peaks` are given,
-        the unit is Pa or N, or 1 for friction coefficients.
+        Standard deviation of the error of a peak, in `unit`. If `Peaks`
+        are given, the unit is Pa or N, or 1 for friction coefficients.
     unit : str
-        Unit of peaks and load-cell error. A unit of force needs the ``thickness``
-        of a specimen, the ``width`` of a line, or a plane. The unit "1" stands
-        for friction coefficients, which need ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error. A unit of force needs the
+        ``thickness`` of a specimen, the ``width`` of a line, or a
+        plane. The unit "1" stands for friction coefficients, which need
+        ``Load(normal_pressure=...)``.
     samples : int, optional
-        Number of simulated specimens at each point, by default 2000 with the local
-        criterion and 500 with equilibrium. For mean and scatter, number of simulated
-        specimens for each field, by default 200 with the local criterion and 100 with
-        other methods.
+        Number of simulated specimens at each point, by default 2000
+        with the local criterion and 500 with equilibrium. For mean and
+        scatter, number of simulated specimens for each field, by
+        default 200 with the local criterion and 100 with other methods.
     seed : int
-        Not negative. All points share the samples, so that the likelihood is smooth.
+        Not negative. All points share the samples, so that the
+        likelihood is smooth.
     workers, progress
         As in `monte_carlo`.
 
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats). Use `to_arviz()` to
-        plot and compare posteriors with ArviZ.
+        With `draws`, `mean`, `interval` and `information` (nats). Use
+        `to_arviz()` to plot and compare posteriors with ArviZ.
 
     Raises
     ------
     InputError
-        If any argument is invalid, or if no parameters in the prior can produce the
-        peaks. In the latter case the message names the bound that must move.
+        If any argument is invalid, or if no parameters in the prior can
+        produce the peaks. In the latter case the message names the
+        bound that must move.
 
     Warns
     -----
     AccuracyWarning
-        If the prior determines the scatter between specimens, or the profiles come
-        from one specimen. If the posterior piles up at an end of the prior, the
-        method is inaccurate there, or few samples are simulated for the number of
-        peaks. If profiles and peaks contradict each other: the message then gives the
-        p-value from `stiction.statistics.agreement`.
+        If the prior determines the scatter between specimens, or the
+        profiles come from one specimen. If the posterior piles up at an
+        end of the prior, the method is inaccurate there, or few samples
+        are simulated for the number of peaks. If profiles and peaks
+        contradict each other: the message then gives the p-value from
+        `stiction.statistics.agreement`.
     UserWarning
-        Before a simulation that takes more than a minute. The message gives the time
-        and faster alternatives.
+        Before a simulation that takes more than a minute. The message
+        gives the time and faster alternatives.
 
     Notes
     -----
@@ -248,8 +261,8 @@ def infer(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
             " standard deviation in the unit of the peaks"
         )
-    # Tests of a single length must be tests of the problem. A posterior from several lengths
-    # holds for any problem.
+    # Tests of a single length must be tests of the problem. A posterior
+    # from several lengths holds for any problem.
     (length, *others), size = measured.lengths, problem.interface.measure
     several = bool(others) or problem.interface.is_plane
     if not (several or length is None or math.isclose(length, size)):
@@ -301,7 +314,8 @@ def _of_parameters(
         if np.array_equal(wider, box):
             break
         box = wider
-    # In the whole prior, no further box can contain peaks that are out of reach.
+    # In the whole prior, no further box can
+    # contain peaks that are out of reach.
     if np.all(box == prior.whole) and (refused := likelihood.refusals()):
         raise InputError(refused)
     if grid is None or u is None:
@@ -338,9 +352,9 @@ def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> No
 def _first_box(likelihood: Likelihood) -> Array:
     """Return the slightly widened box of the posterior by the local criterion (step 3).
 
-    The box is the whole prior if the local criterion cannot produce the peaks. Other
-    methods may still produce them, if nodes reach their residual strength before the
-    onset.
+    The box is the whole prior if the local criterion cannot produce the
+    peaks. Other methods may still produce them, if nodes reach their
+    residual strength before the onset.
     """
     grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
     if grid is None:
@@ -363,7 +377,8 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     """Return the limitations of the posterior."""
     prior = likelihood.prior
     notes = _piled_up(prior, u)
-    # The local criterion may be inaccurate where the posterior lies, not in all of the prior.
+    # The local criterion may be inaccurate where the posterior lies,
+    # not in all of the prior.
     middle = prior.theta(u.mean(axis=0, keepdims=True))
     (experiment,) = experiments_at(prior, middle, likelihood.method)
     if text := pilot_doubt(experiment, compare([experiment])):
@@ -416,8 +431,9 @@ def _of_specimens(
         nothing = replace(measured, values=tuple(np.empty(0) for _ in measured.values))
         alone = _result(by_profiles, nothing, **common)
         comparison = agreement(alone, measured, seed=simulation.seed)
-    # Without profiles and with a prior of the mean that is flat in its logarithm, the prior
-    # has no density, and neither the evidence nor the information on the mean is defined.
+    # Without profiles and with a prior of the mean that is flat in its
+    # logarithm, the prior has no density, and neither the evidence nor
+    # the information on the mean is defined.
     proper = known or profiles.prior.mean is not None
     return _result(
         grid, measured, notes=tuple(_specimen_notes(grid, comparison)), agreement=comparison,
@@ -471,7 +487,8 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
             f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Check units,"
             " method and surfaces. Until then use the lower force, from peaks or profiles alone"
         )
-    # The cells of s have equal prior probability. A prior that the user states is meant.
+    # The cells of s have equal prior probability. A prior that the user
+    # states is meant.
     shares = grid.mass.sum(axis=(0, 1, 3))
     usual = profiles.prior.scatter is FactorPrior().scatter
     if usual and math.log(shares.size) - float(entropy(shares)) < LITTLE_INFORMATION:

@@ -1,29 +1,31 @@
 """Likelihood of measured peaks, from simulated onsets on a grid of parameters.
 
-Problem. Parameters theta of a random interface are unknown. Peaks y_j = T + error
-were measured on specimens with onset T. Compute the likelihood L(theta) = prod_j
-p(y_j | theta) for any theta. Each density p needs hundreds of simulated onsets.
+Problem. Parameters theta of a random interface are unknown. Peaks y_j =
+T + error were measured on specimens with onset T. Compute the
+likelihood L(theta) = prod_j p(y_j | theta) for any theta. Each density
+p needs hundreds of simulated onsets.
 
-Sources. Steps 1 to 3 and 5 are our own. Step 4 is a control variate (Hammersley and
-Handscomb, Monte Carlo Methods, 1964, section 5.5), applied to quantiles in place of a
-mean.
+Sources. Steps 1 to 3 and 5 are our own. Step 4 is a control variate
+(Hammersley and Handscomb, Monte Carlo Methods, 1964, section 5.5),
+applied to quantiles in place of a mean.
 
 Steps:
 
 1. Find the parameters that only shift and stretch the onset
    (`stiction.inference.scaling`). They need no simulation.
-2. Place nodes along each of the other parameters, at most four, in the relevant box
-   of the prior.
-3. Simulate onsets at every node of the product grid. Use the same draws, so that L
-   is smooth.
-4. If the method is expensive and the local criterion applies, use the method only
-   at the corners and at a few nodes between them (`COARSE`), and the local
-   criterion at all nodes. Shift the onsets from the local criterion by the
-   difference between both quantile functions. Do so only if the correlation between
-   the onsets from both methods is above `MIN_CORRELATION`.
-5. Tabulate the density at each node (`stiction.inference.density`). Between nodes,
-   the log of the standardised density, the bound, the mean and the spread are
-   linear in each parameter.
+2. Place nodes along each of the other parameters, at most four, in the
+   relevant box of the prior.
+3. Simulate onsets at every node of the product grid. Use the same
+   draws, so that L is smooth.
+4. If the method is expensive and the local criterion applies, use the
+   method only at the corners and at a few nodes between them
+   (`COARSE`), and the local criterion at all nodes. Shift the onsets
+   from the local criterion by the difference between both quantile
+   functions. Do so only if the correlation between the onsets from both
+   methods is above `MIN_CORRELATION`.
+5. Tabulate the density at each node (`stiction.inference.density`).
+   Between nodes, the log of the standardised density, the bound, the
+   mean and the spread are linear in each parameter.
 """
 
 import itertools
@@ -155,8 +157,8 @@ def of_length(problem: Problem, length: float | None) -> Problem:
 class Simulation(NamedTuple):
     """Settings for the simulation of onsets.
 
-    `done` holds onsets from an interrupted call, by experiment and samples. New onsets are
-    added.
+    `done` holds onsets from an interrupted call, by experiment and
+    samples. New onsets are added.
     """
 
     method: Any
@@ -185,7 +187,8 @@ def simulate(
     done = {} if simulation.done is None else simulation.done
     peaks = np.empty((len(experiments), samples))
     seeded = [experiment.with_seed(simulation.seed) for experiment in experiments]
-    # Batches begin at blocks of draws, because a part of a block costs as much as the block.
+    # Batches begin at blocks of draws, because a part of a block costs
+    # as much as the block.
     jobs = [
         (row, experiment, *span)
         for row, experiment in zip(peaks, seeded, strict=True)
@@ -218,7 +221,8 @@ class Area(NamedTuple):
 def area_of(prior: Prior, method: Any, length: float | None) -> Area:
     """Return the area of specimens with a given length, m, or as in the problem if None."""
     middle = prior.middle
-    # One parameter after the other moves to its lower end, to see whether the area follows.
+    # One parameter after the other moves to its lower end, to see
+    # whether the area follows.
     moved = np.where(np.eye(middle.size, dtype=np.bool_), prior.ends[0], middle)
     experiments = experiments_at(prior, np.vstack([middle, moved]), method, length)
     areas: list[Any] = [experiment.problem.area for experiment in experiments]
@@ -296,8 +300,8 @@ class Likelihood:
         shift, stretch = self.scales(kind, theta)
         known = self.densities[kind]
         index, weight = corners(self.axes, theta)
-        # A node in proportion to its weight, and one of its onsets. Bound, mean and spread are
-        # interpolated, as in the likelihood.
+        # A node in proportion to its weight, and one of its onsets.
+        # Bound, mean and spread are interpolated, as in the likelihood.
         corner = (weight.cumsum(axis=1) < rng.random((u.shape[0], 1))).sum(axis=1)
         node = index[np.arange(u.shape[0]), np.minimum(corner, index.shape[1] - 1)]
         sample = rng.integers(known.onsets.shape[1], size=u.shape[0])
@@ -352,10 +356,11 @@ def make_likelihood(
 ) -> Likelihood:
     """Simulate the onsets that the likelihood needs (steps 1 to 5).
 
-    `lengths` holds the specimen length, m, for each kind, or None for the length in
-    the problem. `variable` is the name of the peaks among the results, and `error` is
-    the standard deviation of the load-cell error. `box` is the relevant part of the
-    prior, in u with shape (2, parameters), and by default the whole prior.
+    `lengths` holds the specimen length, m, for each kind, or None for
+    the length in the problem. `variable` is the name of the peaks among
+    the results, and `error` is the standard deviation of the load-cell
+    error. `box` is the relevant part of the prior, in u with shape (2,
+    parameters), and by default the whole prior.
     """
     box = prior.whole if box is None else box
     method, meter = simulation.method, simulation.meter
@@ -412,12 +417,12 @@ def moved(
 ) -> Array:
     """Estimate onsets by an expensive method from many onsets by the local criterion (step 4).
 
-    `many` are onsets by the local criterion, with shape (points, many). At coarse
-    nodes, `few` are onsets by the method and `known` are onsets by the local
-    criterion for the same samples, both with shape (nodes, few). The difference
-    between their quantiles, divided by the standard deviation, changes little between
-    nodes. It is interpolated between the nodes `index` around each point, with
-    weights `weight`.
+    `many` are onsets by the local criterion, with shape (points, many).
+    At coarse nodes, `few` are onsets by the method and `known` are
+    onsets by the local criterion for the same samples, both with shape
+    (nodes, few). The difference between their quantiles, divided by the
+    standard deviation, changes little between nodes. It is interpolated
+    between the nodes `index` around each point, with weights `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
     standardised = (np.sort(known) - mean) / spread
@@ -425,7 +430,8 @@ def moved(
     result = np.empty_like(many)
     for row, values, nodes, share in zip(result, many, index, weight, strict=True):
         same = values[: few.shape[1]]
-        # The samples that both methods solved give the scale, so that their error cancels.
+        # The samples that both methods solved give the scale, so that
+        # their error cancels.
         z = (values - same.mean()) / same.std()
         shift = share @ np.stack(
             [np.interp(z, standardised[node], away[node]) for node in nodes]

@@ -1,30 +1,31 @@
 """Fit marginals by maximum likelihood to values with measurement noise.
 
-Problem. Values y = x + e contain normal noise e with standard deviation s, and x
-has the distribution F from a family. Find the parameters of F that maximise the
-likelihood of y.
+Problem. Values y = x + e contain normal noise e with standard deviation
+s, and x has the distribution F from a family. Find the parameters of F
+that maximise the likelihood of y.
 
-Sources. The search uses Fisher's scoring with damping (Levenberg, 1944, Quarterly
-of Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal 11, 431). Values are
-treated as independent, and the estimate remains consistent (a composite likelihood:
-Varin, Reid and Firth, 2011, Statistica Sinica 21, 5). The bootstrap gives the error
-of the estimate.
+Sources. The search uses Fisher's scoring with damping (Levenberg, 1944,
+Quarterly of Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal
+11, 431). Values are treated as independent, and the estimate remains
+consistent (a composite likelihood: Varin, Reid and Firth, 2011,
+Statistica Sinica 21, 5). The bootstrap gives the error of the estimate.
 
 Steps:
 
-1. If the noise is negligible, the likelihood is the density at the values. Otherwise
-   count the values in `BINS` bins. The probability of a bin follows from F convolved
-   with the noise, so that values may lie beyond a bound of F.
-2. Search over the logarithms of scale and shape. For 'beta', search over both
-   shapes and over the distances of free bounds from the mean. The shape at a free
-   bound is at least 1. Otherwise the likelihood would grow without limit as the
-   bound approaches a value.
-3. Take steps (M + damping diag(M))^-1 g, with the score g and the information M.
-   Divide the damping by 10 after a step that raises the likelihood, and multiply it
-   by 10 otherwise. Hold parameters that are at their limits. Stop after a small
-   gain.
-4. scipy fits families of `scipy.stats`. The values are first shrunk to the variance
-   that they would have without noise.
+1. If the noise is negligible, the likelihood is the density at the
+   values. Otherwise count the values in `BINS` bins. The probability of
+   a bin follows from F convolved with the noise, so that values may lie
+   beyond a bound of F.
+2. Search over the logarithms of scale and shape. For 'beta', search
+   over both shapes and over the distances of free bounds from the mean.
+   The shape at a free bound is at least 1. Otherwise the likelihood
+   would grow without limit as the bound approaches a value.
+3. Take steps (M + damping diag(M))^-1 g, with the score g and the
+   information M. Divide the damping by 10 after a step that raises the
+   likelihood, and multiply it by 10 otherwise. Hold parameters that are
+   at their limits. Stop after a small gain.
+4. scipy fits families of `scipy.stats`. The values are first shrunk to
+   the variance that they would have without noise.
 """
 
 import math
@@ -142,8 +143,9 @@ class Family:
             return float(counts @ logs), logs
 
         def derivatives(v: Array, logs: Array) -> tuple[Array, Array]:
-            # One-sided differences, away from the upper limits. The sum of the outer products
-            # of the scores of all values is Fisher's information on average.
+            # One-sided differences, away from the upper limits. The sum
+            # of the outer products of the scores of all values is
+            # Fisher's information on average.
             sides = np.where(v + MARGINAL_STEP <= limits[:, 1], MARGINAL_STEP, -MARGINAL_STEP)
             slopes = np.stack([(terms(v + s) - logs) / s.sum() for s in np.diag(sides)])
             return slopes @ counts, (slopes * counts) @ slopes.T
@@ -186,8 +188,8 @@ class Family:
     def widened(self, marginal: Any, factor: float) -> Any:
         """Return the marginal with the same mean and `factor` times the standard deviation.
 
-        Fixed parameters do not change. A distribution of scipy with a fixed loc or
-        scale is returned unchanged.
+        Fixed parameters do not change. A distribution of scipy with a
+        fixed loc or scale is returned unchanged.
         """
         free, mean = self.parameters(marginal), float(marginal.distribution.mean())
         moved: dict[str, Any] = {
@@ -300,8 +302,8 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
     if start is None:
         ends = ends_at(1.1 * room[name] for name in sides)
         start = beta_of(float(quiet.mean()), float(quiet.std()), **ends)
-    # A free bound needs a shape of at least 1, because the likelihood would grow without
-    # limit as the bound approaches a value.
+    # A free bound needs a shape of at least 1, because the likelihood
+    # would grow without limit as the bound approaches a value.
     limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
     first = [start.alpha, start.beta]
     for name, side in sides.items():
@@ -318,8 +320,8 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
 def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], Array]]:
     """Return counts in bins, points, and a function that maps F at the points to probabilities.
 
-    The convolution with the noise is a sum in steps of half a standard deviation or less
-    (step 1).
+    The convolution with the noise is a sum in steps of half a standard
+    deviation or less (step 1).
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
@@ -342,8 +344,9 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     """Return the mean log density of values with noise.
 
-    With noise, the density is the probability of a bin over its width. The result
-    stays finite if a value is almost impossible in the family.
+    With noise, the density is the probability of
+    a bin over its width. The result stays finite
+    if a value is almost impossible in the family.
     """
     if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -371,8 +374,9 @@ def climb(
 ) -> tuple[Array, Any]:
     """Return the parameters with the greatest likelihood, and the state there (step 3).
 
-    Steps are at most `longest`. `value_of` returns the log likelihood, and a state from which
-    `derivatives` returns score and information. A gain below `settled` ends the search.
+    Steps are at most `longest`. `value_of` returns the log likelihood,
+    and a state from which `derivatives` returns score and information.
+    A gain below `settled` ends the search.
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)
@@ -384,7 +388,8 @@ def climb(
         free = np.flatnonzero(~held)
         information, score = information[np.ix_(free, free)], score[free]
         diagonal = np.diag(np.diag(information) + 1e-9 * np.trace(information) + 1e-300)
-        # More damping makes steps shorter and turns them towards the gradient.
+        # More damping makes steps shorter and
+        # turns them towards the gradient.
         while damping < HIGHEST:
             step = np.zeros(at.size)
             step[free] = np.linalg.solve(information + damping * diagonal, score)

@@ -1,9 +1,10 @@
 """Measured peaks, validated and in SI units, with one array for each kind of specimen.
 
-`make_peaks` is the door for all kinds of input: numbers with or without a unit, mappings
-from specimen lengths to numbers, tables of pandas, and curves. `read_peaks` reads a file.
-A wrong unit would change a result by a factor of a thousand, so a unit that contradicts
-another unit is refused, and so are peaks that are far from the predictions.
+`make_peaks` is the door for all kinds of input: numbers with or without
+a unit, mappings from specimen lengths to numbers, tables of pandas, and
+curves. `read_peaks` reads a file. A wrong unit would change a result by
+a factor of a thousand, so a unit that contradicts another unit is
+refused, and so are peaks that are far from the predictions.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ class Peaks(Result):
     Attributes
     ----------
     lengths : tuple of float or None
-        Specimen length for each kind, m. None means the length of the problem.
+        Specimen length for each kind, m.
+        None means the length of the problem.
     values : tuple of arrays
         Peaks of each kind, in `unit`.
     unit : str
@@ -165,19 +167,20 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    First plot the peaks in the order of the tests. Peaks that drift are not a sample
-    from one distribution.
+    First plot the peaks in the order of the tests. Peaks that drift are
+    not a sample from one distribution.
 
     Parameters
     ----------
     source : path or Curves
-        Curves from `stiction.read_curve`, or a table with a heading and one test
-        in each line, separated by commas, semicolons, tabs or blanks. The peaks are
-        the column called peak, stress, strength, force or friction, with its unit:
-        ``peak [MPa]``. Forces have the unit N or kN. Friction coefficients have the
-        unit 1 or -. If no column has such a name, the peaks are the only column with
-        a suitable unit. A column ``length [mm]`` may hold the length of the specimen.
-        Other columns are not read.
+        Curves from `stiction.read_curve`, or a table with a heading and
+        one test in each line, separated by commas, semicolons, tabs or
+        blanks. The peaks are the column called peak, stress, strength,
+        force or friction, with its unit: ``peak [MPa]``. Forces have
+        the unit N or kN. Friction coefficients have the unit 1 or -. If
+        no column has such a name, the peaks are the only column with a
+        suitable unit. A column ``length [mm]`` may hold the length of
+        the specimen. Other columns are not read.
     unit : str, optional
         Unit of the peaks if the file does not state it.
     missing, decimal, skip, sheet
@@ -191,8 +194,8 @@ def read_peaks(
     Raises
     ------
     InputError
-        If a unit is missing or unknown, columns are ambiguous, a number is
-        missing, or the file is the curve of one test.
+        If a unit is missing or unknown, columns are ambiguous, a number
+        is missing, or the file is the curve of one test.
 
     Examples
     --------
@@ -234,7 +237,8 @@ def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
     if any(texts := [column.attrs["text"] for column in columns]):
         raise InputError(filter(None, texts))
     values, si = column_in_si(without_missing(peak, options), "peak", unit, VARIABLES, "unit")
-    # A stated word or number marks a test without a peak. Any other NaN is a mistake.
+    # A stated word or number marks a test without a peak. Any other NaN
+    # is a mistake.
     kept = ~np.isnan(values) if options.missing is not None else np.ones(values.size, np.bool_)
     if length is None:
         return make_peaks(values[kept], si)

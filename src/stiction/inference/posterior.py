@@ -1,7 +1,7 @@
 """Posteriors: draws, intervals, information gain and accuracy.
 
-`Posterior` holds parameters with a prior. `SpecimenPosterior` holds the mean, the scatter
-between specimens, and the field within a specimen.
+`Posterior` holds parameters with a prior. `SpecimenPosterior` holds the
+mean, the scatter between specimens, and the field within a specimen.
 """
 
 from collections.abc import Mapping
@@ -41,14 +41,16 @@ class Posterior(Result):
     draws : dict of (draws,) arrays
         Draws of each parameter, in the unit of the parameter.
     information : dict of float
-        Kullback-Leibler divergence between the marginal posterior of a parameter and
-        its prior, nats. Halving a uniform range gives ln 2 = 0.69.
+        Kullback-Leibler divergence between the marginal
+        posterior of a parameter and its prior, nats.
+        Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
-        Logarithm of the density of the peaks under the prior, for the comparison of
-        models.
+        Logarithm of the density of the peaks under the prior, for the
+        comparison of models.
     monte_carlo_error : float
-        Standard error of a posterior mean due to the finite number of simulated
-        samples, over the posterior standard deviation. It is about the square root of
+        Standard error of a posterior mean due to the finite
+        number of simulated samples, over the posterior
+        standard deviation. It is about the square root of
         the ratio of measured to simulated peaks.
     method : str
         Method that computed the onset.
@@ -127,7 +129,8 @@ class Posterior(Result):
         Raises
         ------
         InputError
-            If a parameter belongs to the problem, not to the random interface.
+            If a parameter belongs to the
+            problem, not to the random interface.
 
         Examples
         --------
@@ -201,9 +204,9 @@ class Posterior(Result):
     def to_arviz(self) -> Any:
         """Return the posterior, prior, log-likelihood, prediction and data for ArviZ.
 
-        The result is an `arviz.InferenceData`, or a `DataTree` from ArviZ 1 on.
-        The draws are independent. They are divided into four chains because ArviZ
-        compares chains.
+        The result is an `arviz.InferenceData`, or a `DataTree` from
+        ArviZ 1 on. The draws are independent. They are divided into
+        four chains because ArviZ compares chains.
 
         Raises
         ------
@@ -269,8 +272,8 @@ class SpecimenPosterior(Posterior):
     families : dict of str to float
         Posterior probability of each family for the factor between specimens.
     agreement : Agreement or None
-        Agreement of the peaks with the prediction from the profiles alone. None
-        without profiles.
+        Agreement of the peaks with the prediction from the profiles
+        alone. None without profiles.
     """
 
     grid: FactorGrid = field(repr=False, compare=False)
@@ -304,7 +307,8 @@ class SpecimenPosterior(Posterior):
         Parameters
         ----------
         count : int
-            Number of interfaces. A longer list does not begin with a shorter list.
+            Number of interfaces. A longer list does not begin with a
+            shorter list.
         seed : int
             Not negative.
         """

@@ -24,10 +24,11 @@ TAIL_PROBABILITY = 1e-4
 class Prior:
     """Independent priors for some parameters of a problem and its random interface.
 
-    `distributions` maps the user's keys to frozen distributions of `scipy.stats`. A
-    point is given by `u`, which holds a number in [0, 1] for each parameter. The
-    prior is uniform in `u`. Arrays have shape (points, parameters). The parameters
-    replace values in `problem` and `random`.
+    `distributions` maps the user's keys to frozen distributions of
+    `scipy.stats`. A point is given by `u`, which holds a number in [0,
+    1] for each parameter. The prior is uniform in `u`. Arrays have
+    shape (points, parameters). The parameters replace values in
+    `problem` and `random`.
     """
 
     problem: Problem

@@ -1,20 +1,23 @@
 """Records: measured values with gaps, at equal distances on a line or a plane.
 
-Problem. Profiles come as arrays, labelled data or lists of points. Some have gaps,
-rounded coordinates, outliers or dropouts. Return values on a regular grid, and refuse
+Problem. Profiles come as arrays, labelled data or lists
+of points. Some have gaps, rounded coordinates, outliers
+or dropouts. Return values on a regular grid, and refuse
 records from which no spectrum can be estimated.
 
-Source. The test for white noise follows Box and Pierce (1970), Journal of the American
-Statistical Association 65, 1509, with a sum in place of a sum of squares.
+Source. The test for white noise follows Box and Pierce (1970), Journal
+of the American Statistical Association 65, 1509, with a sum in place of
+a sum of squares.
 
 Steps:
 
-1. Find the spacing of the points: a common divisor of the distances between neighbours,
-   which the printed digits may have rounded.
-2. Place the values on a regular grid. Missing points, and values that were filled, are
-   NaN.
-3. Refuse short, constant and infinite records. Warn about outliers, which are far from
-   the median, and about dropouts, which are far from both neighbours.
+1. Find the spacing of the points: a common divisor of the distances
+   between neighbours, which the printed digits may have rounded.
+2. Place the values on a regular grid. Missing points, and values that
+   were filled, are NaN.
+3. Refuse short, constant and infinite records. Warn about outliers,
+   which are far from the median, and about dropouts, which are far from
+   both neighbours.
 4. Refuse records of white noise (`refuse_uncorrelated`).
 """
 
@@ -92,7 +95,8 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         values = np.where(measured, values, np.nan)  # filled values were not measured
     if not places:
         return _of_array(values, interface)
-    # 1. and 2. Points in any order, and missing points, find their places on a grid.
+    # 1. and 2. Points in any order, and missing points, find their
+    # places on a grid.
     index, spacings = [], []
     for dim, at in places.items():
         spacing = _spacing(np.sort(at) if len(places) == 1 else np.unique(at), dim)
@@ -131,8 +135,8 @@ def _spacing(x: Array, name: str) -> float:
     spacing = float(np.median(steps))
     if not steps.min() > 1e-6 * spacing:
         raise InputError(f"{name} repeats: there are two values at {x[steps.argmin()]:.9g} m")
-    # Each step is a whole number of spacings, although few printed digits make it
-    # uneven.
+    # Each step is a whole number of spacings, although few printed
+    # digits make it uneven.
     spacing = float((x[-1] - x[0]) / np.maximum(np.round(steps / spacing), 1.0).sum())
     place = (x - x[0]) / spacing
     off = np.abs(place - np.round(place))
@@ -159,7 +163,8 @@ def _checked(record: Record, quantity: str) -> Record:
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
     check_positive(record.values, quantity)
-    # The median absolute deviation of a normal sample is its deviation over 1.4826.
+    # The median absolute deviation of a normal sample is its deviation
+    # over 1.4826.
     aside = np.abs(values - np.median(values))
     far = aside > OUTLYING * 1.4826 * np.median(aside)
     if np.median(aside) > 0.0 and far.any():
@@ -175,9 +180,10 @@ def _checked(record: Record, quantity: str) -> Record:
 def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
     """Refuse records of white noise: their correlation length is shorter than the spacing.
 
-    Take the sum of products v_i v_(i+j) over all lags j up to k, divided by the
-    variance. For white noise it has mean 0, and a variance equal to the number of
-    products. The test takes k = 1, 2, 4, ..., and pools records and directions (step 4).
+    Take the sum of products v_i v_(i+j) over all lags j up to k,
+    divided by the variance. For white noise it has mean 0, and a
+    variance equal to the number of products. The test takes k = 1, 2,
+    4, ..., and pools records and directions (step 4).
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     # A short correlation length shows at few lags, and a long length at many.
@@ -200,7 +206,8 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
 def _doubt_jumps(record: Record) -> None:
     """Warn about values that differ from both neighbours much more than usual (step 3).
 
-    A dropout in a smooth record is far from its neighbours, but may be near the median.
+    A dropout in a smooth record is far from its neighbours, but may be
+    near the median.
     """
     middle = record.values[1:-1]
     jumps = middle - 0.5 * (record.values[:-2] + record.values[2:])

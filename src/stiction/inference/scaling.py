@@ -1,34 +1,38 @@
 """Find parameters that shift and stretch the strength, and therefore the onset.
 
-Problem. The strength is tau_p = a + b s, with b > 0 and a profile s whose
-distribution does not depend on a and b. When is onset(a + b s) = a + b onset(s),
-sample by sample?
+Problem. The strength is tau_p = a + b s, with b > 0 and a profile s
+whose distribution does not depend on a and b. When is onset(a + b s) =
+a + b onset(s), sample by sample?
 
-Source. The derivation uses the duality of linear programmes (Farkas, 1902). The
-application is our own.
+Source. The derivation uses the duality of linear programmes (Farkas,
+1902). The application is our own.
 
 Derivation:
 
-1. Let the load profile and the initial stress be uniform, and the weakening rate W be
-   given. The onset is the smallest load at which A d + tau_p - tau_0 >= 0, d >= 0
-   has no solution, with A = K - W. By duality it is
+1. Let the load profile and the initial stress be uniform, and the
+   weakening rate W be given. The onset is the smallest load at which A
+   d + tau_p - tau_0 >= 0, d >= 0 has no solution, with A = K - W. By
+   duality it is
 
        min {<tau_p, y> : y >= 0, <1, y> = 1, A y <= 0} = a + b min {<s, y> : ...},
 
-   because A and the set of y do not depend on the strength. The equation holds as
-   long as no node has reached its residual strength.
-2. The local criterion is the same minimum with y restricted to one weight. It ignores the
+   because A and the set of y do not depend on the strength. The
+   equation holds as long as no node has reached its residual strength.
+2. The local criterion is the same minimum with y
+   restricted to one weight. It ignores the
    residual strength, so the equation always holds.
 3. In equilibrium, with slip in units of b, the strength is a + b max(s - W d, (tau_r -
    a)/b). The problem is the same only if (tau_r - a)/b is the same: if a = 0, and
    tau_r is zero or proportional to tau_p.
-4. A rupture also depends on the loading rate, which would have to scale with b.
-5. If W follows from a critical slip or a fracture energy, W and the nucleation length
-   change with b. The equation does not hold.
-6. A friction coefficient mu = a + b s is a strength sigma_n (a + b s). The shift
-   sigma_n a is uniform only if the normal pressure is uniform. Otherwise a must be
-   zero. The parameter a must also be zero if the load profile p varies and there is
-   no initial stress, as on specimens: <b s, y>/<p, y> only stretches.
+4. A rupture also depends on the loading
+   rate, which would have to scale with b.
+5. If W follows from a critical slip or a fracture energy, W and the
+   nucleation length change with b. The equation does not hold.
+6. A friction coefficient mu = a + b s is a strength sigma_n (a + b s).
+   The shift sigma_n a is uniform only if the normal pressure is
+   uniform. Otherwise a must be zero. The parameter a must also be zero
+   if the load profile p varies and there is no initial stress, as on
+   specimens: <b s, y>/<p, y> only stretches.
 """
 
 from typing import Any, NamedTuple

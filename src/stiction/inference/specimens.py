@@ -1,35 +1,38 @@
 """Posterior of the mean and the scatter between specimens, from profiles and peaks, on a grid.
 
-Problem. Specimen k has strength m b_k f(x). Here m is the mean, b_k a factor with
-mean 1 and coefficient of variation s, and f a field with mean 1 within the
-specimen. The data are the levels (mean strengths) of some specimens and the peaks of
-others. A specimen of mean strength c has its onset at T(c). Each measured specimen
-has its own factor. Find the posterior of m, s and the family of b, averaged over
-equally likely fields within a specimen.
+Problem. Specimen k has strength m b_k f(x). Here m is the mean, b_k a
+factor with mean 1 and coefficient of variation s, and f a field with
+mean 1 within the specimen. The data are the levels (mean strengths) of
+some specimens and the peaks of others. A specimen of mean strength c
+has its onset at T(c). Each measured specimen has its own factor. Find
+the posterior of m, s and the family of b, averaged over equally likely
+fields within a specimen.
 
-Sources. Gelman and others, Bayesian Data Analysis (2013), chapter 5, describe the
-integration of hierarchical models. Gelman (2006), Bayesian Analysis 1, 515,
-proposes the half-Cauchy prior for a scatter.
+Sources. Gelman and others, Bayesian Data Analysis (2013), chapter 5,
+describe the integration of hierarchical models. Gelman (2006), Bayesian
+Analysis 1, 515, proposes the half-Cauchy prior for a scatter.
 
 In the steps, x = log(m b/reference) is the log strength of one specimen:
 
-1. Simulate onsets T of each field at the reference mean. This is sufficient if T(c)/c
-   does not depend on c. Otherwise simulate at `ONSET_MEANS` means and interpolate
-   T(c)/c, sample by sample.
-2. Tabulate the likelihood of each measured number as a function of x: the normal density
-   of the logarithm of a level, or the density of simulated onsets at a peak
-   (`stiction.inference.density`).
-3. Choose `SCATTER_CELLS` values of s at equal steps of its prior probability, and
-   `MEAN_CELLS` values of log m. The likelihood of a number at (family, s, m) is the
-   integral of step 2 over the density of x, which is the density of log b shifted
-   by log m: a convolution.
-4. Multiply the likelihoods of all numbers, and narrow the grid to the means with
-   posterior mass.
-5. Given the profiles, the fields are equally likely. The peaks multiply their
-   probabilities by the mean of the likelihood over (family, s, m).
+1. Simulate onsets T of each field at the reference mean. This is
+   sufficient if T(c)/c does not depend on c. Otherwise simulate at
+   `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
+2. Tabulate the likelihood of each measured number as a function of x:
+   the normal density of the logarithm of a level, or the density of
+   simulated onsets at a peak (`stiction.inference.density`).
+3. Choose `SCATTER_CELLS` values of s at equal steps of its prior
+   probability, and `MEAN_CELLS` values of log m. The likelihood of a
+   number at (family, s, m) is the integral of step 2 over the density
+   of x, which is the density of log b shifted by log m: a convolution.
+4. Multiply the likelihoods of all numbers, and narrow the grid to the
+   means with posterior mass.
+5. Given the profiles, the fields are equally
+   likely. The peaks multiply their probabilities by
+   the mean of the likelihood over (family, s, m).
 
-Departure. The levels affect only the likelihood of (m, s). The fields within a
-specimen come from `fit_field` for the same profiles without their levels.
+Departure. The levels affect only the likelihood of (m, s). The fields
+within a specimen come from `fit_field` for the same profiles without
+their levels.
 """
 
 import math
@@ -196,7 +199,8 @@ class Onsets:
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
         """Return the range of x to tabulate for these peaks, and the smallest deviation of x."""
-        # x = log y - log(T(c) over c/reference), by which fields and samples scatter.
+        # x = log y - log(T(c) over c/reference), by which fields and
+        # samples scatter.
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -286,7 +290,8 @@ def grid_of_profiles(
     profiles: Profiles, tables: "Tables | None" = None
 ) -> tuple[FactorGrid, FactorGrid]:
     """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
-    # The logarithm of a level lies below log(m b) by half its variance on average.
+    # The logarithm of a level lies below log(m
+    # b) by half its variance on average.
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -320,8 +325,8 @@ def grid_of_profiles(
                 " Check their units, and leave out tests of another kind of specimen"
             )
         mass = np.exp(after - evidence)
-        # Both posteriors must fit on the grid. Without a prior of the mean and without
-        # profiles, the first posterior has no end.
+        # Both posteriors must fit on the grid. Without a prior of the
+        # mean and without profiles, the first posterior has no end.
         along = [mass.sum(axis=(0, 1, 2))]
         if levels.size or profiles.prior.mean is not None:
             along.append(np.exp(before).sum(axis=(0, 1, 2)))
@@ -340,13 +345,14 @@ def grid_of_profiles(
 def _products(kernel: Array, tables: Array) -> Array:
     """Return log likelihoods (fields, families, cells, means), summed over measured numbers.
 
-    `tables` holds the log likelihoods (fields, numbers, points) of the numbers at x
-    (steps 3 and 4).
+    `tables` holds the log likelihoods (fields, numbers, points) of the
+    numbers at x (steps 3 and 4).
     """
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
     for table in np.moveaxis(tables, 1, 0):
-        # The likelihood of a number may be far below the smallest number of the computer.
+        # The likelihood of a number may be far below the smallest
+        # number of the computer.
         top = table.max(axis=1, keepdims=True)
         total += np.log(np.maximum(np.exp(table - top) @ flat, 1e-300)) + top
     return total.reshape(-1, *kernel.shape[:-1])
@@ -382,7 +388,8 @@ class Tables:
 
     def parts(self, u: Array) -> Array:
         """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
-        # The density of a peak at a draw is the integral over x, as in step 3.
+        # The density of a peak at a draw is
+        # the integral over x, as in step 3.
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
         for family, cv, places in _factor_groups(self.profiles, u):
@@ -398,7 +405,8 @@ class Tables:
         """Draw a peak for a kind of specimen for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
-        # A further specimen has its own factor and one of the simulated onsets.
+        # A further specimen has its own factor
+        # and one of the simulated onsets.
         x = u[:, 3].copy()
         for family, cv, places in _factor_groups(self.profiles, u):
             x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
@@ -410,18 +418,20 @@ class Tables:
     def quantile(self, grid: FactorGrid, probability: float) -> float:
         """Return the peak of a further specimen, of the first kind, at a probability.
 
-        The predictive distribution is the mean over field, onset and grid. No draws
-        are needed.
+        The predictive distribution is the mean over field, onset and
+        grid. No draws are needed.
         """
         profiles, known = self.profiles, self.onsets[0]
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
-        # Probability that x of a further specimen lies below each point, for each field.
+        # Probability that x of a further specimen lies below each
+        # point, for each field.
         below = np.zeros((len(profiles.fields), x.size))
         for family, name in enumerate(profiles.families):
             for cell, cv in enumerate(profiles.prior.cells()):
                 below += grid.mass[:, family, cell] @ masses(name, cv, grid.means, x)
         below = np.cumsum(below, axis=1)
-        # T(c) rises with c. Find the c at which it is t, for each field and sample.
+        # T(c) rises with c. Find the c at which
+        # it is t, for each field and sample.
         logs = np.log(known.area * known.ratios) + known.at[:, None]
 
         def excess(log_peak: float) -> float:
@@ -492,7 +502,8 @@ def _onsets(
 
     at, fields = np.zeros(1), range(len(profiles.fields))
     if not scales_with_strength(problem, profiles.fields[0], method):
-        # The onsets at the reference show over which strengths the peaks range.
+        # The onsets at the reference show over which strengths the
+        # peaks range.
         ratios, known = onsets(0, at)
         peaks = peaks if peaks.size else area * ratios.ravel()
         low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
@@ -501,7 +512,8 @@ def _onsets(
     warn_if_long(Experiment(problem, profiles.fields[0], method), total, workers)
     meter.stage("simulated onsets", total)
     by_field = in_threads(lambda place: onsets(place, at), fields, workers or usable_cores())
-    # Standardised densities differ little between fields. Their mean has a smaller error.
+    # Standardised densities differ little between fields. Their mean
+    # has a smaller error.
     table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
     densities = tuple(known._replace(table=table) for _, known in by_field)
     return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)

@@ -1,8 +1,8 @@
 """Whittle likelihood of records with noise, whose field is mapped from a Gaussian field.
 
-Problem. A record y = v(z) + e has periodogram I_k. Its expectation E_k follows from
-the spectrum of z, the map v and the variance of the noise. Find the parameters with
-the greatest likelihood
+Problem. A record y = v(z) + e has periodogram I_k. Its expectation E_k
+follows from the spectrum of z, the map v and the variance of the noise.
+Find the parameters with the greatest likelihood
 
     L = -sum_k w_k (log E_k + I_k/E_k).
 
@@ -17,19 +17,20 @@ Statistical Society B 84,
 Steps:
 
 1. Average the periodograms of all records with the same geometry (`window`).
-2. The correlation of the values is a power series in the correlation of z, whose
-   coefficients are the squared Hermite coefficients of the map. White noise adds
-   its variance at zero lag.
-3. E_k follows exactly from this correlation and the window. The variance is a free
-   parameter, so that its error in a short record does not disturb the shape of the
-   spectrum.
-4. Add a floor of a thousandth of the highest power to I_k and E_k. A truncated
-   spectrum has almost no power at high wavenumbers, and without a floor, rounding
-   and higher orders of the map would matter there. The score stays unbiased, and
-   power below the floor has no effect.
-5. Start at the best point of a coarse grid of parameters, and climb by scoring
-   (`marginal_fit.climb`). Fisher's information is sum w d d^T with d = d log E/d
-   theta.
+2. The correlation of the values is a power series in the correlation of
+   z, whose coefficients are the squared Hermite coefficients of the
+   map. White noise adds its variance at zero lag.
+3. E_k follows exactly from this correlation and the window. The
+   variance is a free parameter, so that its error in a short record
+   does not disturb the shape of the spectrum.
+4. Add a floor of a thousandth of the highest power to I_k
+   and E_k. A truncated spectrum has almost no power at
+   high wavenumbers, and without a floor, rounding and
+   higher orders of the map would matter there. The score
+   stays unbiased, and power below the floor has no effect.
+5. Start at the best point of a coarse grid of parameters, and climb by
+   scoring (`marginal_fit.climb`). Fisher's information is sum w d d^T
+   with d = d log E/d theta.
 
 Departures. The map v, the noise and the floor are our own.
 """
@@ -55,9 +56,9 @@ RANGES = {
     "variance": (1e-200, 1e200),
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
     "anisotropy": (0.05, 20.0),
-    # A negative share means less power at high wavenumbers than the field alone
-    # has, by chance. If it were cut at zero, the errors of small noises could not
-    # be estimated.
+    # A negative share means less power at high wavenumbers than the
+    # field alone has, by chance. If it were cut at zero, the errors of
+    # small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
 """Ends of the searched range of each parameter. The noise is given by its share of the variance."""
@@ -116,9 +117,10 @@ def periodograms_of(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> l
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
 
-    `end_seen` states whether the truncation of the spectrum was given. If not, the
-    truncation is left out: it lies at a multiple of 1/xi_0, and would determine the
-    correlation length if it fell among the wavenumbers of a record.
+    `end_seen` states whether the truncation of the spectrum was given.
+    If not, the truncation is left out: it lies at a multiple of 1/xi_0,
+    and would determine the correlation length if it fell among the
+    wavenumbers of a record.
     """
 
     spectrum: Any
@@ -197,7 +199,8 @@ class SpectrumFamily:
             n: float(v) if n == "noise_share" else offset(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
         }
-        # A known noise has a share that depends on the variance of the values.
+        # A known noise has a share that depends
+        # on the variance of the values.
         variance = values.pop("variance")
         anisotropy = values.pop("anisotropy", self.anisotropy or 1.0)
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
@@ -295,7 +298,8 @@ class Whittle(NamedTuple):
         moved = {}
         for i, name in enumerate(family.free):
             if name not in ("variance", "noise_share"):
-                # Only these parameters need a new signal, so their slopes are differences.
+                # Only these parameters need a new signal, so their
+                # slopes are differences.
                 aside = at.copy()
                 aside[i] += LOG_STEP if at[i] + LOG_STEP <= limits[i, 1] else -LOG_STEP
                 moved[name] = family.model(aside, self.shares), aside[i] - at[i]
@@ -322,11 +326,12 @@ class Whittle(NamedTuple):
     ) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The error assumes independent ordinates. It is too small, but proportional to
-        the true error.
+        The error assumes independent ordinates. It is too small, but
+        proportional to the true error.
         """
         model, (_, information) = state[0], self.score(at, state)
-        # The noise variance is the product of two parameters, whose errors are correlated.
+        # The noise variance is the product of two parameters, whose
+        # errors are correlated.
         slope = np.zeros(at.size)
         slope[self.family.free.index("variance")] = model.noise_share * model.variance
         slope[self.family.free.index("noise_share")] = model.variance

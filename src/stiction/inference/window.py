@@ -1,32 +1,34 @@
 """Exact effect of a finite window on a spectrum: taper, gaps and removal of a trend.
 
-Problem. A record is not a period of the interface. Find the expectation of the
-periodogram after a taper h (zero at gaps) and removal of a trend by the projection
-P. The expectation is linear in the correlation C:
+Problem. A record is not a period of the interface. Find the expectation
+of the periodogram after a taper h (zero at gaps) and removal of a trend
+by the projection P. The expectation is linear in the correlation C:
 
     E |sum_m u_k(m) y(m)|^2 = sum_l C(l) a_k(l),    u_k = P (h exp(-i k x)),
 
-with the autocorrelation a_k of u_k. The equation contains leakage, gaps, aliasing
-and the loss of low wavenumbers to the trend.
+with the autocorrelation a_k of u_k. The equation contains leakage,
+gaps, aliasing and the loss of low wavenumbers to the trend.
 
-Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251,
-treat a line without a trend. Guillaumin, Sykulski, Olhede and Simons (2022),
-Journal of the Royal Statistical Society B 84, 1526, treat planes with gaps.
+Sources. Sykulski, Olhede, Guillaumin, Lilly and Early (2019),
+Biometrika 106, 251, treat a line without a trend. Guillaumin, Sykulski,
+Olhede and Simons (2022), Journal of the Royal Statistical Society B 84,
+1526, treat planes with gaps.
 
 Steps:
 
-1. Fit orthonormal polynomials to the measured points: P is the identity minus the
-   projection on these polynomials.
-2. For most wavenumbers the trend has no effect because of the taper, and a_k is the
-   autocorrelation of h. One transform gives the expectation at all these
-   wavenumbers.
+1. Fit orthonormal polynomials to the measured points: P is the identity
+   minus the projection on these polynomials.
+2. For most wavenumbers the trend has no effect because of the taper,
+   and a_k is the autocorrelation of h. One transform gives the
+   expectation at all these wavenumbers.
 3. For the lowest wavenumbers (`EXACT`), compute a_k with the trend.
-4. The correlation comes from a transform of the spectrum on a period of `ROOM`
-   records. Add the density at all wavenumbers that alias to the same wavenumber.
-   The nearest aliases are exact. Farther aliases are evaluated at few wavenumbers,
-   because their sum is smooth.
+4. The correlation comes from a transform of the spectrum on a period of
+   `ROOM` records. Add the density at all wavenumbers that alias to the
+   same wavenumber. The nearest aliases are exact. Farther aliases are
+   evaluated at few wavenumbers, because their sum is smooth.
 
-Departures. The trend in step 3 is our own, as is the treatment of aliases in step 4.
+Departures. The trend in step 3 is our own, as is the treatment of
+aliases in step 4.
 """
 
 import itertools
@@ -70,8 +72,8 @@ class Edge(NamedTuple):
 class RecordWindow:
     """Geometry of records: points `spacings` (m) apart, taper, gaps and degree of the trend.
 
-    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. A real transform has
-    shape (*half).
+    Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. A real
+    transform has shape (*half).
     """
 
     def __init__(
@@ -108,8 +110,8 @@ class RecordWindow:
         unit = np.zeros(lags)
         unit[(0,) * unit.ndim] = 1.0
         self.white = self.expectation(unit)  # of white noise
-        # One half if both k and -k are there or k is its own opposite, and 0 for
-        # the mean.
+        # One half if both k and -k are there or k is its own opposite,
+        # and 0 for the mean.
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
         self.weights[(0,) * unit.ndim] = 0.0
@@ -159,9 +161,10 @@ class RecordWindow:
     def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
         """Return the variance of z in each mode on a periodic grid. The sum is 1 (step 4).
 
-        Power above `FOLDS` sampling wavenumbers is spread evenly. The spectrum fades
-        out at its truncation. If `end_seen` is false, the spectrum is not truncated,
-        because the missing power of a rough spectrum would be mistaken for noise.
+        Power above `FOLDS` sampling wavenumbers is spread evenly. The
+        spectrum fades out at its truncation. If `end_seen` is false,
+        the spectrum is not truncated, because the missing power of a
+        rough spectrum would be mistaken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]

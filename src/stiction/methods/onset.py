@@ -1,9 +1,10 @@
 """Compute the onset of given profiles by any method, and check approximate methods.
 
-`onset`, `monte_carlo`, `infer` and failure probabilities check approximate methods,
-such as the local criterion, by solving some samples also with the exact method.
-`exact_counterpart` returns the exact method. `may_differ` returns whether the check
-is needed. `doubt` returns a warning.
+`onset`, `monte_carlo`, `infer` and failure probabilities check
+approximate methods, such as the local criterion, by solving some
+samples also with the exact method. `exact_counterpart` returns the
+exact method. `may_differ` returns whether the check is needed. `doubt`
+returns a warning.
 """
 
 from __future__ import annotations
@@ -65,8 +66,8 @@ def relative_differences(stress: Array, exact: Array) -> Array:
 def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
     """Return a warning if the mean or scatter of a difference is above 1 %, otherwise `None`.
 
-    `differences` maps a description of samples to the mean and scatter of relative
-    differences.
+    `differences` maps a description of samples to the mean and scatter
+    of relative differences.
     """
     if not any(abs(size) > MAX_DIFFERENCE for pair in differences.values() for size in pair):
         return None
@@ -95,34 +96,38 @@ def onset(
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength tau_p (Pa) with shape (samples, nodes) or (nodes,), or on a plane
-        (samples, nx, ny) or (nx, ny). Alternatively, several profiles by name, such as
-        ``{"strength": ..., "residual_strength": ...}``. Give each profile here or in the
-        problem, not in both (see `Problem.sample`). In a DataArray or Dataset, the
-        dimension 'x' runs along the interface (on a plane 'x' and 'y'), the coordinate
-        (m) gives the position of each value, and stated `units` are converted (see
-        `stiction.read_profile`). A DataArray with the unit 1, or the name
-        'friction_coefficient', holds friction coefficients, which are multiplied by the
-        normal pressure.
+        Peak strength tau_p (Pa) with shape (samples, nodes) or
+        (nodes,), or on a plane (samples, nx, ny) or (nx, ny).
+        Alternatively, several profiles by name, such as ``{"strength":
+        ..., "residual_strength": ...}``. Give each profile here or in
+        the problem, not in both (see `Problem.sample`). In a DataArray
+        or Dataset, the dimension 'x' runs along the interface (on a
+        plane 'x' and 'y'), the coordinate (m) gives the position of
+        each value, and stated `units` are converted (see
+        `stiction.read_profile`). A DataArray with the unit 1, or the
+        name 'friction_coefficient', holds friction coefficients, which
+        are multiplied by the normal pressure.
     method : LocalCriterion, Equilibrium or Rupture
         The method that computes the onset. There is no default.
     gaps : {"refuse", "fill"}
         Whether to refuse missing values (NaN), or to fill them as
         `stiction.read_profile` does.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable receives
-        (done, total).
+        True shows progress on standard error after a second. A callable
+        receives (done, total).
 
     Returns
     -------
     xarray.Dataset
-        Over 'sample': `critical_load`, `critical_stress`, `first_instability`
-        (Pa), `critical_position` (m), and the variables that the method adds. If
-        there is a normal pressure, the result includes `friction_coefficient`. If a
-        thickness, width or area is known, it includes `critical_force` and
-        `first_instability_force` (N). Every variable has `units` and `long_name`. If
-        gaps were filled, `in_gap` states whether the critical patch reaches into a
-        gap, and the coordinate `measured` marks the nodes with measured values.
+        Over 'sample': `critical_load`, `critical_stress`,
+        `first_instability` (Pa), `critical_position` (m), and the
+        variables that the method adds. If there is a normal pressure,
+        the result includes `friction_coefficient`. If a thickness,
+        width or area is known, it includes `critical_force` and
+        `first_instability_force` (N). Every variable has `units` and
+        `long_name`. If gaps were filled, `in_gap` states whether the
+        critical patch reaches into a gap, and the coordinate `measured`
+        marks the nodes with measured values.
 
     Raises
     ------
@@ -132,10 +137,10 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If gaps are filled, or if the onset lies in a gap. Also if the error of the
-        local criterion exceeds 1 % in the first samples. These are checked only if a
-        quick test leaves a doubt: as many as `Equilibrium` solves in two seconds, but
-        at most 32.
+        If gaps are filled, or if the onset lies in a gap. Also if the
+        error of the local criterion exceeds 1 % in the first samples.
+        These are checked only if a quick test leaves a doubt: as many
+        as `Equilibrium` solves in two seconds, but at most 32.
     UnitWarning
         If a value is so unusual for a solid that its unit is in doubt.
 
@@ -167,8 +172,8 @@ def onset(
             part = sample.part(slice(start, start + size))
             with collect_warnings() as caught:
                 parts.append(solver(part))
-            # Samples are numbered in a batch: shift their numbers to those in all
-            # profiles.
+            # Samples are numbered in a batch: shift their numbers to
+            # those in all profiles.
             warned += (text.after(start) for text in caught)
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
@@ -180,10 +185,11 @@ def onset(
 def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) -> None:
     """Warn if an approximate method is inaccurate for the first samples.
 
-    The exact method solves as many samples as take `COMPARISON_SECONDS`, at most
-    `MAX_COMPARED`.
+    The exact method solves as many samples as take
+    `COMPARISON_SECONDS`, at most `MAX_COMPARED`.
     """
-    # The cost decides how many samples are compared, and the quick test whether any are.
+    # The cost decides how many samples are compared, and the quick test
+    # whether any are.
     exact = exact_counterpart(problem, method)
     if exact is None:
         return
@@ -192,7 +198,8 @@ def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) ->
     first, stress = sample.part(slice(0, count)), stress[:count]
     if not count or not optional_member(method, "may_differ")(problem, first, stress):
         return
-    # The exact method may warn of its own accuracy, which is not the question here.
+    # The exact method may warn of its own accuracy, which is not the
+    # question here.
     with collect_warnings():  # and drop warnings of the comparison
         true = prepared(problem, exact)(first)["critical_stress"]
     differences = relative_differences(stress, true)

@@ -48,10 +48,10 @@ METHODS: Kinds = Kinds("methods", OWN)
 class Method(Protocol):
     """Protocol for a method: its options, and the solver that they define.
 
-    `stiction.onset` and `stiction.monte_carlo` accept any frozen dataclass with these
-    members. To use the method in study files, make its `type` known with
-    `stiction.extensions.register` or an entry point. The members of `OptionalMembers`
-    may be added.
+    `stiction.onset` and `stiction.monte_carlo` accept any frozen
+    dataclass with these members. To use the method in study files, make
+    its `type` known with `stiction.extensions.register` or an entry
+    point. The members of `OptionalMembers` may be added.
     """
 
     @property
@@ -90,7 +90,8 @@ class OptionalMembers:
     warning gives the difference."""
     scaling: ClassVar[Literal["none", "stretch", "affine"]] = "none"
     """How onsets scale with the strength s at a given weakening rate and a uniform load. "affine":
-    onset(a + b s) = a + b onset(s). "stretch": onset(b s) = b onset(s) without residual strength
+    onset(a + b s) = a + b onset(s). "stretch": onset(b s) = b onset(s)
+    without residual strength
     and initial stress."""
     counted_only: ClassVar[bool] = False
     """Whether failures are counted in plain samples, not sought by subset simulation."""
@@ -100,16 +101,17 @@ class OptionalMembers:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        The bound from below is min (tau_p - tau_i)/p, the load at which the first
-        node slips. The bound from above is the mean strength. The event is
-        'critical_stress' or 'first_instability'.
+        The bound from below is min (tau_p - tau_i)/p, the load at which
+        the first node slips. The bound from above is the mean strength.
+        The event is 'critical_stress' or 'first_instability'.
         """
         return False, False
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
         """Return why this method cannot guide another method, whose `first_stage` it is, or `None`.
 
-        `varying` contains the names of the properties that differ between samples.
+        `varying` contains the names of the properties that differ
+        between samples.
         """
         return None
 

@@ -72,8 +72,8 @@ def space_numbers(axes: Axes) -> None:
 def new_figure(width: float, height: float) -> Figure:
     """Return a figure, with sizes in inches, that notebooks and galleries show.
 
-    The figure is made outside `paper_style`, because a backend that is loaded here
-    also sets parameters.
+    The figure is made outside `paper_style`, because a backend that is
+    loaded here also sets parameters.
     """
     import matplotlib.pyplot as plt
 
@@ -177,7 +177,8 @@ def scaled(variable: xr.DataArray, *others: xr.DataArray) -> tuple[float, str, s
 def add_friction_scale(axes: Axes, problem: Problem, which: str, factor: float) -> None:
     """If there is a pressure, add a scale of stress over mean normal pressure on the other side.
 
-    `which` is the scale of stresses, "x" or "y", and `factor` the factor of its unit.
+    `which` is the scale of stresses, "x" or "y", and `factor` the
+    factor of its unit.
     """
     if problem.given_pressure is None:
         return

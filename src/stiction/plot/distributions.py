@@ -46,13 +46,14 @@ def monte_carlo(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo` or `Study.run`. Give several results as a list, or by
-        name. Up to six steps of a sweep over a single parameter are drawn.
+        From `monte_carlo` or `Study.run`. Give several results as a
+        list, or by name. Up to six steps of a sweep over a single
+        parameter are drawn.
     quantity : str, optional
-        A variable of the result. The default is `critical_force` if the area of a
-        line or specimen is known, else `friction_coefficient` if there is a
-        pressure, else `critical_stress`. `critical_position` is drawn as a
-        histogram.
+        A variable of the result. The default is `critical_force` if the
+        area of a line or specimen is known, else `friction_coefficient`
+        if there is a pressure, else `critical_stress`.
+        `critical_position` is drawn as a histogram.
     measured : Peaks, Curves or array, optional
         Peaks from tests, in SI or with a unit. They are marked separately.
     ax : matplotlib.axes.Axes, optional
@@ -147,9 +148,10 @@ def quantiles(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `Study.run` with a sweep over one or two parameters. With two parameters,
-        there is a curve for each value of the second. Several results, as a list or
-        by name, are compared along the same sweep over a single parameter.
+        From `Study.run` with a sweep over one or two parameters. With
+        two parameters, there is a curve for each value of the second.
+        Several results, as a list or by name, are compared along the
+        same sweep over a single parameter.
     quantity : str, optional
         As in `monte_carlo`.
     along : str, optional
@@ -160,8 +162,9 @@ def quantiles(
     Returns
     -------
     matplotlib.axes.Axes
-        Medians with their 95 % confidence intervals, and bands between quartiles. A
-        single curve also has a paler band between the 5 % and 95 % quantiles.
+        Medians with their 95 % confidence intervals, and bands between
+        quartiles. A single curve also has a paler band between the 5 %
+        and 95 % quantiles.
 
     Raises
     ------
@@ -287,8 +290,8 @@ def failure_curve(
     curve : Dataset
         From `stiction.failure_curve`.
     stress : float, optional
-        Demand, Pa: the mean shear stress to carry. The figure marks the demand and
-        its probability.
+        Demand, Pa: the mean shear stress to carry. The figure marks the
+        demand and its probability.
     force : float, optional
         Demand as a force, N, instead of `stress`.
     ax : matplotlib.axes.Axes, optional
@@ -297,15 +300,17 @@ def failure_curve(
     Returns
     -------
     matplotlib.axes.Axes
-        The scale at the top shows forces if the area of the interface is known, or
-        else friction coefficients if there is a normal pressure. A dotted line marks
-        the lower bound of the strength. For equally likely interfaces, the curve is
-        their mean, and a wider band contains 90 % of them.
+        The scale at the top shows forces if the area of the interface
+        is known, or else friction coefficients if there is a normal
+        pressure. A dotted line marks the lower bound of the strength.
+        For equally likely interfaces, the curve is their mean, and a
+        wider band contains 90 % of them.
 
     Raises
     ------
     InputError
-        If the dataset is not a failure curve, or the area of a force is not known.
+        If the dataset is not a failure curve,
+        or the area of a force is not known.
     """
     need(curve, "stress", "probability", "probability_low", "probability_high")
     curve = curve.isel(point=np.isfinite(curve["stress"].values))
@@ -368,8 +373,8 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar connects the designs at both ends of a range. The line is the design,
-        and the band is its interval.
+        Each bar connects the designs at both ends of a range. The line
+        is the design, and the band is its interval.
 
     Raises
     ------

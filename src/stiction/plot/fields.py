@@ -49,16 +49,18 @@ def field(
     ----------
     where : Problem or Interface
     profile : array or RandomField
-        On a line, an array with shape (nodes,) or (samples, nodes). The first six
-        samples are drawn. On a plane, an array with shape (nx, ny) or (samples, nx,
-        ny). The first sample is drawn. Units and coordinates are read as in
-        `stiction.onset`. A field is drawn as its median with the
-        measured values (`RandomField.given`), and on a line also with its central 90
-        % band.
+        On a line, an array with shape (nodes,) or (samples,
+        nodes). The first six samples are drawn. On a plane,
+        an array with shape (nx, ny) or (samples, nx, ny). The
+        first sample is drawn. Units and coordinates are read
+        as in `stiction.onset`. A field is drawn as its median
+        with the measured values (`RandomField.given`), and on
+        a line also with its central 90 % band.
     quantity : str, optional
-        Name of the property, as `RandomInterface` uses it, or
-        'friction_coefficient'. The default is 'friction_coefficient' for a field
-        of coefficients or a DataArray in the unit 1, else 'strength'.
+        Name of the property, as `RandomInterface` uses
+        it, or 'friction_coefficient'. The default is
+        'friction_coefficient' for a field of coefficients
+        or a DataArray in the unit 1, else 'strength'.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -176,13 +178,13 @@ def onset(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `stiction.onset` with this strength. Give several methods as a list,
-        or by name.
+        From `stiction.onset` with this strength. Give several methods
+        as a list, or by name.
     strength : array
-        tau_p, Pa, with shape (nodes,) or (samples, nodes), or on a plane (nx, ny) or
-        (samples, nx, ny). Units and coordinates are read as in `stiction.onset`. A
-        DataArray of friction coefficients (unit 1) is multiplied by the normal
-        pressure.
+        tau_p, Pa, with shape (nodes,) or (samples, nodes), or on a
+        plane (nx, ny) or (samples, nx, ny). Units and coordinates are
+        read as in `stiction.onset`. A DataArray of friction
+        coefficients (unit 1) is multiplied by the normal pressure.
     problem : Problem, optional
         Needed only if the result does not hold it.
     sample : int

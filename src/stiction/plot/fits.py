@@ -46,11 +46,13 @@ def fit(field_fit: FieldFit) -> NDArray[Any]:
     Returns
     -------
     (4,) array of matplotlib.axes.Axes
-        Panels for all records together: (a) values and the fitted marginal, (b)
-        quantiles of the data against quantiles of the fit, (c) correlation, with the
-        effect of the window, and (d) spectrum. The bands come from records that were
-        simulated from the fitted field. In (a) and (b) they contain 90 % of the fits
-        to such records. In (c) and (d) they contain 90 % of the sets of such records.
+        Panels for all records together: (a) values and the fitted
+        marginal, (b) quantiles of the data against quantiles of the
+        fit, (c) correlation, with the effect of the window, and (d)
+        spectrum. The bands come from records that were simulated from
+        the fitted field. In (a) and (b) they contain 90 % of the fits
+        to such records. In (c) and (d) they contain 90 % of the sets of
+        such records.
     """
     estimate, rng = field_fit._estimate, np.random.default_rng(0)
     windows = estimate.setting.windows
@@ -81,7 +83,8 @@ def _histogram(axes: Axes, field_fit: FieldFit) -> None:
     noisy = field_fit._estimate.model.noise > 0.05 * field_fit.parameters["standard_deviation"]
     name = "fitted, without the noise" if noisy else "fitted"
     axes.plot(at * factor, density, color=color(1), label=name)
-    # A density that is infinite at a bound must not set the scale of the panel.
+    # A density that is infinite at a bound
+    # must not set the scale of the panel.
     axes.set_ylim(0.0, 1.6 * np.max(counts))
     axes.set_xlabel(with_unit(field_fit.quantity.replace("_", " "), unit))
     axes.set_ylabel(f"density (1/{unit})" if unit else "density")
@@ -111,8 +114,8 @@ def _powers(observed: list[Observed]) -> list[Array]:
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
     """Return the correlation in the windows at lags (m). Records are weighted by their size.
 
-    A record counts at lags up to half of its length, because its period repeats lags
-    beyond.
+    A record counts at lags up to half of its length, because its period
+    repeats lags beyond.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
     for (window, records, *_), power in zip(observed, powers, strict=True):
@@ -214,8 +217,9 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        If the prediction is right, the steps lie completely in the shaded band for 90
-        % of campaigns with as many tests. Each specimen length has a colour.
+        If the prediction is right, the steps lie completely in the
+        shaded band for 90 % of campaigns with as many tests. Each
+        specimen length has a colour.
 
     Examples
     --------

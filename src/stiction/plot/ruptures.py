@@ -81,11 +81,11 @@ def rupture(
     Returns
     -------
     matplotlib.axes.Axes
-        If a patch became unstable, a dot marks the onset, at time zero. On a
-        line, time begins shortly before the onset and ends shortly after the last
-        slip, and points that slip seven decades slower than the fastest point are
-        white. On a plane, the front is drawn at equal intervals of time on a map
-        of the strength.
+        If a patch became unstable, a dot marks the onset, at time zero.
+        On a line, time begins shortly before the onset and ends shortly
+        after the last slip, and points that slip seven decades slower
+        than the fastest point are white. On a plane, the front is drawn
+        at equal intervals of time on a map of the strength.
 
     Raises
     ------
@@ -116,9 +116,9 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        The left panel shows the moment rate, until it stays below a twentieth of its
-        largest value. The right panel shows its spectrum, which tends to the moment
-        at low frequencies.
+        The left panel shows the moment rate, until it stays below a
+        twentieth of its largest value. The right panel shows its
+        spectrum, which tends to the moment at low frequencies.
 
     Examples
     --------
@@ -164,19 +164,20 @@ def events(
     Parameters
     ----------
     result : Dataset, or list or mapping of Dataset
-        From `monte_carlo`, `onset` or a study whose method has ``events=``, or from
-        `simulate_rupture` or `equilibrium_path`. Give several as a list, or by name.
+        From `monte_carlo`, `onset` or a study whose method has
+        ``events=``, or from `simulate_rupture` or `equilibrium_path`.
+        Give several as a list, or by name.
     problem : Problem, optional
         Needed only if the result does not hold it.
 
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        The left panel shows the number of events per sample with at least a given
-        moment. The right panel shows moment against area, or on a line against
-        length. Between half-spaces, a curve shows cracks with the median
-        `event_area_stress_drop`: Eshelby's circular crack for planes, and Starr's crack
-        for lines.
+        The left panel shows the number of events per sample with at
+        least a given moment. The right panel shows moment against area,
+        or on a line against length. Between half-spaces, a curve shows
+        cracks with the median `event_area_stress_drop`: Eshelby's
+        circular crack for planes, and Starr's crack for lines.
 
     Raises
     ------
@@ -253,9 +254,9 @@ def events(
 def crack_moment(problem: Problem, drop: float, sizes: Array) -> Array:
     """Return the moment of cracks with a uniform stress drop (Pa) between half-spaces.
 
-    For a crack of length 2a on a line, the moment is pi drop a² G/G* (Starr, 1928).
-    For a circular crack of radius a on a plane, it is 16 (1 - nu)/(3 (2 - nu)) drop
-    a³ (Eshelby, 1957).
+    For a crack of length 2a on a line, the moment is pi drop a² G/G*
+    (Starr, 1928). For a circular crack of radius a on a plane, it is 16
+    (1 - nu)/(3 (2 - nu)) drop a³ (Eshelby, 1957).
     """
     solid = problem.solid
     if problem.interface.is_plane:
@@ -282,8 +283,9 @@ def film(
     path : path
         Ends in .gif.
     frames : int
-        Maximum number of frames. They are evenly spaced over the frames of the run,
-        which are closer in time as the interface accelerates.
+        Maximum number of frames. They are evenly spaced over the frames
+        of the run, which are closer in time as the interface
+        accelerates.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -383,7 +385,8 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     draw_map(axes, interface, strength * factor, text, cmap=STRENGTH)
     since, begin = _since_onset(run, "arrival_time")
     scale, time_unit = unit_for("s", since)
-    # Beside the ends of an interface, nodes creep long after the front has passed.
+    # Beside the ends of an interface, nodes
+    # creep long after the front has passed.
     after = since[since > 0.0]
     latest = scale * float(np.quantile(after, FRONT_SHARE)) if after.size else 0.0
     length, _ = unit_for("m", interface.lengths)

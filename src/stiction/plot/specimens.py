@@ -43,9 +43,11 @@ def specimen(
     problem : Problem
         A problem with a specimen.
     strength : array, optional
-        tau_p, Pa, with shape (nodes,) or (samples, nodes), or with labels and units.
+        tau_p, Pa, with shape (nodes,) or (samples, nodes), or with
+        labels and units.
     result : Dataset, optional
-        From `stiction.onset` with this strength. The critical patch is marked.
+        From `stiction.onset` with this
+        strength. The critical patch is marked.
     sample : int
         Number of the sample, counted from 0.
 
@@ -112,7 +114,8 @@ def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
             sides = ("left", "right") if drive.side == "both" else (drive.side,)
             for side in sides:
                 end = 0.0 if side == "left" else length
-                # Upper block: pushed at the left, or pulled if driven to the left.
+                # Upper block: pushed at the left, or pulled if driven
+                # to the left.
                 pushed = up if side == "left" or drive.side == "both" else -up
                 outside = -1.0 if side == "left" else 1.0
                 start = end + outside * reach if pushed * outside < 0.0 else end
@@ -138,12 +141,12 @@ def force_travel(
     Parameters
     ----------
     result : Dataset, or sequence of Dataset
-        From `stiction.equilibrium_path` for a specimen, at many loads. Several paths,
-        for samples from the same field, are drawn as a median, with a band that
-        contains 90 % of them at each travel.
+        From `stiction.equilibrium_path` for a specimen, at many loads.
+        Several paths, for samples from the same field, are drawn as a
+        median, with a band that contains 90 % of them at each travel.
     measured : Curves, optional
-        From `stiction.read_curve`. The curves are drawn over the prediction, with
-        their precursors.
+        From `stiction.read_curve`. The curves are drawn over the
+        prediction, with their precursors.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -227,9 +230,10 @@ def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
     Returns
     -------
     (rows, columns) array of matplotlib.axes.Axes
-        Velocity along the interface, at times when 2 to 95 % of the slip has
-        occurred. All panels share a colour scale, and 1 % of the values lie beyond
-        its ends. Time counts from the first arrival of the front.
+        Velocity along the interface, at times when 2 to 95 % of the
+        slip has occurred. All panels share a colour scale, and 1 % of
+        the values lie beyond its ends. Time counts from the first
+        arrival of the front.
     """
     need(run, "block_velocity", hint=". It is kept for specimens")
     interface = problem_of(run, problem).interface
@@ -296,15 +300,15 @@ def precursors(
     problem : Problem, optional
         Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`. They are drawn over the prediction. Marks at
-        the upper edge of the lower panel show the travel at which precursors of
-        the tests begin.
+        From `stiction.read_curve`. They are drawn over the prediction.
+        Marks at the upper edge of the lower panel show the travel at
+        which precursors of the tests begin.
 
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        The upper panel is the plot of `force_travel`. The lower panel shows the
-        extent of each event at its travel.
+        The upper panel is the plot of `force_travel`. The lower panel
+        shows the extent of each event at its travel.
 
     Examples
     --------

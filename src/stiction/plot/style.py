@@ -29,8 +29,9 @@ ACCENT = "#b5322a"
 SLIP_RATE = "inferno_r"
 """Colours of slip rates."""
 
-# Each colour also has its own dashes and marker. To readers with deuteranopia, protanopia or
-# tritanopia, two colours differ by at least 19 units of CAM02-UCS.
+# Each colour also has its own dashes and marker. To readers with
+# deuteranopia, protanopia or tritanopia, two colours differ by at least
+# 19 units of CAM02-UCS.
 _SERIES: tuple[tuple[str, Any, str], ...] = (
     ("#14213d", "-", "o"),
     ("#2a6f97", (0, (5.0, 1.4)), "s"),
@@ -79,7 +80,8 @@ def paper_style() -> Iterator[None]:
 def readable(color: Any, background: Any) -> Any:
     """Return a colour with the same hue, and a contrast of at least 4.5 to 1 with a background.
 
-    The contrast is defined in the Web Content Accessibility Guidelines 2.1, 1.4.3.
+    The contrast is defined in the Web Content
+    Accessibility Guidelines 2.1, 1.4.3.
     """
 
     def luminance(colour: Any) -> float:

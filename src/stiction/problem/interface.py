@@ -154,27 +154,28 @@ class Interface:
     Parameters
     ----------
     length : float or (float, float)
-        Period, m. A number gives a line. Two numbers give a plane: the first is the
-        period along x, the direction of load and slip, and the second is the period
-        along y.
+        Period, m. A number gives a line. Two numbers give a plane: the
+        first is the period along x, the direction of load and slip, and
+        the second is the period along y.
     nodes : int or (int, int)
-        Number of nodes in each direction, even and at least 8, at most 2^24 in all.
-        Powers of two are fastest.
+        Number of nodes in each direction, even and at least 8, at most
+        2^24 in all. Powers of two are fastest.
     width : float, optional
-        Width of a line, m, which turns its stresses into forces, N. A plane does not
-        need a width. A specimen has a thickness instead.
+        Width of a line, m, which turns its stresses into forces, N. A
+        plane does not need a width. A specimen has a thickness instead.
     ends : {"periodic", "free"}
-        Set by a `Problem`: "free" if it has a `specimen`. The nodes are then the
-        centres of cells, x_i = (i + 1/2) length/nodes, and the interface stops at
-        its ends.
+        Set by a `Problem`: "free" if it has a `specimen`. The nodes are
+        then the centres of cells, x_i = (i + 1/2) length/nodes, and the
+        interface stops at its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
-        Part of the interface that can break, by default the whole interface. Beyond
-        the extent, both solids are a single piece, which never slips. For a line,
-        give its two ends (m, or text such as "0.5 km"). For a plane, give two pairs
-        of ends (along x and y) or an `Ellipse`. For a line or a plane you may also
-        give a mask: a boolean array with shape (*shape), or in a study file the path
-        of a ``.npy`` file. Nodes at the ends can break. An extent of all nodes is
-        the same as no extent.
+        Part of the interface that can break, by default the whole
+        interface. Beyond the extent, both solids are a single piece,
+        which never slips. For a line, give its two ends (m, or text
+        such as "0.5 km"). For a plane, give two pairs of ends (along x
+        and y) or an `Ellipse`. For a line or a plane you may also give
+        a mask: a boolean array with shape (*shape), or in a study file
+        the path of a ``.npy`` file. Nodes at the ends can break. An
+        extent of all nodes is the same as no extent.
 
     Notes
     -----
@@ -426,8 +427,8 @@ class Interface:
     def in_plane_share(self) -> Array:
         """Share of mode II, (kx/k)², at each wave vector of a plane. The other share is mode III.
 
-        The constant mode counts as mode II. On a line the share is 1, because the
-        problem sets the mode.
+        The constant mode counts as mode II. On a line the share is 1,
+        because the problem sets the mode.
         """
         k = self.wavenumbers
         k.flat[0] = 1.0
@@ -438,8 +439,8 @@ class Interface:
     def transform(self, profiles: Array) -> Array:
         """Return the real Fourier transform of profiles (..., *shape), unscaled.
 
-        Profiles are transformed one at a time, so the result does not depend on the
-        batch.
+        Profiles are transformed one at a time, so the result does not
+        depend on the batch.
         """
         return np.fft.rfft2(profiles) if self.is_plane else np.fft.rfft(profiles)
 

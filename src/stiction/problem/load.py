@@ -30,9 +30,10 @@ NotNegative = Annotated[Real, Field(ge=0.0)]
 class LoadShape(ABC):
     """Load profile given by a formula and scaled to a mean of 1, so that tau_0 is the mean stress.
 
-    To add a shape, write a subclass. Decorate it with `stiction.extensions.model`,
-    which checks its parameters. Study files accept its `type` if you also decorate it
-    with `stiction.extensions.register`.
+    To add a shape, write a subclass. Decorate it with
+    `stiction.extensions.model`, which checks its parameters. Study
+    files accept its `type` if you also decorate it with
+    `stiction.extensions.register`.
     """
 
     family: ClassVar[str] = "loads"
@@ -99,13 +100,14 @@ class GradientLoad(LoadShape):
 class EdgeLoad(LoadShape):
     """Load that is higher near an edge, where a pusher or the corner of a block acts.
 
-    The profile is proportional to 1 + excess exp(-distance/decay). It is symmetric
-    about the edge, as for a specimen and its mirror image.
+    The profile is proportional to 1 + excess exp(-distance/decay). It
+    is symmetric about the edge, as for a specimen and its mirror image.
 
     Parameters
     ----------
     excess : float
-        Excess load at the edge, relative to the load far away (1), not negative.
+        Excess load at the edge, relative to
+        the load far away (1), not negative.
     decay : float
         Decay length, m, positive.
     edge : float
@@ -135,14 +137,15 @@ class Load:
     profile : float, (nodes,) array, GradientLoad, EdgeLoad or another LoadShape
         p, dimensionless, positive.
     initial_stress : float or (nodes,) array
-        tau_i, Pa, below the peak strength everywhere. `Rupture` also takes nodes
-        at which it is higher, which break at once.
+        tau_i, Pa, below the peak strength everywhere. `Rupture` also
+        takes nodes at which it is higher, which break at once.
     normal_pressure : float or (nodes,) array, optional
-        Pa, positive on average. Every onset then has a `friction_coefficient`.
+        Pa, positive on average. Every onset then has a
+        `friction_coefficient`.
     pressing_force : float, optional
-        Force, N, positive, in place of `normal_pressure`. The force over the area of
-        the interface, which must be known, is the uniform pressure, or the mean
-        pressure between glued plates.
+        Force, N, positive, in place of `normal_pressure`. The force
+        over the area of the interface, which must be known, is the
+        uniform pressure, or the mean pressure between glued plates.
 
     Examples
     --------

@@ -90,19 +90,20 @@ class Problem:
     load : Load, optional
         By default a uniform load without initial stress.
     mode : {"II", "III"}
-        In-plane or anti-plane shear. A plane is in-plane along x and anti-plane
-        along y.
+        In-plane or anti-plane shear. A plane is in-plane along x and
+        anti-plane along y.
     specimen : Blocks, optional
-        Finite blocks instead of half-spaces. Their drive determines the load profile.
-        The interface ends with the blocks (`interface.ends` is "free"). tau_0 is the
-        mean stress that the drive would cause without slip.
+        Finite blocks instead of half-spaces. Their drive determines the
+        load profile. The interface ends with the blocks
+        (`interface.ends` is "free"). tau_0 is the mean stress that the
+        drive would cause without slip.
 
     Raises
     ------
     InputError
-        If an array does not have the shape of the interface, fewer than four nodes
-        span the nucleation length, or another argument is invalid. The message lists
-        every problem.
+        If an array does not have the shape of the interface, fewer than
+        four nodes span the nucleation length, or another argument is
+        invalid. The message lists every problem.
 
     Examples
     --------
@@ -263,9 +264,10 @@ class Problem:
     ) -> None:
         """Warn about mean peak and residual strengths (Pa) that do not fit the rest of the problem.
 
-        Raise an `InputError` for strengths that cannot fit, and for scales of slip,
-        given by name, that the grid does not resolve at these strengths. By default,
-        `pressure` and `initial`, the size of the initial stress, come from the problem.
+        Raise an `InputError` for strengths that cannot fit, and for
+        scales of slip, given by name, that the grid does not resolve at
+        these strengths. By default, `pressure` and `initial`, the size
+        of the initial stress, come from the problem.
         """
         friction, modulus = self.friction, self.solid.shear_modulus
         pressure = self.given_pressure if pressure is None else pressure
@@ -333,9 +335,10 @@ class Problem:
     def relief(self, slip: Array) -> float:
         """Return by how much a slip (m, flattened) lowers the mean stress, Pa.
 
-        A machine of finite stiffness loses force when the interface slips, and nodes
-        beyond the extent take over stress. The mean covers the nodes that can break,
-        and is divided by the mean of their load profile.
+        A machine of finite stiffness loses force when the interface
+        slips, and nodes beyond the extent take over stress. The mean
+        covers the nodes that can break, and is divided by the mean of
+        their load profile.
         """
         if not self.interface.is_held:
             return 0.0 if self.specimen is None else float(self.blocks.mean_relief(slip))
@@ -345,8 +348,9 @@ class Problem:
     def relief_of_nodes(self) -> Array:
         """Relief (nodes,), Pa/m, by unit slip at each node, for an interface that ends.
 
-        K is symmetric, so the mean of K d over the nodes that can break is <K b, d> over their
-        number, where b is 1 at these nodes and 0 beyond.
+        K is symmetric, so the mean of K d over the nodes
+        that can break is <K b, d> over their number,
+        where b is 1 at these nodes and 0 beyond.
         """
         interface, can_break = self.interface, self.interface.breakable
         profile = np.broadcast_to(self.load_profile, interface.shape)[can_break].sum()
@@ -425,8 +429,9 @@ class Problem:
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
 
-        If the law steepens, W is the steepest rate. An `InputError` says that the rate
-        varies along the interface or follows from other parameters.
+        If the law steepens, W is the steepest rate. An `InputError`
+        says that the rate varies along the interface or follows from
+        other parameters.
         """
         if self.uniform_weakening_rate is None:
             raise InputError(
@@ -439,8 +444,8 @@ class Problem:
     def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
         """Return h_n, m, in each direction, for a uniform weakening rate (Pa/m).
 
-        On a plane, the length along x belongs to mode II and the length along y to
-        mode III.
+        On a plane, the length along x belongs to mode II and the length
+        along y to mode III.
         """
         if not weakening_rate > 0.0:
             given = describe(weakening_rate)
@@ -450,8 +455,8 @@ class Problem:
     def nodes_in_nucleation_length(self, weakening_rate: float) -> tuple[float, ...]:
         """Return how many nodes span the nucleation length at a weakening rate (Pa/m).
 
-        There is a number for each direction. If the law steepens, its steepest rate
-        is used.
+        There is a number for each direction. If the law steepens, its
+        steepest rate is used.
         """
         lengths = self.nucleation_lengths(weakening_rate * self.friction.steepening)
         return tuple(np.divide(lengths, self.interface.spacings).tolist())
@@ -517,24 +522,27 @@ class Problem:
         Parameters
         ----------
         profiles : array, mapping of arrays, xarray.Dataset or Sample
-            Peak strength tau_p (Pa) with shape (samples, *shape) or (*shape), or
-            profiles by name: 'strength' and other names in `PROFILES`, but at most
-            one of 'weakening_rate', 'critical_slip' and 'fracture_energy'. Give each
-            profile here or in the problem, not in both. Except for the strength, a
-            profile may also be a number or have shape (samples, 1). Such a
-            'normal_pressure' is a mean, which glued blocks distribute. The strength
-            may be replaced by a 'friction_coefficient', or by a DataArray that states
-            the unit 1. These are multiplied by the pressure.
+            Peak strength tau_p (Pa) with shape (samples, *shape) or
+            (*shape), or profiles by name: 'strength' and other names in
+            `PROFILES`, but at most one of 'weakening_rate',
+            'critical_slip' and 'fracture_energy'. Give each profile
+            here or in the problem, not in both. Except for the
+            strength, a profile may also be a number or have shape
+            (samples, 1). Such a 'normal_pressure' is a mean, which
+            glued blocks distribute. The strength may be replaced by a
+            'friction_coefficient', or by a DataArray that states the
+            unit 1. These are multiplied by the pressure.
         accept : collection of {"overstress"}
-            Extreme profiles that the method accepts: initial stress above the
-            strength.
+            Extreme profiles that the method accepts: initial stress
+            above the strength.
 
         Raises
         ------
         InputError
-            If a name, shape or value is invalid, a strength is not above the initial
-            stress, no strength is above the residual strength, or a `Sample` was made
-            by a different problem. The message lists every problem.
+            If a name, shape or value is invalid, a strength is not
+            above the initial stress, no strength is above the residual
+            strength, or a `Sample` was made by a different problem. The
+            message lists every problem.
 
         Notes
         -----
@@ -583,9 +591,9 @@ class Problem:
     def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
         """Return a sample from arrays by name that the package made. They are in SI units.
 
-        Only values are checked here, because some samples may not fit the problem.
-        The caller checks the resolution, and the nodes that do not weaken, for all
-        samples together.
+        Only values are checked here, because some samples may not fit
+        the problem. The caller checks the resolution, and the nodes
+        that do not weaken, for all samples together.
         """
         problems: list[str] = []
         for name, rows in profiles.items():
@@ -605,7 +613,8 @@ class Problem:
         """
         interface, strength = self.interface, profiles["strength"]
         constants = self.constants(strength)
-        # A given profile replaces the value in the problem, so its scale comes first.
+        # A given profile replaces the value in the problem, so its
+        # scale comes first.
         scale = next(name for name in (*profiles, *constants) if name in SCALES)
         known = constants | dict(profiles)
         if known["normal_pressure"] is None:
@@ -623,13 +632,14 @@ class Problem:
             raise InputError(problems)
         W = self.friction.weakening_rate_of(strength - residual, scale, value)
         if interface.is_held and scale != "weakening_rate":
-            # Barriers never weaken. Any finite rate will do, and here it is the fastest.
+            # Barriers never weaken. Any finite rate will do, and here
+            # it is the fastest.
             fastest = np.where(barriers, 0.0, W).max(interface.axes, keepdims=True)
             W = np.where(barriers, fastest, W)
         constant = strength <= residual
         if constant.any():
-            # Residual from the start, tau_r = tau_p: then d_c = 0, and W is of no
-            # consequence.
+            # Residual from the start, tau_r = tau_p: then d_c = 0, and
+            # W is of no consequence.
             residual = np.minimum(residual, strength)
             slowest = np.min(
                 W, axis=interface.axes, where=~constant, initial=np.inf, keepdims=True
@@ -648,8 +658,8 @@ class Problem:
     def given_twice(self, names: Collection[str], owner: str) -> list[str]:
         """Return messages about values that profiles or random properties would replace.
 
-        There are also messages about values that are given in neither place. In the
-        messages, `owner` stands before the names.
+        There are also messages about values that are given in neither
+        place. In the messages, `owner` stands before the names.
         """
         twice = [
             f"problem.{key}: has no effect beside {owner}.{name}. Leave either out"

@@ -21,8 +21,8 @@ nodes that weaken."""
 def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
     """Return the largest weakening rate, Pa/m, among nodes that may break.
 
-    Arrays have shape (samples, *shape). Barriers do not count: with a uniform
-    critical slip they weaken steeply but never slip.
+    Arrays have shape (samples, *shape). Barriers do not count: with a
+    uniform critical slip they weaken steeply but never slip.
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or weakening_rate.max() == weakening_rate.min():
@@ -54,17 +54,17 @@ class Sample(Result, _Profiles):
     Attributes
     ----------
     strength, residual_strength, weakening_rate, initial_stress : (samples, *shape) arrays
-        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not write to these
-        arrays. The strength is infinite beyond the extent of the interface. If a
-        strength is not above the residual strength, both are set equal and W has no
-        effect.
+        tau_p, tau_r (Pa), W at zero slip (Pa/m), tau_i (Pa). Do not
+        write to these arrays. The strength is infinite beyond the
+        extent of the interface. If a strength is not above the residual
+        strength, both are set equal and W has no effect.
     load_profile : (*shape) array
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
         In Pa, NaN if the problem has no pressure.
     problem : Problem, optional
-        The problem that made the sample. Other problems do not accept the sample. A
-        sample made by hand has no problem.
+        The problem that made the sample. Other problems do not accept
+        the sample. A sample made by hand has no problem.
     """
 
     def _summary(self) -> Summary:

@@ -27,14 +27,15 @@ class Solid:
     Parameters
     ----------
     shear_modulus : float
-        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa. Then G = E/(2 (1 +
-        nu)) is stored.
+        G, Pa. Alternatively, pass `youngs_modulus`, E in Pa. Then G =
+        E/(2 (1 + nu)) is stored.
     poisson_ratio : float
         nu, in (-1, 0.5).
     density : float
         rho, kg/m3.
     plane : {"strain", "stress"}
-        Plane state of the in-plane problem (mode II). Mode III does not depend on it.
+        Plane state of the in-plane problem (mode II). Mode III does not
+        depend on it.
 
     Examples
     --------
@@ -68,8 +69,8 @@ class Solid:
         ratio: Any = named.get("poisson_ratio")
         named = dict(named)
         modulus = check("youngs_modulus", named.pop("youngs_modulus"), Positive)
-        # Without a usable ratio any modulus will do: the ratio is what is
-        # complained of.
+        # Without a usable ratio any modulus will do: the ratio is what
+        # is complained of.
         usable = is_finite(ratio) and ratio > -1.0
         named["shear_modulus"] = modulus / (2.0 * (1.0 + (ratio if usable else 0.0)))
         return ArgsKwargs((), named) if isinstance(given, ArgsKwargs) else named
@@ -114,9 +115,9 @@ class Solid:
     def rayleigh_wave_speed(self) -> float:
         """c_R, m/s, from Rayleigh's cubic in q = (c_R/c_s)^2.
 
-        The cubic is q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2) = 0 with eta =
-        c_d/c_s. It follows from (2-q)^2 = 4 sqrt(1-q) sqrt(1-q/eta^2), squared and
-        divided by q (Rayleigh, 1885).
+        The cubic is q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2)
+        = 0 with eta = c_d/c_s. It follows from (2-q)^2 = 4 sqrt(1-q)
+        sqrt(1-q/eta^2), squared and divided by q (Rayleigh, 1885).
         """
         slowness = self.wave_speed_ratio**-2
         roots = np.roots([1.0, -8.0, 24.0 - 16.0 * slowness, -16.0 * (1.0 - slowness)])
@@ -132,8 +133,9 @@ class Solid:
     def effective_modulus(self, mode: Mode = "II") -> float:
         """Static modulus G*, Pa, in tau(k) = tau_0 - (G*/2) |k| delta(k).
 
-        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress, that is 2 G (1 -
-        c_s^2/c_d^2) (Geubelle and Rice, 1995, static limit). Mode III: G.
+        Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress,
+        that is 2 G (1 - c_s^2/c_d^2) (Geubelle and Rice, 1995, static
+        limit). Mode III: G.
         """
         if mode not in ("II", "III"):
             raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")

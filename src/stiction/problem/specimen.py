@@ -42,12 +42,12 @@ class Platen:
     Parameters
     ----------
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, N/m. 0 is a dead
-        load (the force is controlled). ``float("inf")`` is a rigid machine (the
-        travel is controlled).
+        Stiffness of the machine between the grips of the two blocks,
+        N/m. 0 is a dead load (the force is controlled).
+        ``float("inf")`` is a rigid machine (the travel is controlled).
     mass : float
-        Mass of the platen and the grip that move with a block, kg. It counts in
-        ruptures with inertia only.
+        Mass of the platen and the grip that move with a block, kg. It
+        counts in ruptures with inertia only.
     """
 
     stiffness: Stiffness = 0.0
@@ -62,17 +62,18 @@ class Pusher:
     Parameters
     ----------
     height : float
-        Height of the middle of the pusher above the interface, m. The pusher may be
-        anywhere on the side, up to the top and down to the interface.
+        Height of the middle of the pusher above the interface, m. The
+        pusher may be anywhere on the side, up to the top and down to
+        the interface.
     width : float
         Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
-        The trailing side, from which slip is driven. Two pushers share the force
-        equally. This is the shear of a lap joint. Its bending, and its change of
-        pressure, are not modelled.
+        The trailing side, from which slip is driven. Two pushers share
+        the force equally. This is the shear of a lap joint. Its
+        bending, and its change of pressure, are not modelled.
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, N/m (see
-        `Platen`).
+        Stiffness of the machine between the grips of the two blocks,
+        N/m (see `Platen`).
     mass : float
         Mass, kg, that moves with the pushers of a block (see `Platen`).
     """
@@ -103,18 +104,19 @@ class Blocks:
     height : float
         Height of each block, m. Its length is the length of the interface.
     thickness : float, optional
-        Depth, m, which turns stresses into forces, N. A machine of finite stiffness
-        needs it.
+        Depth, m, which turns stresses into forces, N. A machine of
+        finite stiffness needs it.
     drive : Platen or Pusher
     pressing : {"frictionless", "glued"}
-        How the blocks are pressed: by a uniform pressure, or between plates on which
-        the top faces do not slide. With plates, ``Load(normal_pressure=...)`` is the
-        mean pressure.
+        How the blocks are pressed: by a uniform pressure, or between
+        plates on which the top faces do not slide. With plates,
+        ``Load(normal_pressure=...)`` is the mean pressure.
     quality_factor : float
-        Q of the slowest shear wave along a block, at the frequency f = c_s/(2 L).
-        Momentum decays at the rate 2 pi f/Q, in ruptures with inertia only. The value
-        25 is for acrylic at about 10 kHz, with a loss tangent of 0.04. With
-        ``float("inf")``, waves echo for ever.
+        Q of the slowest shear wave along a block, at the
+        frequency f = c_s/(2 L). Momentum decays at the rate
+        2 pi f/Q, in ruptures with inertia only. The value 25
+        is for acrylic at about 10 kHz, with a loss tangent
+        of 0.04. With ``float("inf")``, waves echo for ever.
 
     Examples
     --------

@@ -1,8 +1,10 @@
 """Random properties: marginals, spectra, and profiles that depend on (seed, sample).
 
-Read `fields` first. It defines a `RandomField`, and a `RandomInterface` with several fields. Then
-read `marginals`, `spectra`, `mapping` (from the Gaussian field to the property), `modes` (waves on
-an interface) and `synthesis` (draws and transforms). `conditioning` and `transport` take measured
-values into account. `equally_likely` holds mixtures of interfaces. `dotted_keys` finds parameters
-by name. `stresses` multiplies friction coefficients by the pressure.
+Read `fields` first. It defines a `RandomField`, and a `RandomInterface`
+with several fields. Then read `marginals`, `spectra`, `mapping` (from
+the Gaussian field to the property), `modes` (waves on an interface) and
+`synthesis` (draws and transforms). `conditioning` and `transport` take
+measured values into account. `equally_likely` holds mixtures of
+interfaces. `dotted_keys` finds parameters by name. `stresses`
+multiplies friction coefficients by the pressure.
 """

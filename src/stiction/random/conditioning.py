@@ -9,44 +9,47 @@ With phi_k = phi(x_k), the posterior of the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
-If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose precision p_k
-may be negative, this is a linear regression. The posterior of the draws is then
-normal, with
+If every l_k is replaced by a Gaussian exp(b_k z - p_k z^2/2), whose
+precision p_k may be negative, this is a linear regression. The
+posterior of the draws is then normal, with
 
     covariance P = (1 + sum_k p_k phi_k phi_k')^-1,   mean mu = P sum_k b_k phi_k.            (2)
 
-With the symmetric root, mu + P^(1/2) a turns the usual draws into conditioned
-draws. Their distribution is the same as with Matheron's rule (A. G. Journel and C.
-J. Huijbregts, Mining Geostatistics, 1978). The caller only replaces the draws.
+With the symmetric root, mu + P^(1/2) a turns the usual draws into
+conditioned draws. Their distribution is the same as with Matheron's
+rule (A. G. Journel and C. J. Huijbregts, Mining Geostatistics, 1978).
+The caller only replaces the draws.
 
 Algorithm (`conditioned`)
 -------------------------
 The method is expectation propagation (T. P. Minka, Uncertainty in Artificial
 Intelligence 17, 2001), followed by a map for the skewness that Gaussians miss:
 
-1. Begin with z ~ N(0, 1) at every place, as if no other value had been measured.
-2. Replace each l_k by a Gaussian. Choose it so that the product with the normal
-   distribution of z_k given all other values keeps its mean and variance
-   (`Measured.gaussian`, by quadrature).
+1. Begin with z ~ N(0, 1) at every place,
+   as if no other value had been measured.
+2. Replace each l_k by a Gaussian. Choose it so that the product with
+   the normal distribution of z_k given all other values keeps its mean
+   and variance (`Measured.gaussian`, by quadrature).
 3. Find the regression (2) from a singular value decomposition (`_regression`).
    With the rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1
    + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
    densely. If some p_k are negative, V is turned so that P is diagonal in it, and
    s^2 stands for the eigenvalues of P^-1 - 1, which may be negative.
-4. Remove the Gaussian of each place from the posterior. The result, called the
-   cavity, is the mean and variance of z_k given all other values (`_from_others`).
-5. Repeat from step 2 until these means no longer change, at most `MAX_UPDATES`
-   times.
-6. Map draws before the regression, so that they have the density (1) instead of
-   its Gaussian approximation (`stiction.random.transport`, which also estimates
-   the remaining error).
-7. Compare the misfit of values and draws at the mean with chi-square, for a
-   warning.
+4. Remove the Gaussian of each place from the posterior. The result,
+   called the cavity, is the mean and variance of z_k given all other
+   values (`_from_others`).
+5. Repeat from step 2 until these means no longer change, at most
+   `MAX_UPDATES` times.
+6. Map draws before the regression, so that they have the density (1)
+   instead of its Gaussian approximation (`stiction.random.transport`,
+   which also estimates the remaining error).
+7. Compare the misfit of values and draws at the mean with chi-square,
+   for a warning.
 
-The algorithm departs from Minka in three points. All places are updated at once. If
-the Gaussians have no posterior (P is not positive definite), b and p are reduced by
-a common factor. In step 4 each place keeps at least half of the precision that it
-has without measurements.
+The algorithm departs from Minka in three points. All places are updated
+at once. If the Gaussians have no posterior (P is not positive
+definite), b and p are reduced by a common factor. In step 4 each place
+keeps at least half of the precision that it has without measurements.
 """
 
 from collections.abc import Sequence
@@ -222,7 +225,8 @@ class Measured(NamedTuple):
         """Step 2: return b and p (points,) from mean and variance of z given all other values."""
         law, noise = self.marginal.distribution, self.conditions.noise
         value = self.conditions.values
-        # The range of z in which likelihood and normal distribution both matter.
+        # The range of z in which likelihood and normal distribution
+        # both matter.
         edges = value + HALF_WIDTH * noise * np.array([[-1.0], [1.0]])
         likely = _normal_score(law.cdf(edges), law.sf(edges)).clip(-MAX_Z, MAX_Z)
         width = HALF_WIDTH * np.sqrt(variance)
@@ -238,9 +242,9 @@ class Measured(NamedTuple):
             return half_range, z, log_density
 
         half_range, z, log_density = evaluate()
-        # If a value contradicts the others, the product peaks outside the range
-        # or at its end. Then search both ranges, and narrow the search around the
-        # peak.
+        # If a value contradicts the others, the product peaks outside
+        # the range or at its end. Then search both ranges, and narrow
+        # the search around the peak.
         ends = log_density[:, [0, -1]].max(axis=1)
         apart = ~overlap | (ends > log_density.max(axis=1) - MIN_END_FALL)
         if apart.any():
@@ -258,7 +262,8 @@ class Measured(NamedTuple):
                 low = np.where(apart, z[rows, first], low)
                 high = np.where(apart, z[rows, last], high)
                 half_range, z, log_density = evaluate()
-        # Mean and variance of the product, and the Gaussian that gives the same.
+        # Mean and variance of the product, and
+        # the Gaussian that gives the same.
         weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
         total = weight.sum(axis=1)
         centre = (weight * z).sum(axis=1) / total
@@ -315,8 +320,8 @@ class Conditioning(NamedTuple):
     def quantile_at(self, phi: Array, probability: float) -> Array:
         """Return the quantile of z = phi @ draws at each point.
 
-        The quantile is exact for the regression. Samples estimate the effect of the
-        map.
+        The quantile is exact for the regression. Samples estimate the
+        effect of the map.
         """
         mean, deviation = self.regression.moments(phi)
         quantile = mean + float(ndtri(probability)) * deviation
@@ -351,14 +356,17 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
     cavity = np.zeros(len(phi)), np.ones(len(phi))
     shift, precision = _gaussians(measured, cavity)
     for update in range(1, MAX_UPDATES + 1):
-        # 3. and 4. All values together, and z at each place given all other values.
+        # 3. and 4. All values together, and z at each place given all
+        # other values.
         regression, shift, precision = _regression(phi, shift, precision)
         previous_mean, cavity = cavity[0], _from_others(phi, regression, shift, precision)
-        # 5. End before new Gaussians: step 6 divides by the Gaussians of the regression.
+        # 5. End before new Gaussians: step 6 divides by the Gaussians
+        # of the regression.
         if np.abs(cavity[0] - previous_mean).max() < SETTLED_MEAN or update == MAX_UPDATES:
             break
         shift, precision = _gaussians(measured, cavity)
-    # 6. The regression gives z = mean + (along / gain) w with standard normal w. Map w to (1).
+    # 6. The regression gives z = mean + (along / gain) w with standard
+    # normal w. Map w to (1).
     along, gain = phi @ regression.right, np.sqrt(1.0 + regression.power)
     mean = along @ (regression.data[0] / gain**2)
     log_ratio = _log_ratio(measured, shift, precision, mean)
@@ -391,8 +399,8 @@ def _log_ratio(
 ) -> LogRatio:
     """Return a function of place and z: the log ratio of l_k to its Gaussian.
 
-    The Gaussian is scaled to 1 at the `mean`, because a constant factor at a place
-    does not matter.
+    The Gaussian is scaled to 1 at the `mean`, because a constant factor
+    at a place does not matter.
     """
 
     def log_ratio(places: NDArray[np.int64], z: Array) -> Array:
@@ -435,8 +443,8 @@ def _from_others(
     mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
     remaining = np.maximum(deviation**-2 - precision, least)
-    # Across a small deviation the map is linear, and the difference would be
-    # round-off.
+    # Across a small deviation the map is linear, and the difference
+    # would be round-off.
     sharp = deviation < MIN_DEVIATION
     cavity_mean = (mean / deviation**2 - shift) / remaining
     return np.where(sharp, 0.0, cavity_mean), np.where(sharp, 1.0, 1.0 / remaining)
@@ -479,7 +487,8 @@ def conditionings(
             given.check(fields[i].marginal, interface)
             size = given.values.size * random.dimension(interface)
             check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
-            # z combines the property's own draws with the draws of earlier properties.
+            # z combines the property's own draws with the draws of
+            # earlier properties.
             basis = fields[i].modes(interface).basis(given.places)
             phi = np.zeros((len(basis), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):

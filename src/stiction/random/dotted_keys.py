@@ -22,9 +22,9 @@ MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     """Copy a model object, or a list of model objects, and set values by dotted keys.
 
-    Messages begin with `path`, the dotted key that leads to the object. Raises an
-    `InputError` if a value is invalid, or if a key does not exist. The message then
-    names the nearest valid key.
+    Messages begin with `path`, the dotted key that leads to the object.
+    Raises an `InputError` if a value is invalid, or if a key does not
+    exist. The message then names the nearest valid key.
     """
     if isinstance(owner, list):
         return [with_values(member, values, path) for member in owner]
@@ -55,7 +55,8 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
         fields = {names[key]: value for key, value in changes.items()}
         return dataclasses.replace(owner, **fields)
     except InputError as error:
-        # The path replaces the name of the class, which a user of keys does not know.
+        # The path replaces the name of the class, which a user of keys
+        # does not know.
         kind = f"{type(owner).__name__}."
         texts = (text.removeprefix(kind) for text in error.problems)
         raise InputError([begin + text for text in texts]) from None
@@ -78,8 +79,8 @@ def full_key(key: str) -> str:
 def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
     """Return a Latin hypercube: each distribution has a value in every 1/count of probability."""
     rng = np.random.default_rng([seed, 6])
-    # Permute the intervals of each distribution, and take a random place in each
-    # interval.
+    # Permute the intervals of each distribution, and take a random
+    # place in each interval.
     cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
     shares = (cells + rng.random(cells.shape)) / count
     rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
@@ -94,7 +95,8 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
     problems: list[str] = []
     distributions: dict[str, Any] = {}
     for key, value in given.items():
-        # A name and its full key are the same parameter. All mistakes are listed.
+        # A name and its full key are the same
+        # parameter. All mistakes are listed.
         try:
             full = full_key(str(key))
             if not full.startswith(begin):

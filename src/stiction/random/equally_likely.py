@@ -1,10 +1,10 @@
 """Mixtures of equally likely random interfaces: the first draw of a sample selects the member.
 
-A mixture behaves as a single random interface, so that one search for failures
-covers all members.
+A mixture behaves as a single random interface, so that one search for
+failures covers all members.
 
-1. Collect the draws of all members. Members share a draw for the same property
-   and mode (`_columns`).
+1. Collect the draws of all members. Members share a draw for the same
+   property and mode (`_columns`).
 2. A first draw, mapped to a uniform number, selects the member
    (`EquallyLikely.member`).
 3. The member maps the other draws that it uses to profiles
@@ -94,9 +94,10 @@ else:
 class EquallyLikely:
     """Mixture of equally likely random interfaces, with the protocol of a random interface.
 
-    The first draw of a sample selects its member. Members share the other draws: a property and a
-    mode have the same draw in every member. If a sample changes its member, its profiles
-    keep their form.
+    The first draw of a sample selects its member.
+    Members share the other draws: a property and a mode
+    have the same draw in every member. If a sample
+    changes its member, its profiles keep their form.
     """
 
     members: tuple[RandomInterface, ...]
@@ -167,8 +168,8 @@ class EquallyLikely:
         """Change rows of draws so that they select given members."""
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
-        # The middle of a member's interval, so that round-off cannot select its
-        # neighbour.
+        # The middle of a member's interval, so that round-off cannot
+        # select its neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def variant(self, draws: Array) -> NDArray[np.int64]:
@@ -196,8 +197,8 @@ class EquallyLikely:
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
         columns = _columns(self, interface)
-        # Members that cover all columns draw them. Shared columns get the same
-        # numbers twice.
+        # Members that cover all columns draw them. Shared columns get
+        # the same numbers twice.
         for number in columns.covering:
             of_member = columns.of[number]
             draws[:, of_member] = self.members[number].draws(interface, samples, seed, first)
@@ -229,7 +230,8 @@ class MemberColumns(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _columns(random: EquallyLikely, interface: Interface) -> MemberColumns:
-    # A draw is identified by its stream and its number there, combined in a key.
+    # A draw is identified by its stream and
+    # its number there, combined in a key.
     keys_of_members = []
     for member in random.members:
         keys = []
@@ -238,7 +240,8 @@ def _columns(random: EquallyLikely, interface: Interface) -> MemberColumns:
             numbers = np.concatenate([np.arange(int(stream.mean_mode)), modes.ravel()])
             keys.append(stream.number * MAX_DRAWS_OF_STREAM + numbers)
         keys_of_members.append(np.concatenate(keys))
-    # Column 0 selects the member. The other columns are in the order of their keys.
+    # Column 0 selects the member. The other
+    # columns are in the order of their keys.
     all_keys = np.unique(np.concatenate(keys_of_members))
     columns = [1 + np.searchsorted(all_keys, keys) for keys in keys_of_members]
     drawn, covering = np.zeros(1 + all_keys.size, np.bool_), []
@@ -308,9 +311,9 @@ class UncertainSource(Result):
             likely = as_random(self.given)
         keys = [key for key in self.laws if not key.startswith("problem.")]
         ranks = np.arange(count)
-        # Member n takes the constants n % VARIANTS. Members with the same
-        # constants get neighbouring ranks and thereby, in the order of groups,
-        # strengths in proportion.
+        # Member n takes the constants n % VARIANTS. Members with the
+        # same constants get neighbouring ranks and thereby, in the
+        # order of groups, strengths in proportion.
         if len(keys) < len(self.laws):
             turns = np.array_split(ranks, VARIANTS)
             ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
@@ -351,9 +354,9 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
     Returns
     -------
     UncertainSource
-        Pass it to `design_stress`, `failure_probability` or any function that
-        takes a fit. Each constant of the problem takes forty values, evenly spread
-        over its distribution.
+        Pass it to `design_stress`, `failure_probability` or any
+        function that takes a fit. Each constant of the problem takes
+        forty values, evenly spread over its distribution.
 
     Examples
     --------
@@ -365,7 +368,8 @@ def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
     40
     """
     laws = uncertain_laws(parameters)
-    # Another interface has other nodes, so its draws and profiles would not fit together.
+    # Another interface has other nodes, so its draws and profiles would
+    # not fit together.
     if wrong := [key for key in laws if key.startswith("problem.interface.")]:
         raise InputError(f"uncertain: {wrong[0]}: cannot be uncertain. Sweep over it instead")
     with prefixed("random"):
@@ -378,7 +382,8 @@ def as_random(
 ) -> RandomInterface | EquallyLikely:
     """Return a random interface. A list or a source of several interfaces gives a mixture.
 
-    If `mixture` is true, the list is complete: no other interface is possible.
+    If `mixture` is true, the list is
+    complete: no other interface is possible.
     """
     if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
         raise InputError("mixture: needs a list of all possible interfaces, two or more")

@@ -1,17 +1,18 @@
 """Random fields, and the random interface that holds all random properties.
 
-Problem: map independent standard normal draws to profiles of correlated properties.
-Each property is a translation field (M. Grigoriu, Applied Non-Gaussian Processes,
-1995). `layout` assigns the draws to properties and modes.
+Problem: map independent standard normal draws to profiles
+of correlated properties. Each property is a translation
+field (M. Grigoriu, Applied Non-Gaussian Processes, 1995).
+`layout` assigns the draws to properties and modes.
 
 Algorithm (`RandomInterface.from_draws`)
 ----------------------------------------
 1. Condition the draws on measured values, group by group of correlated properties
    (`conditioning`).
-2. Combine a property's own draws with the draws of earlier properties by the
-   Cholesky factor of the correlation matrix (`lower_factor`).
-3. Synthesise the Gaussian field z from its modes (`modes`), and map it to the
-   marginal (`mapping`).
+2. Combine a property's own draws with the draws of earlier properties
+   by the Cholesky factor of the correlation matrix (`lower_factor`).
+3. Synthesise the Gaussian field z from its modes (`modes`), and map it
+   to the marginal (`mapping`).
 4. Multiply by the factors between specimens. Each factor takes one draw.
 """
 
@@ -75,18 +76,21 @@ class RandomField:
     spectrum : PowerLawSpectrum, ..., CustomSpectrum
         Power spectral density of the Gaussian field z.
     mean_mode : bool
-        Whether z has the mean mode, k = 0. Without this mode, as in Albertini et al.
-        (2020), the mean of z is the same in every sample. This is harmless only if
-        the correlation length is short compared with the interface.
+        Whether z has the mean mode, k = 0. Without this mode, as in
+        Albertini et al. (2020), the mean of z is the same in every
+        sample. This is harmless only if the correlation length is short
+        compared with the interface.
     anisotropy : float, optional
-        On a plane, the correlation length along y divided by the length along x, by
-        default 1. The spectrum gives the correlation length along x.
+        On a plane, the correlation length along y
+        divided by the length along x, by default 1. The
+        spectrum gives the correlation length along x.
     of : {"friction_coefficient"}, optional
-        Declares that the field holds friction coefficients. The stress (strength,
-        residual strength or initial stress) is their product with the normal
-        pressure.
+        Declares that the field holds friction coefficients. The stress
+        (strength, residual strength or initial stress) is their product
+        with the normal pressure.
     conditions : Conditions, optional
-        Measured values, as set by `given`, or in a study file by the table ``given``.
+        Measured values, as set by `given`, or in a study file by the
+        table ``given``.
 
     Notes
     -----
@@ -136,16 +140,19 @@ class RandomField:
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
         """Return the field conditioned on measured values. It remains random at other places.
 
-        Samples of the conditioned field use the same draws as this field. The larger
-        the noise, the closer they are to the samples of this field.
+        Samples of the conditioned field use the same draws as this
+        field. The larger the noise, the closer they are to the samples
+        of this field.
 
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
-            Measured values, for example ``st.read_profile("scan.csv")``, at any
-            places and in the unit of the field. NaN stands for a missing value.
+            Measured values, for example
+            ``st.read_profile("scan.csv")``, at any places and in the
+            unit of the field. NaN stands for a missing value.
         noise : float
-            Standard deviation of the measurement error, in the same unit, positive.
+            Standard deviation of the measurement error, in the same
+            unit, positive.
 
         Examples
         --------
@@ -178,7 +185,8 @@ class RandomField:
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
             [(_, conditioning)] = conditionings(self._alone, interface)
-            # The marginal rises, so quantiles of z become quantiles of the field.
+            # The marginal rises, so quantiles of
+            # z become quantiles of the field.
             z = conditioning.quantile_at(phi, probability)
         return from_normal(self.marginal, z).reshape(interface.shape)
 
@@ -192,8 +200,9 @@ class RandomField:
         Warns
         -----
         AccuracyWarning
-            If the grid is too coarse for the spectrum, or the interface is short
-            compared with the correlation length and the field has no mean mode.
+            If the grid is too coarse for the spectrum, or the interface
+            is short compared with the correlation length and the field
+            has no mean mode.
         """
         self._alone.warn_if_inaccurate(interface)
         profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
@@ -233,9 +242,9 @@ class RandomField:
     ) -> Array:
         """Compute the periodic correlation at the lags ``interface.coordinates``.
 
-        `of` selects the mapped field (with a Hermite expansion: Grigoriu, 1995) or z.
-        If the tails of the marginal are too heavy, an `AccuracyWarning` gives the
-        error.
+        `of` selects the mapped field (with a Hermite expansion:
+        Grigoriu, 1995) or z. If the tails of the marginal are too
+        heavy, an `AccuracyWarning` gives the error.
         """
         modes = self.modes(interface)
         origin = np.zeros((len(interface.shape), 1))
@@ -244,7 +253,8 @@ class RandomField:
 
     def _map_coefficients(self) -> Array:
         coefficients = hermite_coefficients(self.marginal)
-        # The last coefficient stands for the terms that the expansion leaves out.
+        # The last coefficient stands for the
+        # terms that the expansion leaves out.
         error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
         if error > MAX_CORRELATION_ERROR:
             warn_accuracy(
@@ -264,8 +274,8 @@ class RandomField:
         def excess(rho: float) -> float:
             return float(correlation_of_mapped(np.array(rho), coefficients)) - math.exp(-1.0)
 
-        # The correlation of the mapped field rises with the correlation of z:
-        # find the value of z.
+        # The correlation of the mapped field rises with the correlation
+        # of z: find the value of z.
         return lag_of_correlation(self.spectrum, brentq(excess, 0.0, 1.0, xtol=1e-16))
 
 
@@ -301,19 +311,21 @@ class RandomInterface:
     Parameters
     ----------
     strength : RandomField
-        Peak strength, Pa, or with ``of="friction_coefficient"`` a friction
-        coefficient, which is multiplied by the normal pressure.
+        Peak strength, Pa, or with
+        ``of="friction_coefficient"`` a friction coefficient,
+        which is multiplied by the normal pressure.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
-        Other stresses, Pa. The first two may also be coefficients. Leave random
-        properties out of the problem.
+        Other stresses, Pa. The first two may also be coefficients.
+        Leave random properties out of the problem.
     weakening_rate, critical_slip, fracture_energy : RandomField, optional
-        At most one of the three, in Pa/m, m or J/m². If one is random, leave all
-        three out of the friction law.
+        At most one of the three, in Pa/m, m or J/m². If one is random,
+        leave all three out of the friction law.
     correlation : mapping, optional
-        Correlation coefficients between the Gaussian fields of two properties, mode
-        by mode. Example: ``{("strength", "residual_strength"): 0.8}``. In a study
-        file, write ``correlation.strength.residual_strength = 0.8``. Other pairs are
-        independent.
+        Correlation coefficients between the Gaussian fields of two
+        properties, mode by mode. Example: ``{("strength",
+        "residual_strength"): 0.8}``. In a study file, write
+        ``correlation.strength.residual_strength = 0.8``. Other pairs
+        are independent.
     between : mapping, optional
         Marginals of positive factors with mean 1 that are constant along a
         specimen and differ from specimen to specimen: ``{"strength":
@@ -389,7 +401,8 @@ class RandomInterface:
                     f"between.{name}: scatters between specimens, but {name}.given was measured on"
                     " a single specimen. Leave one of them out"
                 )
-            # The field has the mean of the property, and the factor only scatters about it.
+            # The field has the mean of the property, and the factor
+            # only scatters about it.
             mean, low = marginal.distribution.mean(), marginal.distribution.support()[0]
             if low < -1e-12 or abs(float(mean) - 1.0) > 1e-6:
                 problems.append(
@@ -475,9 +488,10 @@ class RandomInterface:
     ) -> Array:
         """Draw independent standard normal numbers for samples `first`, `first` + 1, ....
 
-        Draw j for a property in sample i depends on (seed, property, i, j) only. The
-        result has shape (samples, dimension). It holds the draws for the properties
-        in the order of `names`, and then the draws for `between`.
+        Draw j for a property in sample i depends on (seed, property, i,
+        j) only. The result has shape (samples, dimension). It holds the
+        draws for the properties in the order of `names`, and then the
+        draws for `between`.
         """
         streams = layout(self, interface)
         # Draws, and the profiles that follow from them.
@@ -490,8 +504,8 @@ class RandomInterface:
     def from_draws(self, interface: Interface, draws: RealArray) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles (samples, *shape) by name.
 
-        For a property that is not random, the name is `FACTOR` followed by the
-        property.
+        For a property that is not random, the name is `FACTOR` followed
+        by the property.
         """
         check_draws(draws, self.dimension(interface))
         streams = layout(self, interface)
@@ -503,7 +517,8 @@ class RandomInterface:
         independent = [draws[:, stream.columns] for stream in streams]
         rows = zip(self.properties.items(), streams, lower_factor(self.matrix), strict=False)
         for (name, field), stream, row in rows:
-            # 2. The factor is triangular: only draws of properties up to this one.
+            # 2. The factor is triangular: only draws of properties up
+            # to this one.
             mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
             of_property = np.ascontiguousarray(mixed[:, stream.of_property])
             # 3.
@@ -536,16 +551,16 @@ class RandomInterface:
     ) -> list[RandomInterface]:
         """Return equally likely random interfaces whose parameters have given distributions.
 
-        Pass the list to a failure probability. The parameters are independent.
-        Each parameter has a value in every interval of probability 1/count (a Latin
-        hypercube: McKay and others, 1979).
+        Pass the list to a failure probability. The parameters are
+        independent. Each parameter has a value in every interval of
+        probability 1/count (a Latin hypercube: McKay and others, 1979).
 
         Parameters
         ----------
         parameters : mapping
-            Distributions by dotted key, like the priors of `infer`: frozen
-            `scipy.stats` distributions, ranges (low, high), or tables as in a
-            study file.
+            Distributions by dotted key, like the priors of `infer`:
+            frozen `scipy.stats` distributions, ranges (low, high), or
+            tables as in a study file.
         count : int
             Number of interfaces. 30 are enough for a 90 % band.
         seed : int
@@ -564,7 +579,8 @@ class RandomInterface:
         (30, True)
         """
         laws = uncertain_laws(parameters, "random.")
-        # A value may be invalid together with the others, so the message names all of them.
+        # A value may be invalid together with the others, so the
+        # message names all of them.
         interfaces = []
         for values in hypercube(laws, count, seed):
             where = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())

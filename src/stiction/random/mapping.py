@@ -7,8 +7,9 @@ g(z(x)) with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
-and is needed for millions of z. The quantile F^-1 of scipy is a thousand times too
-slow. If z at a lag has the correlation rho, v at this lag has the correlation
+and is needed for millions of z. The quantile F^-1 of scipy is a
+thousand times too slow. If z at a lag has the correlation rho, v at
+this lag has the correlation
 
     sum_m c_m^2 rho^m / sum_m c_m^2, m >= 1,   c_m = E[g(Z) h_m(Z)],                          (2)
 
@@ -18,13 +19,13 @@ Algorithm of the mapping (`from_normal`): our own
 -------------------------------------------------
 1. Reduce the marginal to scale 1, so that all multiples share a table
    (`_standard`).
-2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4], with slopes
-   by central differences of fourth order. Check every piece at three points, and
-   mark pieces that miss `TABLE_RTOL`, for example at a kink of the density
-   (`quantile_table`).
-3. Interpolate (`interpolate`). Values of z outside the table, or on a marked piece,
-   use a second table for [-8, 8]. scipy computes the values that this table does
-   not cover.
+2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4],
+   with slopes by central differences of fourth order. Check every piece
+   at three points, and mark pieces that miss `TABLE_RTOL`, for example
+   at a kink of the density (`quantile_table`).
+3. Interpolate (`interpolate`). Values of z outside the table, or on a
+   marked piece, use a second table for [-8, 8]. scipy computes the
+   values that this table does not cover.
 
 The relative error is at most 1e-9, or the absolute error 1e-15 standard
 deviations.
@@ -33,10 +34,10 @@ Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------
 4. Compute c_m of (2) with the trapezoidal rule on [-8, 8], and the polynomials with
    their recursion.
-5. Stop after at least `MIN_TERMS` terms, when the remaining share of the variance
-   is small.
-6. Append a coefficient for the remaining variance, so that the correlation is 1 at
-   zero lag.
+5. Stop after at least `MIN_TERMS` terms, when the remaining share of
+   the variance is small.
+6. Append a coefficient for the remaining variance, so that the
+   correlation is 1 at zero lag.
 """
 
 from functools import lru_cache
@@ -62,13 +63,14 @@ MAX_REST = 1e-6  # share of the variance for which the last coefficient may stan
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
     """Compute F^-1(Phi(z)) for a frozen scipy.stats distribution (Grigoriu, 1995).
 
-    Phi(z) loses its digits as it approaches 1, and rounds to 1 near z = 8.3. The upper tail
-    therefore uses Phi(-z), which keeps its digits if scipy inverts the survival function of the
-    family directly.
+    Phi(z) loses its digits as it approaches 1, and rounds to 1 near z =
+    8.3. The upper tail therefore uses Phi(-z), which keeps its digits
+    if scipy inverts the survival function of the family directly.
     """
     tail, lower, value = ndtr(-np.abs(z)), z < 0.0, np.empty_like(z)
     value[lower], value[~lower] = distribution.ppf(tail[lower]), distribution.isf(tail[~lower])
-    # scipy's beta.isf may be NaN if the value equals its upper end to round-off.
+    # scipy's beta.isf may be NaN if the value
+    # equals its upper end to round-off.
     return np.where(np.isnan(value) & (z > TABLE_END), distribution.support()[1], value)
 
 
@@ -105,8 +107,9 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
 def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     """Step 2: return an array (nodes, 2) with values of the mapping, and slopes times the step.
 
-    The slopes of a marked piece are NaN. Most tables take 32 KiB, so that the cache
-    can hold the tables of many equally likely interfaces.
+    The slopes of a marked piece are NaN. Most
+    tables take 32 KiB, so that the cache can hold
+    the tables of many equally likely interfaces.
     """
     distribution = marginal.distribution
     step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * end * PIECES_PER_UNIT)
@@ -118,8 +121,8 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     checks = z[2:-3, None] + step * np.array([0.25, 0.5, 0.75])
     exact = quantile_of_normal(distribution, checks)
     interpolated = np.empty(checks.size)
-    # Read-only arrays have another type for numba: check with the type of later
-    # calls.
+    # Read-only arrays have another type for numba: check with the type
+    # of later calls.
     table.flags.writeable = False
     interpolate(checks.ravel(), table, interpolated)
     # Errors are relative to the value, but not at its zero crossing.
@@ -127,7 +130,8 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
     wrong = ~(np.abs(interpolated.reshape(checks.shape) - exact) <= TABLE_RTOL * scale).all(
         axis=1
     )
-    # A NaN slope marks the piece, and the piece before it, which shares the node.
+    # A NaN slope marks the piece, and the
+    # piece before it, which shares the node.
     result = table.copy()
     result[:-1][wrong, 1] = np.nan
     result.flags.writeable = False
@@ -171,9 +175,9 @@ class Standard(NamedTuple):
 def _standard(marginal: Any) -> tuple[Any, float, float]:
     """Step 1: return the marginal at scale 1, and the lower bound and scale of the given marginal.
 
-    Shapes are rounded to 12 digits, because the shapes of multiples differ by
-    round-off. A marginal with a lower bound below zero has its own table, because
-    subtraction would magnify the relative error.
+    Shapes are rounded to 12 digits, because the shapes of multiples
+    differ by round-off. A marginal with a lower bound below zero has
+    its own table, because subtraction would magnify the relative error.
     """
     family = marginal.scipy_family
     if family is None or marginal.low < 0.0:
@@ -188,10 +192,11 @@ def hermite_coefficients(
 ) -> Array:
     """Return c_m = E[F^-1(Phi(Z)) h_m(Z)] for the orthonormal Hermite polynomials h_0, h_1, ...
 
-    c_0 is the mean, and the sum of the squares of all other coefficients is the variance (Grigoriu,
-    1995). The steps are fine enough for kinks in the mapping. The last coefficient accounts
-    for the remaining variance. Raises an `InputError` if the quantile and the moments of
-    scipy disagree.
+    c_0 is the mean, and the sum of the squares of all other
+    coefficients is the variance (Grigoriu, 1995). The steps are fine
+    enough for kinks in the mapping. The last coefficient accounts for
+    the remaining variance. Raises an `InputError` if the quantile and
+    the moments of scipy disagree.
     """
     distribution, half = marginal.distribution, round(TABLE_END / step)
     z = np.arange(-half, half + 1) * step
@@ -199,7 +204,8 @@ def hermite_coefficients(
     mean, variance = float(distribution.mean()), float(distribution.var())
     if not variance > 0.0:
         raise InputError("marginal: its standard deviation is zero in double precision")
-    # 4. Both factors hold the square root of the weight, so that neither overflows.
+    # 4. Both factors hold the square root of the weight, so that
+    # neither overflows.
     root = np.sqrt(step / np.sqrt(2.0 * np.pi)) * np.exp(-0.25 * z * z)
     value = (quantile_of_normal(distribution, z) - mean) * root
     coefficients, rest = [mean], variance
@@ -213,8 +219,8 @@ def hermite_coefficients(
             break
         following = (z * current - np.sqrt(m) * previous) / np.sqrt(m + 1.0)
         previous, current = current, following
-    # A negative rest above round-off and the error of the rule shows inconsistent
-    # moments.
+    # A negative rest above round-off and the error of the rule shows
+    # inconsistent moments.
     if not rest > -max(MAX_REST, step**2) * variance:
         raise InputError("marginal: scipy's quantile of this distribution is inaccurate")
     # 6.

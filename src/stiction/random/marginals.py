@@ -1,8 +1,8 @@
 """Marginals: distributions of a property at a point.
 
-To add a family, write a subclass of `Marginal`, define `distribution`, and
-`register` the class. Study files also accept every continuous distribution of
-`scipy.stats` by its name.
+To add a family, write a subclass of `Marginal`, define `distribution`,
+and `register` the class. Study files also accept every continuous
+distribution of `scipy.stats` by its name.
 """
 
 import math
@@ -30,10 +30,11 @@ Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 class Marginal(ABC):
     """Base class of marginals.
 
-    A class may also define ``of_normal(z)``, which returns F^-1(Phi(z)) in closed
-    form and replaces the tables in `mapping`. Marginals of the class share tables if
-    `scipy_family` is their family in scipy, and `distribution` is this family with
-    shapes, `low` and scale in this order.
+    A class may also define ``of_normal(z)``, which returns
+    F^-1(Phi(z)) in closed form and replaces the tables in
+    `mapping`. Marginals of the class share tables if
+    `scipy_family` is their family in scipy, and `distribution`
+    is this family with shapes, `low` and scale in this order.
     """
 
     family: ClassVar[str] = "marginals"
@@ -69,8 +70,8 @@ def _frozen_once(family: Any) -> Any:
 def frozen(family: Any, *args: float) -> Any:
     """Return a frozen distribution from a family in scipy, with given shapes, loc and scale.
 
-    scipy generates the documentation of each new frozen distribution, which takes a
-    millisecond. A copy shares the documentation.
+    scipy generates the documentation of each new frozen distribution,
+    which takes a millisecond. A copy shares the documentation.
     """
     distribution = copy(_frozen_once(family))
     distribution.args = args
@@ -144,7 +145,8 @@ class _ByMoments(Marginal):
 
     @cached_property
     def distribution(self) -> Any:
-        # Above the lower bound, the family has this mean and this ratio of deviation to mean.
+        # Above the lower bound, the family has this mean and this ratio
+        # of deviation to mean.
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
         return frozen(self.scipy_family, shape, self.low, above / mean_over_scale)
@@ -158,8 +160,8 @@ class Lognormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field, above `low`, and coefficient of variation (standard
-        deviation / mean).
+        Mean of the field, above `low`, and coefficient of variation
+        (standard deviation / mean).
     low : float
         Lower bound, by default 0.
 
@@ -200,8 +202,9 @@ class Weibull(_ByMoments):
             spread = gammaln(1.0 + 2.0 * inverse) - 2.0 * gammaln(1.0 + inverse)
             return float(math.expm1(spread)) - ratio**2
 
-        # The ratio falls from 10 to 0.001 as the shape rises from 0.2 to 1300.
-        # The search is in the logarithm, as the shape ranges over four decades.
+        # The ratio falls from 10 to 0.001 as the shape rises from 0.2
+        # to 1300. The search is in the logarithm, as the shape ranges
+        # over four decades.
         shape = math.exp(brentq(excess, math.log(0.15), math.log(2e3), xtol=1e-14))
         return shape, math.exp(gammaln(1.0 + 1.0 / shape))
 
@@ -226,9 +229,10 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and coefficient of variation (standard deviation /
-        mean), both after truncation. The scatter must be below the scatter of an
-        exponential distribution or, with two bounds, of a uniform distribution.
+        Mean of the field and coefficient of variation (standard
+        deviation / mean), both after truncation. The scatter must be
+        below the scatter of an exponential distribution or, with two
+        bounds, of a uniform distribution.
     low, high : float, optional
         Bounds, by default 0 and no upper bound.
 
@@ -247,7 +251,8 @@ class TruncatedNormal(_ByMoments):
     def distribution(self) -> Any:
         deviation, high = self.cv * self.mean, math.inf if self.high is None else self.high
 
-        # Both unknowns are of order one: the shift in deviations, and the log of the width.
+        # Both unknowns are of order one: the shift in deviations, and
+        # the log of the width.
         def parameters(guess: Any) -> tuple[float, float, float, float]:
             centre = self.mean + deviation * float(guess[0])
             width = deviation * math.exp(float(guess[1]))
@@ -276,8 +281,8 @@ class TruncatedNormal(_ByMoments):
 class ScipyMarginal(Marginal):
     """Continuous `scipy.stats` distribution, given by its name and parameters.
 
-    A distribution without a name in scipy is kept `frozen`. It cannot be written to a
-    study file, and it equals only itself.
+    A distribution without a name in scipy is kept `frozen`. It cannot
+    be written to a study file, and it equals only itself.
     """
 
     type: str
@@ -312,8 +317,8 @@ FACTOR_FAMILIES: dict[str, Any] = {
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
     """Return the names of parameters that only shift or scale a marginal, with shift a and scale b.
 
-    The distribution of (tau_p - a)/b does not depend on these parameters. a and b are linear in
-    them.
+    The distribution of (tau_p - a)/b does not depend on these
+    parameters. a and b are linear in them.
     """
     if isinstance(marginal, Beta):
         return ("low", "high"), marginal.low, marginal.high - marginal.low

@@ -10,11 +10,12 @@ the spectral density g(k) and the truncation K, the amplitudes have the variance
 Algorithm (`make_modes`)
 ------------------------
 1. List candidate wave vectors, either k or -k, in an order that depends only on the
-   proportions of the interface. The position of a mode in this order selects its
-   draws (`_numbers`).
+   proportions of the interface. The position of a mode in this order
+   selects its draws (`_numbers`).
 2. Keep the wave vectors up to the truncation.
-3. Compute (1). The mean mode k = 0 is a single wave vector, and every other mode
-   stands for k and -k. The mean mode therefore takes half of g(0).
+3. Compute (1). The mean mode k = 0 is a single wave
+   vector, and every other mode stands for k and -k.
+   The mean mode therefore takes half of g(0).
 """
 
 import math
@@ -39,10 +40,11 @@ class Modes:
     """Modes of a field on an interface: the mean mode, followed by J modes."""
 
     interface: Interface
-    # Standard deviations, (J + 1,), with unit sum of squares; the first is 0
-    # without a mean mode.
+    # Standard deviations, (J + 1,), with unit sum of squares; the first
+    # is 0 without a mean mode.
     sigma: Array
-    # Wave vectors in units of 2 pi/length, (dimensions, J + 1), either k or -k.
+    # Wave vectors in units of 2 pi/length,
+    # (dimensions, J + 1), either k or -k.
     numbers: NDArray[np.int64]
     ranks: NDArray[np.int64]  # places of modes 1..J in the order of draws, rising, (J,)
     has_mean: bool
@@ -71,8 +73,8 @@ class Modes:
     def gaussian(self, draws: Array) -> Array:
         """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x) as (samples, *shape).
 
-        Each sample has its own inverse transform, so that the result does not depend
-        on the batch.
+        Each sample has its own inverse transform, so that the result
+        does not depend on the batch.
         """
         numbers, shape = self.numbers, self.interface.embedding.shape
         if len(shape) == 1:
@@ -116,9 +118,9 @@ def make_modes(
 ) -> Modes:
     """Return the modes of a spectrum. Raise an `InputError` if there are too many or no modes.
 
-    A field on a specimen is half of a periodic field that is twice as long. With this
-    period, the correlation at lags along the specimen is the same as on an infinite
-    interface.
+    A field on a specimen is half of a periodic field that is twice as
+    long. With this period, the correlation at lags along the specimen
+    is the same as on an infinite interface.
     """
     placed_on, interface = interface, interface.embedding
     dimensions = len(interface.shape)
@@ -141,7 +143,8 @@ def make_modes(
     power = np.zeros(kept.size)
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
     if mean_mode:
-        # A mode j >= 1 stands for k and -k, the mean mode for a single wave vector.
+        # A mode j >= 1 stands for k and -k, the mean mode for a single
+        # wave vector.
         power[0] = 0.5 * float(np.ravel(spectrum.density(np.zeros(1), dimensions))[0])
     total = power.sum()
     if not (0.0 < total < np.inf and power.min() >= 0.0):
@@ -158,9 +161,10 @@ def make_modes(
 def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     """Step 1: return candidate wave vectors in units of 2 pi/length, in the order of draws.
 
-    `largest` is the cutoff along each axis, in the same units. On a plane the order follows growing
-    rectangles with the proportions of the interface, so that the draws of a mode depend on neither
-    the spectrum nor the grid.
+    `largest` is the cutoff along each axis, in the same units. On a
+    plane the order follows growing rectangles with the proportions of
+    the interface, so that the draws of a mode depend on neither the
+    spectrum nor the grid.
     """
     if largest.size == 1:
         _refuse_too_many(largest[0])

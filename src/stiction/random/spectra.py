@@ -4,18 +4,19 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-with the truncation K. Samples have the truncated spectrum, so correlations and
-lengths also refer to the truncated spectrum.
+with the truncation K. Samples have the truncated spectrum, so
+correlations and lengths also refer to the truncated spectrum.
 
-1. Integrate (1) octave by octave, because densities span decades, with QUADPACK's
-   rule for a cosine (R. Piessens, E. de Doncker-Kapenga, C. Ueberhuber and D.
-   Kahaner, QUADPACK, 1983) (`_integrate`).
-2. Find the length at which the correlation falls to 1/e by marching and a search
-   (`lag_of_correlation`).
+1. Integrate (1) octave by octave, because densities span decades, with
+   QUADPACK's rule for a cosine (R. Piessens, E. de Doncker-Kapenga, C.
+   Ueberhuber and D. Kahaner, QUADPACK, 1983) (`_integrate`).
+2. Find the length at which the correlation falls to 1/e by marching and
+   a search (`lag_of_correlation`).
 
-On a plane the field is isotropic, and along any straight line it has the same
-correlation as a field on a line. Therefore, in D dimensions the exponent of 1 + k^2
-grows by (D - 1)/2, and a Gaussian keeps its form.
+On a plane the field is isotropic, and along any
+straight line it has the same correlation as a field on
+a line. Therefore, in D dimensions the exponent of 1 +
+k^2 grows by (D - 1)/2, and a Gaussian keeps its form.
 
 To add a spectrum, write a subclass of `ScaledSpectrum` and `register` it.
 """
@@ -88,7 +89,8 @@ def _integrate(
 ) -> float:
     """Step 1: return the integral of g(k) k^order cos(k lag) over all pieces (QUADPACK's QAWO).
 
-    The tolerance is 1e-12 of `power`, or of each piece if `power` is not known.
+    The tolerance is 1e-12 of `power`, or
+    of each piece if `power` is not known.
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {"epsabs": INTEGRAL_RTOL * power, "epsrel": INTEGRAL_RTOL}
@@ -98,7 +100,8 @@ def _integrate(
         return float(spectrum.density(np.array([k]))[0]) * k**order
 
     pieces = [quad(density, a, b, **options)[:2] for a, b in itertools.pairwise(edges)]
-    # QUADPACK estimates the error of each piece. Their sum bounds the error of the integral.
+    # QUADPACK estimates the error of each piece. Their sum bounds the
+    # error of the integral.
     integrals, errors = np.array(pieces).T
     if not errors.sum() <= MAX_INTEGRAL_ERROR * (power or np.abs(integrals).sum()):
         raise InputError(
@@ -112,7 +115,8 @@ def _integrate(
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
     """Return the ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
     scale, end = spectrum.scale, spectrum.cutoff()
-    # From half the scale on, each piece ends at twice the wavenumber of the piece before.
+    # From half the scale on, each piece ends at twice the wavenumber of
+    # the piece before.
     octaves = scale * np.exp2(np.arange(-1, 1 + max(0, math.log2(end / scale))))
     edges = np.concatenate(([0.0], octaves[octaves < end], [end]))
     return edges, _integrate(spectrum, edges)
@@ -121,10 +125,10 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
     """Step 2: return the first lag (m) at which the correlation on a line falls to `target`."""
-    # The slope of the correlation is at most the mean wavenumber. Between lags
-    # that are close against the root mean square of the wavelengths, it is nearly
-    # straight. March in such steps until it is below the target, then search
-    # between the last two lags.
+    # The slope of the correlation is at most the mean wavenumber.
+    # Between lags that are close against the root mean square of the
+    # wavelengths, it is nearly straight. March in such steps until it
+    # is below the target, then search between the last two lags.
     edges, power = _truncated(spectrum)
     slope = _integrate(spectrum, edges, order=1) / power
     step = 0.25 * math.sqrt(power / _integrate(spectrum, edges, order=2))
@@ -148,9 +152,9 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
 class ScaledSpectrum(SpectralDensity):
     """Base class for spectra with a single length: g depends only on k times this length.
 
-    A subclass defines `density`, `power_within`, its inverse `quantile`, and
-    `untruncated_correlation`. `stiction.fit_field` uses the latter to find the
-    correlation length.
+    A subclass defines `density`, `power_within`, its inverse
+    `quantile`, and `untruncated_correlation`. `stiction.fit_field` uses
+    the latter to find the correlation length.
     """
 
     correlation_length: Magnitude
@@ -189,7 +193,8 @@ class ScaledSpectrum(SpectralDensity):
 
     @property
     def efolding_length(self) -> float:
-        # Search once for each shape, as a sweep may hold a hundred thousand lengths.
+        # Search once for each shape, as a sweep may hold a hundred
+        # thousand lengths.
         unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
@@ -214,8 +219,8 @@ class _PowerOfWavenumber(ScaledSpectrum):
         return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        # The complement 1 - t of the incomplete beta function avoids cancellation
-        # for t near 1.
+        # The complement 1 - t of the incomplete beta function avoids
+        # cancellation for t near 1.
         complement = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - complement) / complement)
 
@@ -232,9 +237,9 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     exponent : float
         Exponent in [0.6, 64], 4 in Albertini et al. (2020, Eq. 4).
     truncation : float, optional
-        Truncation in multiples of lambda. By default it retains 0.99969 of the power
-        on a line, but it is at least 2.5. It is 2.5 for the exponent 4 (as in the
-        paper), 11 for 2 and 2,100 for 1.
+        Truncation in multiples of lambda. By default it retains 0.99969
+        of the power on a line, but it is at least 2.5. It is 2.5 for
+        the exponent 4 (as in the paper), 11 for 2 and 2,100 for 1.
     power_kept : float, optional
         Share of the power retained by truncation, in (0, 1).
 
@@ -271,7 +276,8 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         with np.errstate(divide="ignore", invalid="ignore"):
             log_value = (1.0 - order) * math.log(2.0) - gammaln(order) + order * np.log(a)
             log_value = log_value + np.log(kve(order, a)) - a
-        # If the Bessel function overflows, a is so small that the correlation is 1.
+        # If the Bessel function overflows, a is so small that the
+        # correlation is 1.
         return np.where(np.isfinite(log_value) & (a > 0.0), np.exp(log_value), 1.0)
 
 
@@ -283,11 +289,11 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     Parameters
     ----------
     correlation_length : float
-        Correlation length xi_0, m, at which the correlation of z is 1/e without
-        truncation.
+        Correlation length xi_0, m, at which the correlation of z is 1/e
+        without truncation.
     truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or share of the power to retain, by
-        default 0.9997.
+        Truncation in multiples of 2 pi/xi_0, or share of the power to
+        retain, by default 0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
@@ -312,9 +318,9 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
 class ExponentialSpectrum(_PowerOfWavenumber):
     """Spectrum for the correlation exp(-|x|/xi_0), a rough field: g(k) ~ 1/(1 + (k xi_0)^2).
 
-    The parameters are the same as for `SquaredExponentialSpectrum`. By default 0.99
-    of the power is retained, because every further digit 9 takes ten times as many
-    modes.
+    The parameters are the same as for `SquaredExponentialSpectrum`. By
+    default 0.99 of the power is retained, because every further digit 9
+    takes ten times as many modes.
     """
 
     type: Literal["exponential"] = "exponential"
@@ -336,9 +342,9 @@ class CustomSpectrum(SpectralDensity):
     Parameters
     ----------
     function : callable
-        g(k), which takes an array of wavenumbers (rad/m) and returns an array without
-        negative values. On a plane, g(k) is the density at wave vectors with length
-        k.
+        g(k), which takes an array of wavenumbers (rad/m) and returns an
+        array without negative values. On a plane, g(k) is the density
+        at wave vectors with length k.
     max_wavenumber : float
         Truncation, rad/m.
     """

@@ -1,15 +1,15 @@
 """Random properties as stresses. Friction coefficients are multiplied by the pressure.
 
-`share_below_residual` estimates the share of the strength that does not exceed the
-residual strength. The algorithm is our own:
+`share_below_residual` estimates the share of the strength that does not
+exceed the residual strength. The algorithm is our own:
 
 1. Replace the residual strength by equally likely values.
-2. Some factors apply to only one of the two strengths: factors between specimens,
-   and the pressure if one strength is a coefficient. Multiply or divide by equally
-   likely values of each such factor.
-3. Average the distribution function of the strength over these values. If the two
-   strengths are correlated, take the distribution of the strength given the
-   residual strength.
+2. Some factors apply to only one of the two strengths: factors between
+   specimens, and the pressure if one strength is a coefficient.
+   Multiply or divide by equally likely values of each such factor.
+3. Average the distribution function of the strength over these values.
+   If the two strengths are correlated, take the distribution of the
+   strength given the residual strength.
 """
 
 import math
@@ -24,11 +24,11 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.problem import Problem
 from stiction.random.fields import FACTOR, RandomInterface
 
-# Shares of the strength at or below the residual strength: the largest without a
-# warning, and the largest that is accepted.
+# Shares of the strength at or below the residual strength: the largest
+# without a warning, and the largest that is accepted.
 MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
-# Numbers of equally likely values of a random residual strength, and of a
-# pressure or factor.
+# Numbers of equally likely values of a random residual strength, and of
+# a pressure or factor.
 RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
 
 
@@ -60,12 +60,14 @@ def profiles_in_stress(
 ) -> dict[str, Array]:
     """Return sampled profiles with coefficients multiplied by the pressure at each node.
 
-    A sampled pressure is multiplied by the pressure profile between glued blocks.
-    Constants in the problem are multiplied by their factors between specimens.
+    A sampled pressure is multiplied by the pressure profile between
+    glued blocks. Constants in the problem are multiplied by their
+    factors between specimens.
     """
     stresses = {name: rows for name, rows in profiles.items() if not name.startswith(FACTOR)}
     factors = {name: rows for name, rows in profiles.items() if name.startswith(FACTOR)}
-    # A pressure is random itself, or the pressure of the problem times a random factor.
+    # A pressure is random itself, or the pressure of the problem times
+    # a random factor.
     pressure = problem.normal_pressure
     if "normal_pressure" in stresses:
         pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * problem.pressing
@@ -84,8 +86,8 @@ def support_in_stress(
 ) -> tuple[float, float]:
     """Return the lower and upper bound of a property, Pa, including its factor between specimens.
 
-    If `chance` is positive, the bounds are quantiles: each random part lies beyond them with this
-    probability on either side.
+    If `chance` is positive, the bounds are quantiles: each random part
+    lies beyond them with this probability on either side.
     """
     field, between = random.properties.get(name), random.between or {}
 
@@ -140,7 +142,8 @@ def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> floa
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:
     """Return the probability that the strength at a point is not above the residual strength.
 
-    Properties are assumed to be independent, except strength and residual strength.
+    Properties are assumed to be independent, except strength and
+    residual strength.
     """
     fields, between = random.properties, random.between or {}
     pressed = coefficients_of(random)
@@ -169,7 +172,8 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 def check_residual(problem: Problem, random: RandomInterface) -> None:
     """Warn if a share of the strength above 1e-6 does not exceed the residual strength.
 
-    Nodes with such a strength do not weaken. A share above a half raises an `InputError`.
+    Nodes with such a strength do not weaken. A share above a half
+    raises an `InputError`.
     """
     share = share_below_residual(problem, random)
     if share <= MAX_SILENT_SHARE:

@@ -7,27 +7,28 @@ Mechanics Reviews 44, 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. Sample i must depend only on the seed and i.
-Within a sample, a draw must depend only on its property and mode, not on the batch,
-the number of workers, the spectrum or the grid.
+with standard normal A_j and B_j. Sample i must depend only on the seed
+and i. Within a sample, a draw must depend only on its property and
+mode, not on the batch, the number of workers, the spectrum or the grid.
 
 Draws (`Stream.draw`)
 ---------------------
 1. On a line, 256 samples form a block that shares a generator, because a generator
-   for each sample would cost more than the sample. On a plane, a sample has so many
-   modes that it forms a block by itself. The generator depends on the seed, the
-   property and the number of the block.
-2. Inside a block the draws follow mode after mode, with A_j before B_j, so that a
-   spectrum with more modes extends the same field. Draws of modes outside the
-   spectrum are dropped.
+   for each sample would cost more than the sample. On a plane, a sample
+   has so many modes that it forms a block by itself. The generator
+   depends on the seed, the property and the number of the block.
+2. Inside a block the draws follow mode after mode, with A_j before B_j,
+   so that a spectrum with more modes extends the same field. Draws of
+   modes outside the spectrum are dropped.
 
 Field (`synthesise`)
 --------------------
 3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k,
-   into the half of the wave vectors that a real transform holds. Fold unresolved
-   modes onto resolved modes, so that values at the nodes are exact on any grid.
-4. Transform back, sample by sample, so that the numbers do not depend on the
-   batch.
+   into the half of the wave vectors that a real transform holds. Fold
+   unresolved modes onto resolved modes, so that values at the nodes are
+   exact on any grid.
+4. Transform back, sample by sample, so that the numbers do not depend
+   on the batch.
 """
 
 from functools import lru_cache, reduce
@@ -78,7 +79,8 @@ class Stream(NamedTuple):
             place = (self.number, number, block)[: 2 if block == SAMPLES_PER_BLOCK else 3]
             key = np.random.SeedSequence(entropy=seed, spawn_key=place)
             generator = np.random.Generator(np.random.PCG64DXSM(key))
-            # 2. Draw A_j and B_j of all modes, and keep the modes of the spectrum.
+            # 2. Draw A_j and B_j of all modes, and keep the modes of
+            # the spectrum.
             rows = generator.standard_normal((2 * (modes + 1), block))
             draws[done : done + count] = rows[kept, offset : offset + count].T
             done += count

@@ -8,7 +8,8 @@ with standard normal w. The exact posterior of w has a density proportional to
 
     N(w) prod_k r_k(z_k),                                                                     (1)
 
-where r_k is the likelihood of value k divided by the Gaussian that replaced it.
+where r_k is the likelihood of value k divided by the Gaussian that
+replaced it.
 
 Algorithm
 ---------
@@ -19,34 +20,37 @@ of e_j is, up to a constant,
 
     p(e_j | e_1, ..., e_j-1) = N(e_j) prod_k E[r_k(z_k) | e_1, ..., e_j].                     (2)
 
-Here e_1, ..., e_j-1 are moved already. The mean E is taken over w orthogonal to
-u_1, ..., u_j. Equation (2) treats places as independent given e_1 to e_j (B. Cseke
-and T. Heskes, Journal of Machine Learning Research 12, 2011). It is exact for a
-single place, for independent places if each has its direction, and for places that
-all measure the same number.
+Here e_1, ..., e_j-1 are moved already. The mean E is taken over w
+orthogonal to u_1, ..., u_j. Equation (2) treats places as independent
+given e_1 to e_j (B. Cseke and T. Heskes, Journal of Machine Learning
+Research 12, 2011). It is exact for a single place, for independent
+places if each has its direction, and for places that all measure the
+same number.
 
 Preparation (`make_transport`):
 
-1. Expand log r_k in Hermite polynomials of the standardised z_k. The norm of the
-   coefficients measures the departure from the Gaussian at a place. Ignore the
-   places with the smallest norms, which together stay below `IGNORED_TOTAL`.
-2. Choose the directions greedily. The candidates are the a_k of the places that
-   differ most from the Gaussian, made orthogonal to the directions chosen before.
-   Choose the candidate on which the expansions of all places together have the
-   largest projection.
-3. Tabulate the factors of (2) along each direction. A place that depends noticeably
-   on the coordinates before has its own table, over its mean given e_1 to e_j. The
-   other places share a table over e_j, with the coordinates before at zero.
-4. Estimate the remaining error: map samples, weight them by (1) divided by their
-   density, and compare weighted and plain moments of z.
+1. Expand log r_k in Hermite polynomials of the standardised z_k. The
+   norm of the coefficients measures the departure from the Gaussian at
+   a place. Ignore the places with the smallest norms, which together
+   stay below `IGNORED_TOTAL`.
+2. Choose the directions greedily. The candidates are the a_k of the
+   places that differ most from the Gaussian, made orthogonal to the
+   directions chosen before. Choose the candidate on which the
+   expansions of all places together have the largest projection.
+3. Tabulate the factors of (2) along each direction. A place that
+   depends noticeably on the coordinates before has its own table, over
+   its mean given e_1 to e_j. The other places share a table over e_j,
+   with the coordinates before at zero.
+4. Estimate the remaining error: map samples, weight them by (1) divided
+   by their density, and compare weighted and plain moments of z.
 
 Mapping of a draw (`transport`), for each direction in turn:
 
 5. Add the tables on a grid of e_j, which gives the logarithm of (2).
-6. Integrate the density over each cell, with a logarithm that is linear in the
-   cell.
-7. Find the quantile, starting from the nearer end so that tails keep their digits.
-   Move w along u_j to this quantile.
+6. Integrate the density over each cell, with a logarithm that is linear
+   in the cell.
+7. Find the quantile, starting from the nearer end so that tails keep
+   their digits. Move w along u_j to this quantile.
 """
 
 import math
@@ -92,9 +96,9 @@ LogRatio = Callable[[NDArray[np.int64], Array], Array]
 class Transport(NamedTuple):
     """Directions, and tables for the logarithm of (2) along them, without the factor N(e_j).
 
-    The fields are the first arguments of `transport`, in this order. The caller may express
-    `basis` in other coordinates of the draws: `conditioning` does, since its draws are not
-    whitened.
+    The fields are the first arguments of `transport`, in this order.
+    The caller may express `basis` in other coordinates of the draws:
+    `conditioning` does, since its draws are not whitened.
     """
 
     basis: Array  # (directions, dimension): u_j
@@ -131,8 +135,8 @@ def make_transport(
 
     mean, slopes, coefficients = mean[kept], slopes[kept], coefficients[:, kept]
     basis = _choose_directions(coefficients, slopes / deviation[kept, None])
-    # If log r_k is linear in z_k, earlier coordinates only multiply (2) by a
-    # constant.
+    # If log r_k is linear in z_k, earlier coordinates only multiply (2)
+    # by a constant.
     nonlinearity = np.linalg.norm(coefficients[1:], axis=0)
     tables = _tabulate(log_ratio_of_kept, mean, slopes, basis, nonlinearity)
     if not kept.size:
@@ -146,9 +150,9 @@ def _hermite(log_ratio: LogRatio, mean: Array, deviation: Array) -> Array:
     value = log_ratio(np.arange(mean.size), mean[:, None] + deviation[:, None] * x)
     weight = np.exp(-0.5 * x**2)
     weight /= weight.sum()
-    # Points without a quantile have a log r_k so low that they would decide a
-    # mean over all points. They do not affect the median within a standard
-    # deviation.
+    # Points without a quantile have a log r_k so low that they would
+    # decide a mean over all points. They do not affect the median
+    # within a standard deviation.
     typical = np.median(value[:, np.abs(x) <= 1.0], axis=1)
     value = (value - typical[:, None]).clip(-MAX_LOG_RATIO, MAX_LOG_RATIO)
     coefficients, previous, current = [], np.zeros_like(x), np.ones_like(x)
@@ -169,8 +173,8 @@ def _choose_directions(coefficients: Array, unit: Array) -> Array:
         candidates = unspanned[norm > MIN_UNSPANNED] / norm[norm > MIN_UNSPANNED, None]
         if not candidates.size:
             break
-        # Along a unit vector u, polynomial n of z_k keeps the share (u'a_k /
-        # |a_k|)**n.
+        # Along a unit vector u, polynomial n of z_k keeps the share
+        # (u'a_k / |a_k|)**n.
         cosine = candidates @ unit.T
         power, squared_gain = np.ones_like(cosine), np.zeros(len(candidates))
         for coefficient in coefficients:
@@ -274,8 +278,8 @@ def transport(
 ) -> None:
     """Map each row of `draws`, with shape (rows, dimension), in place.
 
-    Add the log density of the coordinates e, up to a constant, to `log_density`
-    (rows,).
+    Add the log density of the coordinates e, up to a constant, to
+    `log_density` (rows,).
     """
     n_directions, dimension = basis.shape
     n_cells, n_table = shared_table.shape[1] - 1, own_tables.shape[2] - 1
@@ -288,7 +292,8 @@ def transport(
             for d in range(dimension):
                 drawn += basis[j, d] * draws[row, d]
 
-            # 5. The logarithm of (2) on the grid of e_j: the tables, then the factor N(e_j).
+            # 5. The logarithm of (2) on the grid of e_j: the tables,
+            # then the factor N(e_j).
             for g in range(n_cells + 1):
                 log_p[g] = shared_table[j, g]
             for slot in range(n_dependent[j]):
@@ -301,7 +306,8 @@ def transport(
                     position = offset + slope * (g * width - E_MAX)
                     cell = int(min(max(position, 0.0), n_table - 1.0))
                     value = own_tables[j, slot, cell]
-                    # Linear within the cell, and beyond the ends of the table.
+                    # Linear within the cell, and
+                    # beyond the ends of the table.
                     log_p[g] += value + (position - cell) * (
                         own_tables[j, slot, cell + 1] - value
                     )
@@ -310,7 +316,8 @@ def transport(
                 log_p[g] -= 0.5 * (g * width - E_MAX) ** 2
                 highest = max(highest, log_p[g])
 
-            # 6. The mass of each cell, divided by its width and by exp(highest).
+            # 6. The mass of each cell, divided by its width and by
+            # exp(highest).
             total = 0.0
             for g in range(n_cells + 1):
                 log_p[g] = max(log_p[g], highest - MAX_FALL)

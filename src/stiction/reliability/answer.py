@@ -70,71 +70,80 @@ class Answer(Result):
     Attributes
     ----------
     stress, probability : float
-        Stress, Pa, and probability of an onset below this stress. One is given, and
-        the other is estimated.
+        Stress, Pa, and probability of an onset below this stress. One
+        is given, and the other is estimated.
     interval : tuple of float
         95 % confidence interval of the estimated number.
     cv : float
-        Coefficient of variation of the probability: estimated standard error over the
-        estimate. It is infinite without a failure, and zero if the answer is exact.
+        Coefficient of variation of the probability: estimated standard
+        error over the estimate. It is infinite without a failure, and
+        zero if the answer is exact.
     members_cv : float
-        Part of `cv` that arises because a list of equally likely interfaces is only a
-        sample of the interfaces that may be true. The squares of this part and the
+        Part of `cv` that arises because a list of equally
+        likely interfaces is only a sample of the interfaces
+        that may be true. The squares of this part and the
         sampling error add up. 0 for a mixture.
     evaluations, first_stage_evaluations : int
-        Samples solved by the method, and samples solved only by its less expensive
-        first stage.
+        Samples solved by the method, and samples solved only by its
+        less expensive first stage.
     lower_bound, stress_above_bound : float
-        No sample slides below `lower_bound`, Pa, which is minus infinity if unknown.
-        `stress_above_bound` is `stress` minus this bound.
+        No sample slides below `lower_bound`, Pa, which is
+        minus infinity if unknown. `stress_above_bound` is
+        `stress` minus this bound.
     algorithm, reason : str
-        'plain', 'subset', 'two_level' or 'exact' (without samples), and the reason
-        for this choice.
+        'plain', 'subset', 'two_level' or 'exact' (without samples), and
+        the reason for this choice.
     members : (members,) array
-        For a list of equally likely interfaces, the probability for each interface.
-        NaN if fewer than three samples of an interface slide below the stress. Their
-        mean is `probability`, the predictive probability, on which a decision should
-        rest.
+        For a list of equally likely interfaces, the probability for
+        each interface. NaN if fewer than three samples of an interface
+        slide below the stress. Their mean is `probability`, the
+        predictive probability, on which a decision should rest.
     survived : float
-        Share of plain samples in which the event does not happen at any stress.
-        With a stiff machine, an interface may stay stable and carry any load.
+        Share of plain samples in which the event does not happen at any
+        stress. With a stiff machine, an interface may stay stable and
+        carry any load.
     warnings : tuple of str
         Reasons not to trust the answer. Empty if there are no such reasons.
     doubts : tuple of str
         Doubts of the fit or posterior behind the answer.
     normal_pressure, friction_coefficient : float
-        Mean pressure, Pa, and `stress` over it. NaN without a normal pressure.
+        Mean pressure, Pa, and `stress` over
+        it. NaN without a normal pressure.
     area, force : float
-        Area of the interface, m², and `stress` times the area, N. NaN if the area
-        is unknown: give ``Blocks(thickness=...)``, or ``Interface(width=...)``
-        for a line.
+        Area of the interface, m², and `stress` times the area, N. NaN
+        if the area is unknown: give ``Blocks(thickness=...)``, or
+        ``Interface(width=...)`` for a line.
     failing_profiles : xarray.Dataset
-        Given by `failure_probability`: some samples over ('sample', 'x'), drawn from
-        the distribution of failing samples. Variables are `strength` and other random
-        properties, `critical_stress`, `critical_position`, ...
+        Given by `failure_probability`: some samples over ('sample',
+        'x'), drawn from the distribution of failing samples. Variables
+        are `strength` and other random properties, `critical_stress`,
+        `critical_position`, ...
     sensitivities : xarray.Dataset
-        Given by `design_stress`: effects on the design over 'source', the largest
-        first. `low` and `high` are the settings at both ends. `force_at_low` and
-        `force_at_high`, N, and `stress_at_low` and `stress_at_high`, Pa, are the
-        designs there. Attributes ``stress by ...`` hold the stress for each family of
-        the factor between specimens. ``sensitivities.to_dataframe().to_csv(path)``
+        Given by `design_stress`: effects on the design over 'source',
+        the largest first. `low` and `high` are the settings at both
+        ends. `force_at_low` and `force_at_high`, N, and `stress_at_low`
+        and `stress_at_high`, Pa, are the designs there. Attributes
+        ``stress by ...`` hold the stress for each family of the factor
+        between specimens. ``sensitivities.to_dataframe().to_csv(path)``
         writes a file, and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
-        Given by `design_stress` if specimens were counted: stress, Pa, below which 5
-        % of the specimens slide, with this confidence (EN 1990: 75 %). It is a
-        quantile over equally likely interfaces. NaN if specimens were not counted.
+        Given by `design_stress` if specimens were counted: stress, Pa,
+        below which 5 % of the specimens slide, with this confidence (EN
+        1990: 75 %). It is a quantile over equally likely interfaces.
+        NaN if specimens were not counted.
     partial_factor, reliability_index : float
-        `characteristic_stress` over `stress`, and minus the quantile of the normal
-        distribution at the probability.
+        `characteristic_stress` over `stress`, and minus the quantile of
+        the normal distribution at the probability.
     of_stress : bool
-        True if the stress is estimated, as in `design_stress`. False if the
-        probability is.
+        True if the stress is estimated, as in `design_stress`. False if
+        the probability is.
     quantity : str
         First quantity of the printed answer: 'stress', 'force' or
-        'friction_coefficient', as requested. For `design_stress` it is the force
-        if the area is known.
+        'friction_coefficient', as requested. For `design_stress` it is
+        the force if the area is known.
     specimens : int
-        Number of measured specimens behind the scatter between specimens, or 0.
+        Number of measured specimens behind the scatter between
+        specimens, or 0.
     """
 
     stress: float
@@ -165,7 +174,8 @@ class Answer(Result):
     def at(cls, point: TailPoint, doubts: Sequence[str] = (), **more: Any) -> Self:
         """Return the answer at a point of a tail, and issue doubts as warnings.
 
-        `more` contains further attributes, or replaces the attributes of the point.
+        `more` contains further attributes, or replaces the attributes
+        of the point.
         """
         for text in doubts:
             warn_accuracy(text)
@@ -209,11 +219,12 @@ class Answer(Result):
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces, NaN for a single interface.
 
-        The probability is at most the first number for 5 % of the interfaces, and at
-        most the second number for 95 %. More tests make the band narrower. The
-        sampling error of each interface makes the band too wide, and a smaller
-        `target_cv` reduces this error. An end is NaN if `members` is NaN at its rank,
-        which is usual for lists of thousands. Use a list of tens in this case.
+        The probability is at most the first number for 5 % of the
+        interfaces, and at most the second number for 95 %. More tests
+        make the band narrower. The sampling error of each interface
+        makes the band too wide, and a smaller `target_cv` reduces this
+        error. An end is NaN if `members` is NaN at its rank, which is
+        usual for lists of thousands. Use a list of tens in this case.
         `interval` shows the error of the mean.
         """
         return band_of(self.members)
@@ -234,7 +245,8 @@ class Answer(Result):
             over("force", self.area, "N"),
             over("friction coefficient", 1.0 / self.normal_pressure, "1"),
         ]
-        # The requested quantity comes first, and the other number of the answer beside it.
+        # The requested quantity comes first, and the other number of
+        # the answer beside it.
         rows.sort(key=lambda row: row.name != self.quantity.replace("_", " "))
         chance = Row("probability", self.probability, () if ends else self.interval)
         rows.insert(len(rows) if ends else 0, chance)
@@ -337,7 +349,8 @@ def band_of(members: Array) -> tuple[float, float]:
     shares = np.array([0.05, 0.95])
     ends = np.quantile(np.nan_to_num(members), shares)
     zeros, known_from = np.sum(members == 0.0), np.sum(~(members > 0.0))
-    # A quantile lies between the two ranks around it. It is unknown if either is unknown.
+    # A quantile lies between the two ranks around it. It is unknown if
+    # either is unknown.
     ranks = shares * (members.size - 1)
     hidden = (zeros < known_from) & (np.ceil(ranks) >= zeros) & (np.floor(ranks) < known_from)
     low, high = np.where(hidden, math.nan, ends).tolist()
@@ -365,7 +378,8 @@ def prepare(
         problems.append(f"algorithm: 'two_level' is not possible: {reason}")
     if problems:
         raise InputError(problems)
-    # Warnings come after errors: nobody needs a warning about a call that is refused.
+    # Warnings come after errors: nobody needs a warning about a call
+    # that is refused.
     check_fields([experiment])
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return state, max_evaluations or int(
@@ -442,7 +456,8 @@ def with_enough_members(
             return experiment, solution
         meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
-        # A posterior over a list has hardly more different members, however many are drawn.
+        # A posterior over a list has hardly more different members,
+        # however many are drawn.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
             return experiment, solution
         experiment = replace(experiment, random=larger)
@@ -454,7 +469,8 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
     by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
-    # Add up the probabilities of equal interfaces, the largest first. None may be known.
+    # Add up the probabilities of equal interfaces, the largest first.
+    # None may be known.
     members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
@@ -491,8 +507,9 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(point: TailPoint) -> list[str]:
     """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
 
-    These are some of the lowest samples on both sides of the stress. Failures are
-    counted, because in a tail a small change of stress may multiply the probability.
+    These are some of the lowest samples on both sides of the stress.
+    Failures are counted, because in a tail a small change of stress may
+    multiply the probability.
     """
     state, stress = point.state, point.stress
     experiment, (population, near) = state.experiment, point.tail.repetitions[-1].around(stress)
@@ -508,8 +525,9 @@ def exact_doubts(point: TailPoint) -> list[str]:
         fails_exactly = state.by(exact)(population.draws[chosen]) < stress
     fails = population.values[chosen] < stress
     failed, failed_exactly = int(fails.sum()), int(fails_exactly.sum())
-    # If both methods are right on average, the samples that change sides go both ways, and the
-    # difference of the counts has the square root of their number as standard deviation.
+    # If both methods are right on average, the samples that change
+    # sides go both ways, and the difference of the counts has the
+    # square root of their number as standard deviation.
     differing = int(np.sum(fails != fails_exactly))
     if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
         return []

@@ -1,21 +1,22 @@
 """Plain Monte Carlo: count the failures among the samples of the ensemble.
 
-Problem. Estimate P(T < s) from independent samples of the onset T. The coefficient
-of variation must not exceed a target.
+Problem. Estimate P(T < s) from independent samples of the onset T. The
+coefficient of variation must not exceed a target.
 
-Sources. Haldane (1945), Biometrika 33, 222, introduced inverse binomial sampling.
-Girshick, Mosteller and Savage (1946), Annals of Mathematical Statistics 17, 13,
-added limits on the number of samples. The intervals follow Clopper and Pearson
-(1934), Biometrika 26, 404.
+Sources. Haldane (1945), Biometrika 33, 222, introduced inverse binomial
+sampling. Girshick, Mosteller and Savage (1946), Annals of Mathematical
+Statistics 17, 13, added limits on the number of samples. The intervals
+follow Clopper and Pearson (1934), Biometrika 26, 404.
 
 Steps:
 
-1. Fix the number r of failures from the target: the error is proportional to
-   1/sqrt(r - 1). A rule that stopped when the estimate looks precise would favour
-   early failures.
+1. Fix the number r of failures from the target: the error is
+   proportional to 1/sqrt(r - 1). A rule that stopped when the estimate
+   looks precise would favour early failures.
 2. Draw samples until there are r failures, within the limits on samples.
-3. If the last failure ended the count, the unbiased estimate is (r - 1)/(n - 1) for n
-   samples up to this failure. Otherwise it is the share of failures.
+3. If the last failure ended the count, the unbiased estimate is (r -
+   1)/(n - 1) for n samples up to this failure. Otherwise it is the
+   share of failures.
 """
 
 import math
@@ -63,8 +64,8 @@ class Counted(NamedTuple):
         last = int(self.until_failure)
         if self.failures <= last:
             return math.inf
-        # If all samples failed, count one more that holds, because no count is
-        # certain.
+        # If all samples failed, count one more that holds, because no
+        # count is certain.
         held = max(1.0 - self.probability, 1.0 / (self.samples + 1.0))
         return math.sqrt(held / (self.failures - last))
 
@@ -72,7 +73,8 @@ class Counted(NamedTuple):
         """Return the interval of Clopper and Pearson, or the negative binomial interval."""
         low, high = binomial_interval(self.failures, self.samples)
         if self.until_failure:
-            # At least n samples before failure r are at most r - 1 failures in n - 1 samples.
+            # At least n samples before failure r are at most r - 1
+            # failures in n - 1 samples.
             high = binomial_interval(self.failures - 1, self.samples - 1)[1]
         return low, high
 
@@ -109,7 +111,8 @@ def count_failures(
 
     Samples after the last counted failure are also returned.
     """
-    # 1. Two more than the square of 1/target, since the error falls like 1/sqrt(r - 1).
+    # 1. Two more than the square of 1/target, since the error falls
+    # like 1/sqrt(r - 1).
     wanted = 2 + math.ceil(1.0 / (target_cv * target_cv))
     least = min(least, max_evaluations)
     parts: list[Array] = []
@@ -129,7 +132,8 @@ def count_failures(
         state.meter.note = f"{failures:,} failures of {wanted:,} wanted"
     values = np.concatenate(parts)
     count = Counted(failures, done)
-    # 3. The first `least` samples are always counted, whether or not they hold r failures.
+    # 3. The first `least` samples are always counted, whether or not
+    # they hold r failures.
     if failures >= wanted:
         last = int(np.flatnonzero(values < stress)[wanted - 1])
         if last >= least:

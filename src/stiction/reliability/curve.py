@@ -1,15 +1,18 @@
 """Failure curves: the probability of an onset below a stress, over many stresses.
 
-Problem. Tabulate P(T < s) for the onset T from `COMMONEST` down to a smallest probability.
+Problem. Tabulate P(T < s) for the onset T from `COMMONEST` down to a
+smallest probability.
 
 Steps:
 
-1. Sample the tail down to the smallest probability (`tail.sample_curve`). If interfaces
-   are drawn from a fit or a posterior, draw more of them until the error due to their
-   number is small enough (`answer.with_enough_members`).
+1. Sample the tail down to the smallest probability
+   (`tail.sample_curve`). If interfaces are drawn from a fit or a
+   posterior, draw more of them until the error due to their number is
+   small enough (`answer.with_enough_members`).
 2. Warn if the end of the curve is in doubt (`curve_doubts`).
-3. At `PER_DECADE` probabilities per decade, take the stress, its interval, and the
-   probabilities of the equally likely interfaces (`curve_of`).
+3. At `PER_DECADE` probabilities per decade, take the stress, its
+   interval, and the probabilities of the equally likely interfaces
+   (`curve_of`).
 """
 
 from collections.abc import Mapping
@@ -91,23 +94,27 @@ def failure_curve(
     smallest : float
         Smallest probability of the curve.
     target_cv : float
-        Coefficient of variation to reach at the smallest probability. It is lower at
-        other points. Repetitions are added until it is reached. They are the same as
-        in `Study.failure_curve` with the same numbers.
-    problem, random, method, seed, max_evaluations, event, mixture, workers, progress
+        Coefficient of variation to reach at the smallest probability.
+        It is lower at other points. Repetitions are added until it is
+        reached. They are the same as in `Study.failure_curve` with the
+        same numbers.
+    problem, random, method, seed, max_evaluations, event, mixture,
+    workers, progress
         As in `design_stress`.
 
     Returns
     -------
     xarray.Dataset
-        Over 'point': `stress` and `stress_above_bound` (Pa), `probability` with
-        `probability_low`, `probability_high` and `cv`, and `stress_low` and
-        `stress_high` (Pa). If there is a normal pressure, `friction_coefficient` is
-        the stress over the mean pressure. If the area is known, there is `force` (N).
-        `stress_above_bound` has no meaning if the attribute `lower_bound` is zero or
-        less. For a list of interfaces, `probability` is their mean, and `members`,
-        over 'point' and 'member', holds the curve of each interface. The
-        probabilities of 5 % and 95 % of the interfaces are at most `band_low` and
+        Over 'point': `stress` and `stress_above_bound` (Pa),
+        `probability` with `probability_low`, `probability_high` and
+        `cv`, and `stress_low` and `stress_high` (Pa). If there is a
+        normal pressure, `friction_coefficient` is the stress over the
+        mean pressure. If the area is known, there is `force` (N).
+        `stress_above_bound` has no meaning if the attribute
+        `lower_bound` is zero or less. For a list of interfaces,
+        `probability` is their mean, and `members`, over 'point' and
+        'member', holds the curve of each interface. The probabilities
+        of 5 % and 95 % of the interfaces are at most `band_low` and
         `band_high`.
 
     Raises
@@ -162,7 +169,8 @@ def curve_doubts(end: TailPoint, smallest: float, target_cv: float = CURVE_CV) -
 
 def chances(smallest: float) -> Array:
     """Return the probabilities of the points on a curve."""
-    # The last point lies at the smallest probability, also if it is no power of ten.
+    # The last point lies at the smallest probability, also if it is no
+    # power of ten.
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
     probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
@@ -181,8 +189,8 @@ def curve_of(
         members.append(point.members)
         values = stress, stress - lowest, stress / pressure, stress * area, point.probability
         ends = lognormal_interval(point.probability, point.cv)
-        # Both intervals come from the same error: of the probability at this stress, and of the
-        # stress at this probability.
+        # Both intervals come from the same error: of the probability at
+        # this stress, and of the stress at this probability.
         sides = tail.stress_interval(chance, point.cv, lowest)
         rows.append((*values, *ends, point.cv, *sides, *band_of(members[-1]), point.members_cv))
     table: dict[str, Any] = dict(zip(CURVE, np.array(rows).T, strict=False))

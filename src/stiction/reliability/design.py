@@ -1,29 +1,32 @@
 """The design stress, and its change with the family of the factor and with assumed constants.
 
-Problem. Estimate the stress below which the interface slides with a given probability.
-Its interval contains the error of the computation. Assumptions have a larger effect:
-constants in the problem that were not measured, and the family of the factor between
-specimens. How large is this effect?
+Problem. Estimate the stress below which the interface slides with a
+given probability. Its interval contains the error of the computation.
+Assumptions have a larger effect: constants in the problem that were not
+measured, and the family of the factor between specimens. How large is
+this effect?
 
-Source. The method is local sensitivities with common random numbers, as in Asmussen
-and Glynn, Stochastic Simulation (2007), chapter VII.
+Source. The method is local sensitivities with common random numbers, as
+in Asmussen and Glynn, Stochastic Simulation (2007), chapter VII.
 
 Steps:
 
-1. Count many specimens for each solved field, if this costs less (`factors`).
-   Otherwise sample the tail (`tail`). The design stress is a quantile of the onset.
-2. If so many onsets lie at their lower bound that the design stress is the bound
-   itself, return the bound.
-3. For the sensitivities, solve `SAMPLES_PER_END` samples, and take the quantile at the
-   design probability (`factors.solve`). All further steps use the same draws, so that
-   differences are accurate.
-4. For each family, take the quantile over the interfaces with this family. These
-   interfaces are draws from the posterior given the family.
-5. For each constant solve the same samples at both ends of its range: a stated range, the
-   5 and 95 % quantiles of an uncertain constant, or `USUAL_SHARE` below and above its
-   value.
-6. Multiply the design by the ratios of the quantiles from steps 4 and 5 to the
-   quantile from step 3.
+1. Count many specimens for each solved field, if this costs less
+   (`factors`). Otherwise sample the tail (`tail`). The design stress is
+   a quantile of the onset.
+2. If so many onsets lie at their lower bound that the design stress is
+   the bound itself, return the bound.
+3. For the sensitivities, solve `SAMPLES_PER_END` samples, and take the
+   quantile at the design probability (`factors.solve`). All further
+   steps use the same draws, so that differences are accurate.
+4. For each family, take the quantile over the
+   interfaces with this family. These interfaces
+   are draws from the posterior given the family.
+5. For each constant solve the same samples at both ends of its range: a
+   stated range, the 5 and 95 % quantiles of an uncertain constant, or
+   `USUAL_SHARE` below and above its value.
+6. Multiply the design by the ratios of the quantiles from steps 4 and 5
+   to the quantile from step 3.
 """
 
 import math
@@ -92,19 +95,20 @@ def design_stress(
 ) -> Answer:
     """Estimate the stress below which the interface slides with a given probability.
 
-    The design stress is a quantile of the onset stress. One set of repetitions gives
-    the quantile.
+    The design stress is a quantile of the onset stress. One set of
+    repetitions gives the quantile.
 
     Parameters
     ----------
     probability : float
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
-        `Rupture`, or a method that would take more than a quarter of an hour on
-        one core, is refused unless `max_evaluations` is 20,000 or more.
+        `Rupture`, or a method that would take more than
+        a quarter of an hour on one core, is refused
+        unless `max_evaluations` is 20,000 or more.
     target_cv : float
-        Coefficient of variation to reach for the failure probability at the design
-        stress.
+        Coefficient of variation to reach for the failure probability at
+        the design stress.
     confidence : float
         Confidence of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
@@ -119,8 +123,8 @@ def design_stress(
     Returns
     -------
     Answer
-        With `stress`, its 95 % `interval` due to the error of the computation (Pa),
-        and `sensitivities`.
+        With `stress`, its 95 % `interval` due to the error of the
+        computation (Pa), and `sensitivities`.
 
     Raises
     ------
@@ -165,7 +169,8 @@ def _quantile(
     lowest = state.bounds[0]
     goal = Goal(sampling_target(state, target_cv), probability=probability)
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
-    # 1. Counted specimens are whole samples, so they also give the characteristic value.
+    # 1. Counted specimens are whole samples, so they also give the
+    # characteristic value.
     if counts := count_tail(state, goal, budget):
         tail = counts.tail
         asked |= {
@@ -183,7 +188,8 @@ def _quantile(
         doubts = [tail.short_of(f"P = {probability:g}")]
         return Answer.at(point, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
     point, doubts = TailPoint(state, tail, tail.quantile(probability)), []
-    # 2. A lower bound of strength, or the accuracy of the method, lets onsets accumulate.
+    # 2. A lower bound of strength, or the accuracy of the method, lets
+    # onsets accumulate.
     bound = TailPoint(state, tail, math.nextafter(lowest, math.inf))
     if bound.probability >= probability:
         point, asked["stress"] = bound, lowest
@@ -246,7 +252,8 @@ def sensitivities_of(
 
     rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
     with collect_warnings():
-        # 3. and 4. The reference takes the same samples as the ends, not those of the design.
+        # 3. and 4. The reference takes the same samples as the ends,
+        # not those of the design.
         experiment = replace(experiment, random=random)
         counts = solve_specimens(replace(state, experiment=experiment), 0, SAMPLES_PER_END)
         reference = counts.tail.quantile(probability)

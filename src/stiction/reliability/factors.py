@@ -1,29 +1,32 @@
 """Count failures with many specimens for each solved field.
 
-Problem. Estimate the lower tail of the onset T for specimens with strength m b
-f(x). Here m is the mean, b the factor between specimens, and f the field within a
-specimen. Only m and the distribution of b differ between equally likely interfaces
-with the same field. If the onset is proportional to the strength, T is m b R(f),
-and the solver is needed only for R.
+Problem. Estimate the lower tail of the onset T for specimens with
+strength m b f(x). Here m is the mean, b the factor between specimens,
+and f the field within a specimen. Only m and the distribution of b
+differ between equally likely interfaces with the same field. If the
+onset is proportional to the strength, T is m b R(f), and the solver is
+needed only for R.
 
-Source. The method is conditional Monte Carlo (Hammersley, 1956, Journal of the ACM
-3, 73; Asmussen and Glynn, Stochastic Simulation, 2007, section V.4).
+Source. The method is conditional Monte Carlo (Hammersley, 1956, Journal
+of the ACM 3, 73; Asmussen and Glynn, Stochastic Simulation, 2007,
+section V.4).
 
 Steps:
 
 1. Draw plain samples, as `stiction.monte_carlo` does, and solve them.
 2. Divide each onset by the factor and the mean in its sample.
-3. Multiply it by means of other interfaces with the same field, evenly spread over
-   these interfaces, and by factors at stratified quantiles of their distributions.
-   This gives `SPECIMENS_PER_SAMPLE` specimens for each solved sample.
-4. The specimens from one solved sample form a family. The error follows from the
-   share of each family among the failures (`subset.ancestral_variance`), as in
-   subset simulation.
+3. Multiply it by means of other interfaces with the same field, evenly
+   spread over these interfaces, and by factors at stratified quantiles
+   of their distributions. This gives `SPECIMENS_PER_SAMPLE` specimens
+   for each solved sample.
+4. The specimens from one solved sample form a family. The error follows
+   from the share of each family among the failures
+   (`subset.ancestral_variance`), as in subset simulation.
 5. Solve more samples until the error is small enough.
 
-Departures. Stratified sampling replaces the integral over b. If the onset is not
-proportional to the strength, each sample has one specimen, and the method reduces
-to plain counting.
+Departures. Stratified sampling replaces the integral over b. If the
+onset is not proportional to the strength, each sample has one specimen,
+and the method reduces to plain counting.
 """
 
 import math
@@ -63,7 +66,8 @@ over a long list, over the cost of an evaluation in counting."""
 class Counts:
     """Specimens by solved sample: onsets, interfaces and quantile levels of their factors.
 
-    ``counts[numbers]`` and ``len(counts)`` give the draws and the number of specimens.
+    ``counts[numbers]`` and ``len(counts)`` give the draws and the
+    number of specimens.
     """
 
     state: LimitState
@@ -100,9 +104,9 @@ class Counts:
     def characteristic(self, confidence: float) -> float:
         """Return the 5 % quantile, Pa, that a share `confidence` of the interfaces exceeds.
 
-        The onsets of an interface are computed from the onsets in its group at a mean
-        and a factor of 1. These are multiplied by its mean, and by factors at equal
-        steps of probability.
+        The onsets of an interface are computed from the onsets in its
+        group at a mean and a factor of 1. These are multiplied by its
+        mean, and by factors at equal steps of probability.
         """
         random = self.state.experiment.random
         if not np.isfinite(self.shares).any():
@@ -158,8 +162,9 @@ def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
     for number in np.unique(law[members]):
         rows = np.flatnonzero(law[members] == number)
         ratios[rows] /= from_normal(laws[number], own_factor[rows])
-    # 3. A random place in each of equal steps: in order for the interfaces of a group, and
-    # permuted for the factors, which are independent of the interfaces.
+    # 3. A random place in each of equal steps: in order for the
+    # interfaces of a group, and permuted for the factors, which are
+    # independent of the interfaces.
     rng, shape = generator(experiment.seed, 5, first), (samples, SPECIMENS_PER_SAMPLE)
     steps = (np.arange(SPECIMENS_PER_SAMPLE) + rng.random(shape)) / SPECIMENS_PER_SAMPLE
     chosen, group = np.empty(shape, np.int64), random.groups[members]
@@ -182,14 +187,16 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
         chance, cv = goal.probability or tail.probability(stress), tail.cv(stress)
-        # At a quantile, the share of plain samples below it is given. Its error is not in the
-        # families, since each family has a single specimen.
+        # At a quantile, the share of plain samples below it is given.
+        # Its error is not in the families, since each family has a
+        # single specimen.
         if counts.values.shape[1] == 1 and goal.probability:
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
         state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
             return counts
-        # 5. Compare the costs of counting to the target and of subset simulation.
+        # 5. Compare the costs of counting to
+        # the target and of subset simulation.
         wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
         price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2

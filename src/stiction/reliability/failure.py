@@ -1,23 +1,24 @@
 """Failure probability, estimated by counting or from the tail.
 
-Problem. The onset T of a random interface has the distribution P(T < s). Estimate
-the probability at a stress s with a given coefficient of variation.
+Problem. The onset T of a random interface has the
+distribution P(T < s). Estimate the probability at
+a stress s with a given coefficient of variation.
 
-Sources. Each algorithm has its own file: `counting`, `factors`, `subset`,
-`two_level`, `tail`.
+Sources. Each algorithm has its own file: `counting`, `factors`,
+`subset`, `two_level`, `tail`.
 
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
 2. Count many specimens for each solved field, if this costs less (`factors`).
-3. Otherwise solve a pilot of plain samples. Count if failures are frequent, or if the
-   method is too slow for chains (`counting`). Sample the tail if they are rare
-   (`tail`).
-4. If the method is approximate, solve some samples near the stress exactly. Warn if
-   more or fewer of them fail (`answer.exact_doubts`).
-5. If interfaces are drawn from a fit or a posterior, draw more interfaces until the
-   error due to their number is small enough. Repeat steps 1 to 4
-   (`answer.with_enough_members`).
+3. Otherwise solve a pilot of plain samples. Count if failures are
+   frequent, or if the method is too slow for chains (`counting`).
+   Sample the tail if they are rare (`tail`).
+4. If the method is approximate, solve some samples near the stress
+   exactly. Warn if more or fewer of them fail (`answer.exact_doubts`).
+5. If interfaces are drawn from a fit or a posterior, draw more
+   interfaces until the error due to their number is small enough.
+   Repeat steps 1 to 4 (`answer.with_enough_members`).
 """
 
 import math
@@ -101,44 +102,49 @@ def failure_probability(
     Parameters
     ----------
     problem, seed, workers, progress
-        As in `monte_carlo`. The total number of samples that `progress` shows is an
-        estimate.
+        As in `monte_carlo`. The total number of samples that `progress`
+        shows is an estimate.
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The members of a list are equally likely. A fit, a posterior, or any object
-        with a method ``interfaces(count, seed)`` provides as many interfaces as the
-        target needs, from 1,000 to 8,000. The answer is then their mean, the
+        The members of a list are equally likely. A fit, a
+        posterior, or any object with a method ``interfaces(count,
+        seed)`` provides as many interfaces as the target needs,
+        from 1,000 to 8,000. The answer is then their mean, the
         predictive probability, and has a `band`.
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        `Rupture` and other methods that are too slow for subset simulation use
-        plain Monte Carlo, unless `max_evaluations` is 20,000 or more.
+        `Rupture` and other methods that are too slow for subset
+        simulation use plain Monte Carlo, unless `max_evaluations` is
+        20,000 or more.
     friction_coefficient : float, optional
-        Instead of `stress`: ratio of the mean shear stress to carry to the mean
-        normal pressure. If the pressure is random, the pressure of each sample is
-        used.
+        Instead of `stress`: ratio of the mean shear stress to carry to
+        the mean normal pressure. If the pressure is random, the
+        pressure of each sample is used.
     force : float, optional
-        Instead of `stress`: shear force to carry, N. The area of the interface
-        must be known.
+        Instead of `stress`: shear force to carry, N. The area of the
+        interface must be known.
     algorithm : {"auto", "plain", "subset", "two_level"}
-        Plain Monte Carlo, subset simulation, or subset simulation by the local
-        criterion with equilibrium as the last level. See the page 'Failure
-        probability' of the documentation. `reason` in the result explains the
-        choice of 'auto'.
+        Plain Monte Carlo, subset simulation, or subset simulation by
+        the local criterion with equilibrium as the last level. See the
+        page 'Failure probability' of the documentation. `reason` in the
+        result explains the choice of 'auto'.
     target_cv : float
-        Coefficient of variation to reach, including the part due to the list of
-        interfaces.
+        Coefficient of variation to reach, including the part due to the
+        list of interfaces.
     max_evaluations : int, optional
-        Largest number of samples to solve. The default takes about a quarter of an
-        hour on one core, but is at most 2,000,000 samples. For ruptures it is 1,000.
+        Largest number of samples to solve. The default takes about a
+        quarter of an hour on one core, but is at most 2,000,000
+        samples. For ruptures it is 1,000.
     event : {"critical_stress", "first_instability"}
-        Whether failure is sliding of the whole interface, or the first instability of
-        a patch, which may be arrested. By the local criterion both are the same.
+        Whether failure is sliding of the whole interface, or the first
+        instability of a patch, which may be arrested. By the local
+        criterion both are the same.
     mixture : bool
-        Whether a list of interfaces is complete, for example three equally common
-        batches. The interval then contains only the sampling error. By default the
-        list is a sample of the interfaces that may be true, and a short list makes
-        the interval wide.
+        Whether a list of interfaces is complete, for
+        example three equally common batches. The interval
+        then contains only the sampling error. By default
+        the list is a sample of the interfaces that may be
+        true, and a short list makes the interval wide.
 
     Returns
     -------
@@ -153,12 +159,13 @@ def failure_probability(
     Warns
     -----
     AccuracyWarning
-        If the estimate is unreliable. The result has the same text in `warnings`. If
-        the method is the local criterion, equilibrium also solves some samples near
-        the stress.
+        If the estimate is unreliable. The result has the same text in
+        `warnings`. If the method is the local criterion, equilibrium
+        also solves some samples near the stress.
     UnitWarning
-        If the stress is below a fiftieth of the mean strength, or above fifty times
-        the mean strength. A factor of a thousand raises an `InputError`.
+        If the stress is below a fiftieth of the mean strength, or above
+        fifty times the mean strength. A factor of a thousand raises an
+        `InputError`.
 
     Examples
     --------
@@ -217,7 +224,8 @@ def _probability(
     allowed: int | None,
 ) -> Answer:  # fmt: skip
     """Return the answer from the chosen algorithm (steps 1 to 4)."""
-    # 1. Beyond these bounds the probability is negligible, so no sample would show it.
+    # 1. Beyond these bounds the probability is negligible, so no sample
+    # would show it.
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
@@ -229,7 +237,8 @@ def _probability(
         # 2.
         if counts := count_tail(state, goal, budget):
             return _by_tail(TailPoint(state, counts.tail, stress), goal.cv)
-        # 3. Members in order help the chains, and the pilot must have the order of the chains.
+        # 3. Members in order help the chains, and the pilot must have
+        # the order of the chains.
         state = weakest_first(state)
         draws = state.draws(state.experiment.seed, 0, least)
         pilot = draws, state(draws)
@@ -276,7 +285,8 @@ def _by_counting(
 ) -> Answer:
     """Return the answer from plain Monte Carlo that begins with sample `start`.
 
-    Samples of a pilot are not used, because their failures decide whether to count.
+    Samples of a pilot are not used, because their failures decide
+    whether to count.
     """
     count, counted = count_failures(
         state, state.experiment.seed, goal.stress, target_cv=goal.cv, least=least,
@@ -301,12 +311,14 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
     interval = lognormal_interval(probability, point.cv)
     doubts = imprecise(point.sampling_cv, target_cv, tail.spent)
     if tail.algorithm == "two_level" and probability == 0.0:
-        # No exact sample fails, so the interval ends at the probability of the guide's level.
+        # No exact sample fails, so the interval ends at the probability
+        # of the guide's level.
         rarest = tail.repetitions[-1].populations[-1]
         interval = 0.0, math.exp(rarest.log_probability)
         doubts = [f"{tail.short_of('a failure')}. The interval ends at the level of the guide"]
     elif not tail.complete:
-        # The requested stress is below all samples, so its probability is below the last known.
+        # The requested stress is below all samples, so its probability
+        # is below the last known.
         there = tail.probability(tail.reached), tail.cv(tail.reached)
         interval = 0.0, lognormal_interval(*there)[1]
         doubts = [f"{tail.short_of(f'{point.stress:.7g} Pa')}. The interval ends there"]

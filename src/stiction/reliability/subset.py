@@ -1,42 +1,47 @@
 """Subset simulation for any function of standard normal draws.
 
-Problem. Estimate P(g(z) < y) for a function g of many standard normal numbers z,
-where the probability is so small that nearly no plain sample is below y.
+Problem. Estimate P(g(z) < y) for a function g of
+many standard normal numbers z, where the probability
+is so small that nearly no plain sample is below y.
 
-Sources. The method follows Au and Beck (2001), Probabilistic Engineering Mechanics
-16, 263, with the conditional sampling of Papaioannou, Betz, Zwirglmaier and Straub
-(2015). This is a preconditioned Crank-Nicolson walk, whose acceptance does not fall
-with the dimension. Chan and Lai (2013), Annals of Statistics 41, 2877, and Lee and
-Whiteley (2018), Biometrika 105, 609, derive the variance of chains from their
-genealogy.
+Sources. The method follows Au and Beck (2001), Probabilistic
+Engineering Mechanics 16, 263, with the conditional sampling of
+Papaioannou, Betz, Zwirglmaier and Straub (2015). This is a
+preconditioned Crank-Nicolson walk, whose acceptance does not fall with
+the dimension. Chan and Lai (2013), Annals of Statistics 41, 2877, and
+Lee and Whiteley (2018), Biometrika 105, 609, derive the variance of
+chains from their genealogy.
 
 Steps. A level is the set of z with g(z) below its ceiling.
 
-1. Draw N samples and evaluate them. They form the first level, whose ceiling is
-   infinite.
-2. A tenth of N samples, with the lowest values, goes on. The next ceiling is the
-   lowest value that does not go on. If this value is below the requested threshold,
-   take the threshold. If it is at the floor of g, take the number just above the
-   floor.
-3. The probability of the next level is the probability of this level times the share of
-   its samples strictly below the ceiling.
-4. Stop if the threshold, the floor or the requested probability is reached. The
-   walk is incomplete if it stops because no sample goes on, after `MOST_LEVELS`
+1. Draw N samples and evaluate them. They form the first level, whose
+   ceiling is infinite.
+2. A tenth of N samples, with the lowest values, goes on. The next
+   ceiling is the lowest value that does not go on. If this value is
+   below the requested threshold, take the threshold. If it is at the
+   floor of g, take the number just above the floor.
+3. The probability of the next level is the probability of this level
+   times the share of its samples strictly below the ceiling.
+4. Stop if the threshold, the floor or the requested
+   probability is reached. The walk is incomplete if it
+   stops because no sample goes on, after `MOST_LEVELS`
    levels, or because the evaluations are used up.
-5. Each sample that goes on begins a chain, about N states in all. A step moves z to
-   z' = sqrt(1 - b^2) z + b w, with a standard normal w. This preserves the normal
-   distribution. The chain stays at z if g(z') is not below the ceiling. After step
-   t, b is multiplied by exp((share of accepted steps - `ACCEPTANCE`) / sqrt(t)), up
-   to b = 1. The states are the samples of the next level. Continue with step 2.
-6. P(g < y) is the probability of the rarest level whose ceiling is at least y, times the
-   share of its samples below y. The error follows from their first ancestors
-   (`ancestral_variance`).
+5. Each sample that goes on begins a chain, about N states in all. A
+   step moves z to z' = sqrt(1 - b^2) z + b w, with a standard normal w.
+   This preserves the normal distribution. The chain stays at z if g(z')
+   is not below the ceiling. After step t, b is multiplied by exp((share
+   of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b = 1. The states
+   are the samples of the next level. Continue with step 2.
+6. P(g < y) is the probability of the rarest level whose ceiling is at
+   least y, times the share of its samples below y. The error follows
+   from their first ancestors (`ancestral_variance`).
 
-Departures. Only samples strictly below the ceiling go on. The product of the shares is
-then unbiased, although the levels are chosen from the samples (Brehier, Gazeau,
-Goudenege, Lelievre and Rousset, 2016). If the lowest values are all equal, the next
-higher value is the ceiling. All chains move together, and the step size is adapted to
-their acceptance at every step.
+Departures. Only samples strictly below the ceiling go on. The product
+of the shares is then unbiased, although the levels are chosen from the
+samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). If the
+lowest values are all equal, the next higher value is the ceiling. All
+chains move together, and the step size is adapted to their acceptance
+at every step.
 """
 
 import math
@@ -68,15 +73,17 @@ ADVICE = "take fewer nodes, truncate the spectrum earlier, or use algorithm='pla
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Return the squared cv of an estimate by subset simulation, from the ancestors of failures.
 
-    Families that descend from different first samples evolve independently. There are
-    N = `samples` first samples. The shares w_i of the families among the failures
-    therefore measure the error, v = sum (w_i - 1/N)^2. It is computed in three steps:
+    Families that descend from different first samples evolve
+    independently. There are N = `samples` first samples. The shares w_i
+    of the families among the failures therefore measure the error, v =
+    sum (w_i - 1/N)^2. It is computed in three steps:
 
     1. Sum the squared shares, and subtract 1/N.
-    2. If all samples fail, v is zero. Use at least (2/N)^2, as if two more samples
-       had not failed. This bounds the error as the binomial distribution does.
-    3. With k families of equal size, v is 1/k, but the variance of a mean of k values
-       needs 1/(k - 1). Therefore return v/(1 - v).
+    2. If all samples fail, v is zero. Use at least (2/N)^2, as if two
+       more samples had not failed. This bounds the error as the
+       binomial distribution does.
+    3. With k families of equal size, v is 1/k, but the variance of a
+       mean of k values needs 1/(k - 1). Therefore return v/(1 - v).
     """
     if ancestors.size == 0:
         return math.inf
@@ -89,8 +96,8 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
 def generator(seed: int, *key: int) -> np.random.Generator:
     """Return an independent generator for each key under one seed.
 
-    The first number of the spawn key separates this generator from the streams of
-    random fields.
+    The first number of the spawn key separates this generator from the
+    streams of random fields.
     """
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
     return np.random.Generator(np.random.PCG64DXSM(sequence))
@@ -126,9 +133,10 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations, from all samples down to the rarest level.
 
-    It is complete if it reached the threshold or the requested probability. With two
-    levels, it has one population: the samples to which the guide leads, with their
-    exact values. `last` and `walked` describe walks among failures (see `two_level`).
+    It is complete if it reached the threshold or the requested
+    probability. With two levels, it has one population: the samples to
+    which the guide leads, with their exact values. `last` and `walked`
+    describe walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -189,9 +197,9 @@ class Descent(NamedTuple):
     def around(self, value: float) -> tuple[Population, NDArray[np.int64]]:
         """Return a population, and its samples on both sides of a value, in correct proportions.
 
-        They are the lowest samples of the population, twice as many as lie below the
-        value. If more than half of a population lies below the value, a less rare
-        population is used.
+        They are the lowest samples of the population, twice as many as
+        lie below the value. If more than half of a population lies
+        below the value, a less rare population is used.
         """
         holders = self._holders(value)
         while True:
@@ -218,8 +226,8 @@ def grow(
 ) -> tuple[Array, Array, float, float]:
     """Return states and values of chains (given states first), acceptance and last step size.
 
-    All chains move together (step 5). The step size is adapted to their acceptance,
-    with smaller and smaller changes.
+    All chains move together (step 5). The step size is adapted to their
+    acceptance, with smaller and smaller changes.
     """
     chains, dimension = draws.shape
     states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
@@ -254,10 +262,11 @@ def descend(
 ) -> Descent:
     """Walk down to a threshold or a probability, whichever comes first.
 
-    `function` maps draws (k, dimension) to values (k,). Low values are rare, and no
-    value is below `floor`. Each level has `samples` samples. A level begins only if
-    it does not exceed `max_evaluations`. `label` returns, for each sample, the number
-    of its equally likely interface.
+    `function` maps draws (k, dimension) to values (k,). Low values are
+    rare, and no value is below `floor`. Each level has `samples`
+    samples. A level begins only if it does not exceed
+    `max_evaluations`. `label` returns, for each sample, the number of
+    its equally likely interface.
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))
@@ -282,8 +291,8 @@ def descend(
             lowest = float(np.nextafter(floor, math.inf))
         elif lowest == values.min() < values.max():
             lowest = float(values[values > lowest].min())
-        # 3. the probability of the next level. States repeat along chains: with ties at the
-        # ceiling a few fewer go on.
+        # 3. the probability of the next level. States repeat along
+        # chains: with ties at the ceiling a few fewer go on.
         chosen = values < lowest
         share = float(chosen.mean())
         reached = here.log_probability + math.log(share) if share else -math.inf

@@ -1,30 +1,35 @@
 """The lower tail of the onset, from independent repetitions that are pooled until precise enough.
 
-Problem. Estimate p(s) = P(T < s) for the onset T and a stress s, or the stress at a
-probability. The coefficient of variation must not exceed a target.
+Problem. Estimate p(s) = P(T < s) for the onset T
+and a stress s, or the stress at a probability. The
+coefficient of variation must not exceed a target.
 
-Source. The repetitions follow subset simulation (`subset`) or use two levels
-(`two_level`).
+Source. The repetitions follow subset simulation (`subset`) or use two
+levels (`two_level`).
 
 Steps:
 
-1. If the algorithm is 'auto' and two levels are possible, solve a pilot of plain
-   samples by the method and by its less expensive first stage, which is called the
-   guide. Use two levels if the weakest tenth according to the guide contains at
-   least `LEAST_SHARE_PICKED` of the weakest fiftieth of the samples.
-2. Make a repetition of moderate size. It depends only on the seed and its number.
-3. Pool repetitions: p = sum of w_r p_r. The weights w_r are proportional to the
-   numbers of samples, which do not depend on the outcome. The squared coefficient
-   of variation is the sum of (w_r p_r)^2 v_r over p^2, with the relative variances
-   v_r.
-4. If the coefficient of variation is above the target, make the next repetition
-   (step 2) and pool again (step 3). Choose the size that should reach the target,
-   within the limits on size and evaluations.
-5. Suppose that 'auto' chose the guide. If less than a share `POOR` of the samples
-   that the guide selects are failures, sample again by subset simulation.
-6. The stress at a probability follows from p(s) by bisection. The interval of the
-   stress ends at the two stresses that belong to the ends of the interval of p. If
-   no sample is so low, the lower end is the least possible stress.
+1. If the algorithm is 'auto' and two levels are possible, solve a pilot
+   of plain samples by the method and by its less expensive first stage,
+   which is called the guide. Use two levels if the weakest tenth
+   according to the guide contains at least `LEAST_SHARE_PICKED` of the
+   weakest fiftieth of the samples.
+2. Make a repetition of moderate size. It
+   depends only on the seed and its number.
+3. Pool repetitions: p = sum of w_r p_r. The weights w_r are
+   proportional to the numbers of samples, which do not depend on the
+   outcome. The squared coefficient of variation is the sum of (w_r
+   p_r)^2 v_r over p^2, with the relative variances v_r.
+4. If the coefficient of variation is above the target, make the next
+   repetition (step 2) and pool again (step 3). Choose the size that
+   should reach the target, within the limits on size and evaluations.
+5. Suppose that 'auto' chose the guide. If less than a share `POOR` of
+   the samples that the guide selects are failures, sample again by
+   subset simulation.
+6. The stress at a probability follows from p(s) by bisection. The
+   interval of the stress ends at the two stresses that belong to the
+   ends of the interval of p. If no sample is so low, the lower end is
+   the least possible stress.
 """
 
 import math
@@ -77,7 +82,8 @@ OF_CURVES = Sizes(4, 2_000, 2_000)
 class Goal(NamedTuple):
     """Quantity to find in a tail: the probability below a stress, or the stress at a probability.
 
-    The default of the other number cannot be reached, so it never stops the sampling.
+    The default of the other number cannot be reached, so it never stops
+    the sampling.
     """
 
     cv: float  # coefficient of variation to reach
@@ -88,8 +94,9 @@ class Goal(NamedTuple):
 def log_width(cv: float) -> float:
     """Return half the width of the interval for log(estimate).
 
-    The width uses Student's distribution, because the coefficient of variation is
-    itself estimated from about 1/cv^2 independent families.
+    The width uses Student's distribution, because
+    the coefficient of variation is itself estimated
+    from about 1/cv^2 independent families.
     """
     if cv == 0.0:
         return 0.0
@@ -172,9 +179,10 @@ class Tail(NamedTuple):
     def of_members(self, stress: float, count: int) -> Array:
         """Return the probability for each of the equally likely interfaces.
 
-        The probability is NaN if fewer than `RESOLVED` samples of an interface are so
-        low. For plain samples, it is the share among the samples of the interface,
-        because their number is random and causes most of the error near P = 1.
+        The probability is NaN if fewer than `RESOLVED` samples of an
+        interface are so low. For plain samples, it is the share among
+        the samples of the interface, because their number is random and
+        causes most of the error near P = 1.
         """
         in_chains, seen, low, plain = np.zeros((4, count))
         plain_weight = 0.0
@@ -183,11 +191,13 @@ class Tail(NamedTuple):
             failures = np.bincount(below.members, minlength=count)
             seen += failures
             if below.drawn is None:
-                # P(T < s | member) = P(T < s and member) / P(member), and P(member) = 1/count.
+                # P(T < s | member) = P(T < s and member) / P(member),
+                # and P(member) = 1/count.
                 in_chains += weight * count * below.probability * failures
             else:
-                # Plain samples of all repetitions are added up before the division, because
-                # some repetitions have few samples of an interface.
+                # Plain samples of all repetitions are added up before
+                # the division, because some repetitions have few
+                # samples of an interface.
                 low += failures
                 plain += np.bincount(below.drawn, minlength=count)
                 plain_weight += weight
@@ -197,9 +207,10 @@ class Tail(NamedTuple):
     def members_cv(self, stress: float, kinds: Array) -> float:
         """Return the coefficient of variation due to the list, which is a sample of interfaces.
 
-        Members with the same number in `kinds` are one entry of the list. An entry has
-        the share w of the list and the share p of the failures. As in importance
-        sampling, the square of the result is the sum of (p - w)^2 over the entries.
+        Members with the same number in `kinds` are one entry of the
+        list. An entry has the share w of the list and the share p of
+        the failures. As in importance sampling, the square of the
+        result is the sum of (p - w)^2 over the entries.
         """
         entries = np.bincount(kinds)
         failures, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -210,15 +221,17 @@ class Tail(NamedTuple):
             failures += per_sample * np.bincount(of_sample, minlength=entries.size)
             pairs -= per_sample * per_sample * _squares(below.ancestors)
             alike -= per_sample * per_sample * _squares(of_sample, below.ancestors)
-        # The sum of p^2 is the chance that two failures belong to one entry. Only pairs with
-        # different ancestors are independent. Counting all pairs would give too large a chance
-        # if entries have few samples.
+        # The sum of p^2 is the chance that two failures belong to one
+        # entry. Only pairs with different ancestors are independent.
+        # Counting all pairs would give too large a chance if entries
+        # have few samples.
         pairs, alike = pairs + float(failures.sum()) ** 2, alike + float(failures @ failures)
         if not pairs > 0.0:
             return 0.0
         w, p = entries / kinds.size, failures / failures.sum()
         spread = alike / pairs - 2.0 * float(w @ p) + float(w @ w)
-        # The entries determine their own mean, which takes one degree of freedom.
+        # The entries determine their own mean,
+        # which takes one degree of freedom.
         excess = spread / max(1.0 - float(w @ w), 1e-300)
         return math.sqrt(max(excess, 0.0))
 
@@ -246,7 +259,8 @@ class Tail(NamedTuple):
         if not math.isfinite(cv):
             return lowest, highest
         below, above = lognormal_interval(probability, cv)
-        # No sample is below the least one, so smaller probabilities have no stress.
+        # No sample is below the least one, so smaller probabilities
+        # have no stress.
         seen = self.probability(float(np.nextafter(least, math.inf)))
         return self.quantile(below) if below >= seen else lowest, self.quantile(above)
 
@@ -309,10 +323,11 @@ def repeat_until_precise(
 ) -> list[Any]:
     """Return repetitions whose pooled coefficient of variation is at most the target.
 
-    Either all repetitions are complete, or there is a single incomplete repetition.
-    `make` takes (samples, number, remaining evaluations). `judge` returns the
-    coefficient of variation, or zero to stop. Repetitions of moderate size, from
-    `first` to `largest`, limit the memory.
+    Either all repetitions are complete, or there is a single
+    incomplete repetition. `make` takes (samples, number,
+    remaining evaluations). `judge` returns the coefficient
+    of variation, or zero to stop. Repetitions of moderate
+    size, from `first` to `largest`, limit the memory.
     """
     repetitions: list[Any] = []
     spent, size = 0, first
@@ -321,7 +336,8 @@ def repeat_until_precise(
         spent += latest.evaluations
         if not latest.complete:
             return repetitions or [latest]
-        # 3. Only the latest repetition keeps its draws, for checks and failing profiles.
+        # 3. Only the latest repetition keeps its draws, for checks and
+        # failing profiles.
         repetitions = [*(earlier.light() for earlier in repetitions), latest]
         cv = judge(repetitions)
         if cv <= target_cv:
@@ -362,9 +378,9 @@ def sample_tail(
 ) -> Tail:
     """Sample the lower tail until the goal is reached.
 
-    With 'auto', two levels are used if the guide passes steps 1 and 5. `budget`
-    includes the pilot, which holds (draws, stresses) of plain samples that are solved
-    already.
+    With 'auto', two levels are used if the guide passes steps 1 and 5.
+    `budget` includes the pilot, which holds (draws, stresses) of plain
+    samples that are solved already.
     """
     # 1.
     auto, seed = algorithm == "auto", state.experiment.seed
@@ -383,7 +399,8 @@ def sample_tail(
     # 2. to 4.
     repetitions = _repetitions(state, goal, budget - spent, guide, POOR if auto else 0.0)
     spent += sum(descent.evaluations for descent in repetitions)
-    # 5. A walk by a poor guide ends far from the failures, and misses many of them.
+    # 5. A walk by a poor guide ends far from the failures, and misses
+    # many of them.
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
         reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
@@ -408,8 +425,9 @@ def _repetitions(
 ) -> list[Descent]:
     """Repeat subset simulation until the tail is precise enough.
 
-    With a `guide`, each repetition uses two levels. If less than the share `poor` of the samples
-    that the guide selects fails, stop after the first repetition.
+    With a `guide`, each repetition uses two levels. If less than the
+    share `poor` of the samples that the guide selects fails, stop after
+    the first repetition.
     """
     sizes = TWO_LEVELS if guide else sizes
 

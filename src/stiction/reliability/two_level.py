@@ -1,35 +1,39 @@
 """Two levels: an inexpensive limit state leads into the tail, and the exact limit state follows.
 
-Problem. Estimate P(E < s) for an exact stress E, which is expensive, with the help
-of a guide, whose stress L is inexpensive. By the definition of conditional
-probabilities, for any ceiling b,
+Problem. Estimate P(E < s) for an exact stress E, which is expensive,
+with the help of a guide, whose stress L is inexpensive. By the
+definition of conditional probabilities, for any ceiling b,
 
     P(E < s) = P(L < b) P(E < s | L < b) / P(L < b | E < s).
 
-If L follows E closely, the last factor is near one and the middle factor is not
-small. Then a few hundred exact evaluations replace thousands.
+If L follows E closely, the last factor is near
+one and the middle factor is not small. Then a
+few hundred exact evaluations replace thousands.
 
-Source. Subset simulation with less expensive models on its first levels is due to
-Ullmann and Papaioannou (2015), Multilevel estimation of rare events. The choice
-of b and the walks that measure the last factor are our own.
+Source. Subset simulation with less expensive models on
+its first levels is due to Ullmann and Papaioannou (2015),
+Multilevel estimation of rare events. The choice of b and
+the walks that measure the last factor are our own.
 
 Steps:
 
-1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times as many samples per
-   level. Each level is a candidate for L < b, and its probability P(L < b) is known.
-2. Begin with the rarest level, and solve some of its samples exactly. The share
-   with E < s is the middle factor. If a probability is requested, s is the quantile
-   of E that gives this probability.
-3. Start from failures among these samples, walk among the failures E < s
-   (`subset.grow`), and discard the first `FORGOTTEN_STEPS` steps. The share of the
-   later states with L < b is the last factor. `_covered` estimates its error, with
-   one observation for each family of walkers.
-4. Take this level if the last factor is at least `LAST_FACTOR`. Otherwise repeat
-   from step 2 at the next, less rare level, as far as evaluations and levels with
-   draws allow.
+1. Walk down by the guide alone (`subset.descend`), with `GUIDING` times
+   as many samples per level. Each level is a candidate for L < b, and
+   its probability P(L < b) is known.
+2. Begin with the rarest level, and solve some of its samples exactly.
+   The share with E < s is the middle factor. If a probability is
+   requested, s is the quantile of E that gives this probability.
+3. Start from failures among these samples, walk among the failures E <
+   s (`subset.grow`), and discard the first `FORGOTTEN_STEPS` steps. The
+   share of the later states with L < b is the last factor. `_covered`
+   estimates its error, with one observation for each family of walkers.
+4. Take this level if the last factor is at least `LAST_FACTOR`.
+   Otherwise repeat from step 2 at the next, less rare level, as far as
+   evaluations and levels with draws allow.
 
-Failures that L misses, and that no short walk reaches, are never found. Therefore
-`stiction.reliability.tail` first compares how L and E rank samples.
+Failures that L misses, and that no short walk reaches,
+are never found. Therefore `stiction.reliability.tail`
+first compares how L and E rank samples.
 """
 
 import math
@@ -61,8 +65,8 @@ def _covered(
     # Walkers of one ancestor are alike, so each family is one observation.
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last) / (walkers * last)
-    # A family of share w pulls the mean: its square is (1 - 2 w + sum w^2) of
-    # that about the truth.
+    # A family of share w pulls the mean: its square is (1 - 2 w + sum
+    # w^2) of that about the truth.
     shares = np.bincount(group) / walkers
     squares = shares * shares
     kept = float(squares @ (1.0 - 2.0 * shares + squares.sum()))
@@ -87,10 +91,11 @@ def bridge(
 ) -> Descent:
     """Sample the exact lower tail near a threshold, or near a probability.
 
-    `samples` is the number of exact evaluations for the middle factor. The walk among
-    failures takes the same number again, and `max_evaluations` limits their sum.
-    Without a failure the estimate is zero, because omitting this repetition would
-    favour repetitions with a failure.
+    `samples` is the number of exact evaluations for the middle factor.
+    The walk among failures takes the same number again, and
+    `max_evaluations` limits their sum. Without a failure the estimate
+    is zero, because omitting this repetition would favour repetitions
+    with a failure.
     """
     # 1. levels of the guide
     descent = descend(

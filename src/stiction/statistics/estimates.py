@@ -48,8 +48,8 @@ def mean(values: Any) -> WithError:
 def standard_deviation(values: Any) -> WithError:
     """Estimate the standard deviation of independent values (samples,), in their unit.
 
-    The error, sqrt((m_4 - s^4)/N)/(2 s), follows from the fourth moment with the
-    delta method. A Gaussian distribution is not assumed.
+    The error, sqrt((m_4 - s^4)/N)/(2 s), follows from the fourth moment
+    with the delta method. A Gaussian distribution is not assumed.
     """
     sample = as_sample(values)
     s = float(sample.std(ddof=1))
@@ -68,10 +68,11 @@ class Quantiles(Result):
     value : (m,) array
         Quantiles of the sample, in the unit of the values.
     lower, upper : (m,) arrays
-        Ends of the 95 % confidence intervals. An end is infinite if the sample is too
-        small to bound a quantile.
+        Ends of the 95 % confidence intervals. An end is infinite if the
+        sample is too small to bound a quantile.
     unit : str
-        Unit of the values, if they state a unit, as an `xarray.DataArray` does.
+        Unit of the values, if they state a unit, as an
+        `xarray.DataArray` does.
     """
 
     probability: Array
@@ -122,8 +123,8 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     if (wrong := p[~((p > 0.0) & (p < 1.0))]).size:
         raise InputError(f"probability: must be between 0 and 1, exclusive, got {wrong[0]:g}")
     n, tail = ordered.size, 0.025
-    # Rank r is a lower end if fewer than r values lie below the quantile with
-    # probability <= tail.
+    # Rank r is a lower end if fewer than r values lie below the
+    # quantile with probability <= tail.
     low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)
     high = scipy.stats.binom.isf(tail, n, p).astype(int) + 1  # P(B >= high) <= tail
     padded = np.concatenate(([-np.inf], ordered, [np.inf]))
@@ -139,10 +140,11 @@ class Density(Result):
     Attributes
     ----------
     x, value : (m,) arrays
-        Centres of equal cells, in the unit of the values, and the density there,
-        1/unit.
+        Centres of equal cells, in the unit of the values, and the
+        density there, 1/unit.
     error : (m,) array
-        Standard error of the density from sampling, without the effect of smoothing.
+        Standard error of the density from sampling, without the effect
+        of smoothing.
     bandwidth : float
         Standard deviation of the smoothing kernel, in the unit of the values.
     """
@@ -163,25 +165,26 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     ----------
     values : (samples,) array
     bounds : (float or None, float or None)
-        Lower and upper bound of the distribution, if any, in the unit of the
-        values. Use the bounds of the marginal for strength.
+        Lower and upper bound of the distribution, if any, in the unit
+        of the values. Use the bounds of the marginal for strength.
 
     Notes
     -----
     The algorithm follows B. W. Silverman, Density Estimation for Statistics and Data
     Analysis, 1986:
 
-    1. Choose the ends of a grid: the bounds, or half a spread beyond the sample.
+    1. Choose the ends of a grid: the bounds,
+       or half a spread beyond the sample.
     2. Count the values in the cells of the grid.
     3. Choose the bandwidth h with Eq. 3.31, 0.9 min(standard deviation,
        interquartile range/1.34) N^(-1/5), but at least half a cell.
-    4. Smooth the counts with a Gaussian kernel of standard deviation h, reflected at
-       the ends.
-    5. Compute the sampling error from the integral of the squared kernel, 1/(2
-       sqrt(pi) h).
+    4. Smooth the counts with a Gaussian kernel of standard deviation h,
+       reflected at the ends.
+    5. Compute the sampling error from the integral of the squared
+       kernel, 1/(2 sqrt(pi) h).
 
-    A density with two peaks is smoothed more than necessary, and the slope at a bound
-    is zero.
+    A density with two peaks is smoothed more than necessary, and the
+    slope at a bound is zero.
 
     Examples
     --------
@@ -199,7 +202,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
         np.minimum(((sample - low) / width * GRID_CELLS).astype(int), GRID_CELLS - 1),
         minlength=GRID_CELLS,
     )
-    # 3. A narrower kernel would resolve the cells of the grid instead of the sample.
+    # 3. A narrower kernel would resolve the cells of the grid instead
+    # of the sample.
     bandwidth = max(_bandwidth(sample), 0.5 * width / GRID_CELLS)
     # 4. and 5. The smooth density and its error.
     smooth = gaussian_filter1d(
@@ -223,8 +227,8 @@ def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[flo
         raise InputError(f"values: {smallest:g} is below the lower bound {low:g}")
     if largest > high:
         raise InputError(f"values: {largest:g} is above the upper bound {high:g}")
-    # A bound far from the sample would waste cells, as the kernel never reaches
-    # half a spread.
+    # A bound far from the sample would waste cells, as the kernel never
+    # reaches half a spread.
     return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
 
 

@@ -56,14 +56,15 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     problem : Problem
         A problem with uniform weakening rate, load and initial stress.
     strength : RandomField
-        Peak strength, Pa, or friction coefficients under a uniform normal pressure.
+        Peak strength, Pa, or friction coefficients under a uniform
+        normal pressure.
 
     Raises
     ------
     InputError
-        If the weakening rate, the load, the initial stress or the pressure of
-        coefficients varies along the interface, or if a critical patch is larger
-        than the interface.
+        If the weakening rate, the load, the initial stress or the
+        pressure of coefficients varies along the interface, or if a
+        critical patch is larger than the interface.
 
     Notes
     -----
@@ -73,9 +74,9 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     of the weight. The correlation of tau_p follows from a Hermite expansion (Grigoriu,
     1995).
 
-    On a plane tau_n is the average over the middle ellipse of `LocalCriterion`.
-    The method takes the minimum over several ellipses, which has no closed-form
-    moments.
+    On a plane tau_n is the average over the middle ellipse of
+    `LocalCriterion`. The method takes the minimum over several
+    ellipses, which has no closed-form moments.
 
     Examples
     --------
@@ -103,8 +104,8 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
     """Return the share of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
     interface = problem.interface
-    # The spectrum is the transform of the correlation. A mode stands for its
-    # conjugate, too.
+    # The spectrum is the transform of the correlation. A mode stands
+    # for its conjugate, too.
     power = interface.transform(strength.correlation(interface)).real / interface.size
     power[..., 1 : interface.shape[-1] // 2] *= 2.0
     return np.maximum(power, 0.0)
@@ -113,8 +114,8 @@ def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
     """Return the unit of the strength (Pa), the load profile and initial stress if all are uniform.
 
-    The unit of friction coefficients is the normal pressure. Raises an `InputError` if any of them
-    varies along the interface.
+    The unit of friction coefficients is the normal pressure. Raises an
+    `InputError` if any of them varies along the interface.
     """
     check_law(problem)
     problem.refuse_specimen("this", "sample the nucleation stress with st.monte_carlo")

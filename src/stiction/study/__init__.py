@@ -1,7 +1,8 @@
 """A study: everything that defines a Monte Carlo computation, from Python or TOML.
 
-Read `study` first: it joins problem, strength, method and ensemble. Then read
-`sweep`, whose axes turn a study into points. `reading` reads TOML files, and the files
-that they name. `run` reads runs on disk, divides them into parts and exports results.
-`failure` stores repetitions of failure curves and computes the curves.
+Read `study` first: it joins problem, strength, method and ensemble.
+Then read `sweep`, whose axes turn a study into points. `reading` reads
+TOML files, and the files that they name. `run` reads runs on disk,
+divides them into parts and exports results. `failure` stores
+repetitions of failure curves and computes the curves.
 """

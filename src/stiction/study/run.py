@@ -88,8 +88,8 @@ class StoredRun:
     path : Path
     study : Study
     settings : dict, optional
-        Smallest probability and event, for failure curves. A run of samples has no
-        settings.
+        Smallest probability and event, for failure curves. A run of
+        samples has no settings.
     """
 
     def __init__(self, store: Store, study: Any, settings: dict[str, Any] | None) -> None:
@@ -180,14 +180,15 @@ class StoredRun:
         partial : bool
             Whether to write the stored part of an incomplete run.
         events : bool
-            Whether a table (.csv) has a row for each event, as in
-            `stiction.external.event_table`, instead of a row for each sample.
+            Whether a table (.csv) has a row for each
+            event, as in `stiction.external.event_table`,
+            instead of a row for each sample.
 
         Raises
         ------
         InputError
-            If the suffix is neither .nc nor .csv, or if `events` is true and the run
-            has no events.
+            If the suffix is neither .nc nor .csv, or if `events` is
+            true and the run has no events.
         StoreError
             If the file cannot be written.
         RunError
@@ -214,7 +215,8 @@ def export(result: xr.Dataset, path: Path, events: bool = False) -> None:
         write_result(result, path)
     elif path.suffix == ".csv":
         frame = event_table(result) if events else table_of(result)
-        # Numbers are written as the shortest text that reads back to the same bits.
+        # Numbers are written as the shortest text that reads back to
+        # the same bits.
         write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
     elif events:
         raise InputError(f"{path}: a table of events is .csv; .nc holds them without --events")
@@ -226,7 +228,8 @@ def write_result(result: xr.Dataset, path: Path) -> None:
     """Write a result as a NetCDF file with checksums, completely or not at all."""
     with suppress(OSError):
         free = shutil.disk_usage(path.parent).free
-        # NetCDF does not report a full disk, and keeps its unfinished file open.
+        # NetCDF does not report a full disk,
+        # and keeps its unfinished file open.
         if free < 1.05 * result.nbytes + OVERHEAD:
             raise cannot("written", path, OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     encoding = {
@@ -251,15 +254,15 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns are named ``name (unit)``. They hold the sweep and the sample, if
-        there are any, the number of the event in its sample, and the variables of the
-        event (see `equilibrium_path`).
+        Columns are named ``name (unit)``. They hold the sweep and the
+        sample, if there are any, the number of the event in its sample,
+        and the variables of the event (see `equilibrium_path`).
 
     Raises
     ------
     InputError
-        If the result has no events. An `AccuracyWarning` is issued if samples have
-        more events than the result keeps.
+        If the result has no events. An `AccuracyWarning` is issued if
+        samples have more events than the result keeps.
 
     Notes
     -----
@@ -267,10 +270,11 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     slip that an event adds. Length or area, mean slip and the area stress drop refer
     to the patch around the largest slip.
 
-    The event of a `Rupture` ends when the interface is calm. Slow slip after
-    `event_duration`, which the load drives, counts too: on a plane it was 8 % of a
-    moment. An instability in which no node reaches dynamic slip rates is no event. A
-    run at rest can therefore have a `critical_stress` and no row.
+    The event of a `Rupture` ends when the interface is calm. Slow slip
+    after `event_duration`, which the load drives, counts too: on a
+    plane it was 8 % of a moment. An instability in which no node
+    reaches dynamic slip rates is no event. A run at rest can therefore
+    have a `critical_stress` and no row.
 
     Examples
     --------
@@ -299,9 +303,9 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
 def table_of(result: xr.Dataset) -> pd.DataFrame:
     """Return a table with a column for each variable, and a row for each sample and point.
 
-    Columns are named ``name (unit)``. They hold swept keys, the sample number and
-    results. Curves of equally likely interfaces are left out, but their band is
-    included.
+    Columns are named ``name (unit)``. They hold swept keys, the sample
+    number and results. Curves of equally likely interfaces are left
+    out, but their band is included.
     """
     result = result.drop_dims("member", errors="ignore")
     wide = sorted(

@@ -126,7 +126,8 @@ class Question:
     stress, force, friction_coefficient : float, optional
         The demand in Pa, N or 1, as in `stiction.failure_probability`.
     probability : float, optional
-        Probability of sliding below the design, as in `stiction.design_stress`.
+        Probability of sliding below the design, as in
+        `stiction.design_stress`.
     target_cv : float
         Coefficient of variation to reach.
     """
@@ -179,47 +180,48 @@ class _Parts:
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    Names are the same in Python and TOML. A study that is read from the attributes of
-    a result gives the same numbers again.
+    Names are the same in Python and TOML. A study that is read from the
+    attributes of a result gives the same numbers again.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The random properties. A field is the peak strength, Pa. Members of a list are
-        equally likely.
+        The random properties. A field is the peak strength, Pa. Members
+        of a list are equally likely.
     method : LocalCriterion, Equilibrium or Rupture
     ensemble : Ensemble
     sweep : list of dict
-        Axes of the sweep. All their combinations are computed. An axis maps dotted
-        keys, which vary together, to lists of values. The samples are the same at
-        every point of the sweep.
+        Axes of the sweep. All their combinations are computed. An axis
+        maps dotted keys, which vary together, to lists of values. The
+        samples are the same at every point of the sweep.
     uncertain : dict, optional
         Distributions of parameters in ``random`` by dotted key, as in
-        `RandomInterface.uncertain`, and a ``count``, by default 30. With the seed,
-        ``count`` equally likely interfaces are drawn. `failure_curve` computes their
-        mean and band, and `run` draws samples from all of them.
+        `RandomInterface.uncertain`, and a ``count``, by default 30.
+        With the seed, ``count`` equally likely interfaces are drawn.
+        `failure_curve` computes their mean and band, and `run` draws
+        samples from all of them.
     mixture : bool
         Whether a list in ``random`` is complete, as in
         `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the positions of stations.
     reliability : Question, optional
-        Question for `stiction reliability`: a ``force`` (N), ``stress`` (Pa) or
-        ``friction_coefficient`` to carry, or the ``probability`` of a design, with
-        ``target_cv``.
+        Question for `stiction reliability`: a ``force`` (N), ``stress``
+        (Pa) or ``friction_coefficient`` to carry, or the
+        ``probability`` of a design, with ``target_cv``.
     peaks : Peaks or as of `stiction.infer`, optional
-        Peaks of tests that were not used to infer ``random``. `stiction reliability`
-        compares them with its prediction. In a study file, give the name of a file
-        that `read_peaks` can read.
+        Peaks of tests that were not used to infer ``random``. `stiction
+        reliability` compares them with its prediction. In a study file,
+        give the name of a file that `read_peaks` can read.
     title : str
         Title of the study, for readers.
 
     Raises
     ------
     InputError
-        If a key is missing, unknown or out of range, or a point of the sweep is
-        not a valid study. The message lists every problem.
+        If a key is missing, unknown or out of range, or a point of the
+        sweep is not a valid study. The message lists every problem.
 
     Examples
     --------
@@ -376,26 +378,27 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are computed. If you repeat the
-            call, it resumes an interrupted run, computes failed samples again, and
-            adds samples if `samples` was raised.
+            Folder in which results are stored as they are
+            computed. If you repeat the call, it resumes an
+            interrupted run, computes failed samples again,
+            and adds samples if `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
-            Part to compute in an independent job, such as "3/100". All parts go
-            into the same folder.
+            Part to compute in an independent job, such as "3/100". All
+            parts go into the same folder.
 
         Returns
         -------
         xarray.Dataset
-            Over the axes of the sweep and 'sample', with NaN for failed and missing
-            samples.
+            Over the axes of the sweep and 'sample', with NaN for failed
+            and missing samples.
 
         Raises
         ------
         InputError, RunError
-            As in `stiction.monte_carlo`. Also if `out` holds a different study, or if
-            a worker is lost.
+            As in `stiction.monte_carlo`. Also if `out` holds a
+            different study, or if a worker is lost.
         StoreError
             If `out` cannot be used.
         """
@@ -434,18 +437,20 @@ class Study(_Parts):
     ) -> xr.Dataset:
         """Estimate failure probabilities at every point, or at the missing points.
 
-        Each repetition has 2,000 samples per level. Repetition i depends only on
-        (seed, i). The number of samples in the study is not used.
+        Each repetition has 2,000 samples per level.
+        Repetition i depends only on (seed, i). The
+        number of samples in the study is not used.
 
         Parameters
         ----------
         out : path
-            Folder in which repetitions are stored as they are computed. If you repeat
-            the call, it resumes an interrupted run, and adds repetitions if
-            `repetitions` was raised.
+            Folder in which repetitions are stored as they are computed.
+            If you repeat the call, it resumes an interrupted run, and
+            adds repetitions if `repetitions` was raised.
         repetitions : int
-            Number of repetitions. At a probability of 1e-9, eight repetitions give a
-            coefficient of variation of about 0.2, and 32 repetitions give about 0.1.
+            Number of repetitions. At a probability of 1e-9, eight
+            repetitions give a coefficient of variation of about 0.2,
+            and 32 repetitions give about 0.1.
         smallest, event
             As in `stiction.failure_curve`.
         workers, executor, progress, part
@@ -454,15 +459,16 @@ class Study(_Parts):
         Returns
         -------
         xarray.Dataset
-            As from `stiction.failure_curve`, also over the axes of the sweep, and
-            with `lower_bound` (Pa). All stored and computed repetitions are used.
+            As from `stiction.failure_curve`, also over the
+            axes of the sweep, and with `lower_bound` (Pa).
+            All stored and computed repetitions are used.
             Values at a point without repetitions are NaN.
 
         Raises
         ------
         InputError, StoreError, RunError
-            As in `run`. Also if a method is `Rupture`, because its failures can only
-            be counted.
+            As in `run`. Also if a method is `Rupture`, because its
+            failures can only be counted.
         """
         settings = {"smallest": smallest, "event": event}
         rows = Repetitions(self.experiments, repetitions, settings)
@@ -484,7 +490,8 @@ class Study(_Parts):
         Raises
         ------
         InputError
-            If a part cannot be written, such as a spectrum that is a Python function.
+            If a part cannot be written, such as a spectrum that is a
+            Python function.
         """
         plain = to_plain(self).items()
         left_out = ("title", "sweep", "mixture")
@@ -493,8 +500,8 @@ class Study(_Parts):
     def to_toml(self, path: str | Path) -> None:
         """Write the study to a TOML file. Many interfaces are written to a JSON file beside it.
 
-        Raises an `InputError` if a part exists only in Python, and a `StoreError` if the
-        file cannot be written.
+        Raises an `InputError` if a part exists only in Python, and a
+        `StoreError` if the file cannot be written.
         """
         plain, place = self.to_dict(), check("path", path, FilePath)
         beside = place.with_suffix(".random.json")
@@ -570,8 +577,8 @@ def open_run(path: Any) -> StoredRun:
     InputError
         If `path` is not a path.
     StoreError
-        If the folder holds no run, or if its study cannot be read, for example
-        because it names a class that is not installed.
+        If the folder holds no run, or if its study cannot be read, for
+        example because it names a class that is not installed.
     """
     place = check("path", path, FilePath)
     if place.is_file():

@@ -164,9 +164,9 @@ def grid_axes(
 ) -> GridAxes:
     """Return the axes as dimensions of a result.
 
-    The name of an axis is the last part of its key, or the whole key if the last part
-    is ambiguous or a keyword of xarray. The axis for the key 'method' is called
-    'onset_method'.
+    The name of an axis is the last part of its key, or the whole key if
+    the last part is ambiguous or a keyword of xarray. The axis for the
+    key 'method' is called 'onset_method'.
     """
     keys = [key for axis in axes for key in axis]
     last = {key: key.rpartition(".")[2] for key in keys}

@@ -47,7 +47,8 @@ def _foreign_classes(kind: Any) -> set[Any]:
 def _parts(value: Any) -> Iterator[str]:
     """Yield what a compiled function depends on, with the functions and constants that it names.
 
-    A TypeError says that it names something else, which may change without being noticed.
+    A TypeError says that it names something else, which may change
+    without being noticed.
     """
     value = getattr(value, "py_func", value)
     if isinstance(value, tuple):
@@ -83,9 +84,9 @@ def _state_of(classes: Iterable[Any]) -> str | None:
 class _Guard:
     """A cache that keeps code compiled for an external friction law, by the state of the law.
 
-    Such a law is part of the kernels that are compiled for it. numba would not notice
-    that the law was edited, and could not read its index where the law's module is
-    missing.
+    Such a law is part of the kernels that are compiled for it. numba
+    would not notice that the law was edited, and could not read its
+    index where the law's module is missing.
     """
 
     def __init__(self, cache: Any, function: Callable[..., Any]) -> None:
@@ -161,8 +162,9 @@ def _plain(function: Any) -> Any:
 def jit(function: Kernel) -> Kernel:
     """Compile for a single thread, without the interpreter lock.
 
-    ``parallel=True`` is not used, because forking after an OpenMP region aborts. Fast-math
-    is not used either, because results must not depend on the batch.
+    ``parallel=True`` is not used, because forking after an OpenMP
+    region aborts. Fast-math is not used either, because results must
+    not depend on the batch.
     """
     return _compile(function, "OPTIONS")
 

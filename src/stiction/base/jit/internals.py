@@ -1,15 +1,17 @@
 """Compile kernels in two thirds of the time by using numba's private parts.
 
-1. Compiled forms are kept on disk by the text of their file, not by its place and
-   time (`_Locator`).
-2. A function that only other kernels call is a draft (`_Draft`). A draft is stored,
-   but becomes machine code only as a part of the kernels that call it. They also
-   take over its environment (`Cache.save_overload`).
+1. Compiled forms are kept on disk by the text of their file, not by its
+   place and time (`_Locator`).
+2. A function that only other kernels call is a draft (`_Draft`). A
+   draft is stored, but becomes machine code only as a part of the
+   kernels that call it. They also take over its environment
+   (`Cache.save_overload`).
 3. Options are compared by those that were set (`_Flags`).
 4. Kernels that make no arrays count no references (`OPTIONS`).
 
-This file may be deleted. Without it, or with a numba newer than `NEWEST`, `decorators.py`
-compiles the same kernels to the same bits with plain `numba.njit`.
+This file may be deleted. Without it, or with a numba newer than
+`NEWEST`, `decorators.py` compiles the same kernels to the same bits
+with plain `numba.njit`.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ if numba.version_info.short > NEWEST:
 class _Locator(_CacheLocator):
     """The folder for a function's compiled forms, named by a digest of the source text.
 
-    Another environment with the same package therefore compiles nothing again.
+    Another environment with the same package
+    therefore compiles nothing again.
     """
 
     def __init__(self, function: Any, file: str) -> None:

@@ -14,15 +14,16 @@ Algorithm
 1. Compute the averages at all nodes by Fourier transform (`averages`).
 2. On a plane, take the lowest node. A parabola through its neighbours gives the
    position.
-3. On a line, fit a parabola at each node that is a local minimum. Estimate how low
-   the function falls there, and the error of the parabola (`_estimates`).
-4. At the lowest local minimum, and at others that may be lower, find the minimum of
-   the polynomials through `STENCIL` nodes, in the cells on both sides of the node
-   (`_minimum_near`).
+3. On a line, fit a parabola at each node that is a local minimum.
+   Estimate how low the function falls there, and the error of the
+   parabola (`_estimates`).
+4. At the lowest local minimum, and at others that may be lower, find
+   the minimum of the polynomials through `STENCIL` nodes, in the cells
+   on both sides of the node (`_minimum_near`).
 
-The exact average has bounds. Round-off may violate these bounds, and so may the
-polynomials, which ring at jumps of the strength. Values are therefore limited to
-the bounds.
+The exact average has bounds. Round-off may violate these bounds, and so
+may the polynomials, which ring at jumps of the strength. Values are
+therefore limited to the bounds.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,8 +44,8 @@ MAX_NEWTON_STEPS = 50
 PLACE_ATOL = 1e-11  # change of the place, in nodes, that is round-off
 NO_NODE = -1
 
-# Coefficients of the polynomial through ten nodes, in powers of the distance from
-# their middle.
+# Coefficients of the polynomial through ten nodes, in powers of the
+# distance from their middle.
 _FIT = np.linalg.inv(np.vander(np.arange(STENCIL) - 0.5 * (STENCIL - 1), increasing=True))
 
 
@@ -53,15 +54,16 @@ def averages(
 ) -> Iterator[Iterator[Array]]:
     """Yield, for each sample and window y, <s, y>/<p, y> centred at every node, as (*shape).
 
-    Strength minus initial stress s (Pa) has shape (samples, *shape), and the load
-    profile p has shape (*shape). An average is infinite if the window reaches beyond
-    the extent of the interface.
+    Strength minus initial stress s (Pa) has shape (samples, *shape),
+    and the load profile p has shape (*shape). An average is infinite if
+    the window reaches beyond the extent of the interface.
     """
     # Both averages are convolutions with the weights.
     load = interface.transform(profile)
     p_y = [interface.inverse_transform(load * (y.spectrum / y.total)) for y in windows]
     if interface.is_held:
-        # Any finite value will do: the local criterion leaves these nodes out.
+        # Any finite value will do: the local
+        # criterion leaves these nodes out.
         excess = np.where(interface.breakable, excess, 0.0)
         places = (places_of(interface, y) for y in windows)
         p_y = [np.where(at, scale, 0.0) for at, scale in zip(places, p_y, strict=True)]
@@ -82,10 +84,10 @@ def least_average(
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Return the least average of each sample over positions and windows (see `averages`).
 
-    Returns the averages (Pa), their positions in nodes, and the numbers of their
-    windows. On a line the minimum may lie between the nodes. On a plane, and if the
-    interface ends, the average is taken at the nodes, and only the position is
-    interpolated.
+    Returns the averages (Pa), their positions in nodes, and the numbers
+    of their windows. On a line the minimum may lie between the nodes.
+    On a plane, and if the interface ends, the average is taken at the
+    nodes, and only the position is interpolated.
     """
     count = len(excess)
     # A line has one window, and its minimum is found between the nodes.
@@ -155,11 +157,11 @@ def _minimum_near(
 ) -> tuple[float, float]:
     """Step 4: return the minimum between a node and its two neighbours, and its position.
 
-    Newton's method for the slope is kept inside a bracket, with bisection if the
-    function is not convex. Two bounds exclude ringing of the polynomial. The first is
-    the least ratio of strength to load under the patch. The second applies if the
-    values are convex: the lines through two values on either side, extended until
-    they meet.
+    Newton's method for the slope is kept inside a bracket, with
+    bisection if the function is not convex. Two bounds exclude ringing
+    of the polynomial. The first is the least ratio of strength to load
+    under the patch. The second applies if the values are convex: the
+    lines through two values on either side, extended until they meet.
     """
     n = values.size
     least = np.inf
@@ -191,7 +193,8 @@ def _minimum_near(
         value = 0.0
         for p in range(STENCIL - 1, -1, -1):
             value = value * u + power[p]
-        # The second bound: values that rise faster and faster stay above the lines from outside.
+        # The second bound: values that rise faster and faster stay
+        # above the lines from outside.
         value = max(values[cell] + value, least)
         at_node, beside = values[node], values[(node + side) % n]
         before, rise = at_node - values[(node - side) % n], beside - at_node
@@ -219,8 +222,8 @@ def _minimum_of_rows(
     for row in range(excess.shape[0]):
         strength = excess[row]
         convolve(transform, multiplier, strength, spectrum, values)
-        # The exact average is at least the least ratio. Round-off of the
-        # transforms may be below.
+        # The exact average is at least the least ratio. Round-off of
+        # the transforms may be below.
         least = np.inf
         for i in range(nodes):
             least = min(least, multiplier[0] * strength[i] / profile[i])

@@ -10,15 +10,17 @@ Ingenieur-Archiv 28, 1959) are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
-and the energy release rate is G = K |K|/(2 G*). A crack runs if G exceeds the
-fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
+and the energy release rate is G = K |K|/(2 G*). A crack runs if G
+exceeds the fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
 1. Evaluate (1) with Gauss and Chebyshev's rule, with D linear between the nodes
-   (`_intensity_factors`). K is linear in D, so one evaluation serves all loads.
-2. Bracket the lengths at which G crosses the fracture energy. Test lengths are one
-   node apart, and closer near zero. Bisect the brackets (`griffith_length`).
+   (`_intensity_factors`). K is linear in
+   D, so one evaluation serves all loads.
+2. Bracket the lengths at which G crosses the fracture energy. Test
+   lengths are one node apart, and closer near zero. Bisect the brackets
+   (`griffith_length`).
 """
 
 from typing import Any
@@ -45,8 +47,8 @@ def energy_release_rate(
     Parameters
     ----------
     problem : Problem
-        A line. Its load profile, initial stress and residual strength give the
-        stress drop tau_i + tau_0 p - tau_r.
+        A line. Its load profile, initial stress and residual strength
+        give the stress drop tau_i + tau_0 p - tau_r.
     load : float
         tau_0, Pa.
     lengths : (m,) array or float
@@ -57,8 +59,8 @@ def energy_release_rate(
     Returns
     -------
     (m, 2) array, J/m²
-        Energy release rate at the left and the right tip. It is negative if the
-        stress drop acts against the crack at this tip.
+        Energy release rate at the left and the right tip. It is
+        negative if the stress drop acts against the crack at this tip.
 
     Raises
     ------
@@ -115,9 +117,9 @@ def griffith_length(
     centre : float
         Centre of the crack, m, at equal distances from both tips.
     arrest : bool
-        If false, return the shortest length above which the smaller of the two
-        release rates exceeds Gamma. If true, return the next length at which it falls
-        below Gamma again.
+        If false, return the shortest length above which the smaller of
+        the two release rates exceeds Gamma. If true, return the next
+        length at which it falls below Gamma again.
 
     Returns
     -------
@@ -129,7 +131,8 @@ def griffith_length(
         raise InputError(
             f"load: must be a finite number or a list of them, got {describe(load)}"
         )
-    # The factors without load and by a unit load serve every load: shape (loads, lengths, tips).
+    # The factors without load and by a unit load serve every load:
+    # shape (loads, lengths, tips).
     tau, drops = load.reshape(-1, 1, 1), _stress_drops(problem)
 
     def runs(lengths: Array, tau: Array) -> Any:
@@ -137,7 +140,8 @@ def griffith_length(
         release_rate = _release_rate(problem, resting + tau * unit)
         return release_rate.min(axis=-1) > fracture_energy
 
-    # 2. The lengths at which a crack is tested, and whether it runs there under each load.
+    # 2. The lengths at which a crack is tested, and whether it runs
+    # there under each load.
     lengths = problem.interface.spacing * np.append(
         SHORT_LENGTHS, np.arange(1, problem.interface.size)
     )

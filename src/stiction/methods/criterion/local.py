@@ -17,8 +17,8 @@ Algorithm
 2. Find the least average of strength over load, over windows and positions
    (`average`). On a specimen every position has its own window
    (`elasticity.weakest`).
-3. With a machine, subtract an estimate of the stress that slip releases before the
-   onset (`_relief_of_patch`).
+3. With a machine, subtract an estimate of the stress that slip releases
+   before the onset (`_relief_of_patch`).
 """
 
 from collections.abc import Callable, Iterator
@@ -61,13 +61,14 @@ OF_SPECIMENS = {
 class LocalCriterion:
     """Onset at the minimum of the nucleation stress, with each patch in isolation.
 
-    If no node reaches its residual strength (or zero) before the onset, this is an
-    upper bound of the exact onset, up to discretisation, because interaction can only
-    lower the load at which patches become unstable. If nodes reach their residual
-    strength, the exact onset is higher than predicted. Events are assumed not to be
-    arrested, so `first_instability` and `critical_stress` are equal. If a quick test
-    leaves a doubt, `onset` and `monte_carlo` compare samples with `Equilibrium`, and
-    warn about differences above 1 %.
+    If no node reaches its residual strength (or zero) before the onset,
+    this is an upper bound of the exact onset, up to discretisation,
+    because interaction can only lower the load at which patches become
+    unstable. If nodes reach their residual strength, the exact onset is
+    higher than predicted. Events are assumed not to be arrested, so
+    `first_instability` and `critical_stress` are equal. If a quick test
+    leaves a doubt, `onset` and `monte_carlo` compare samples with
+    `Equilibrium`, and warn about differences above 1 %.
 
     Notes
     -----
@@ -77,30 +78,34 @@ class LocalCriterion:
     issues an `AccuracyWarning`: if strength falls less and less steeply, the exact onset is
     higher. A law that steepens raises an error.
 
-    If the interface ends, patches lie within its extent. Between half-spaces, slip
-    before the onset transfers stress to the nodes beyond the extent, and the
-    criterion neglects this transfer. In tests, the correlation length of the strength
-    was one nucleation length, and the extent was 2, 4, 8 and 17 nucleation lengths.
-    Stresses were too high by 4, 1, 0.3 and 0.1 % on average, and by up to 21, 6, 2.5
-    and 3 %. Loads were too high by 0.9, 0.3, 0.1 and 0.1 %. `onset` and `monte_carlo`
-    always compare such interfaces with `Equilibrium`, and the warning gives the
-    difference.
+    If the interface ends, patches lie within its extent. Between
+    half-spaces, slip before the onset transfers stress to the nodes
+    beyond the extent, and the criterion neglects this transfer. In
+    tests, the correlation length of the strength was one nucleation
+    length, and the extent was 2, 4, 8 and 17 nucleation lengths.
+    Stresses were too high by 4, 1, 0.3 and 0.1 % on average, and by up
+    to 21, 6, 2.5 and 3 %. Loads were too high by 0.9, 0.3, 0.1 and 0.1
+    %. `onset` and `monte_carlo` always compare such interfaces with
+    `Equilibrium`, and the warning gives the difference.
 
-    On a plane the average is over critical ellipses with five aspect ratios. A
-    critical ellipse is the smallest ellipse on which the stiffness K - W of the
-    discrete problem is unstable. The unstable eigenvector is the weight. The minimum
-    is taken over nodes and ellipses. `critical_aspect`, `critical_patch_extent` (m,
-    along x and y) and `critical_patch_area` (m²) describe the critical ellipse.
+    On a plane the average is over critical ellipses with five aspect
+    ratios. A critical ellipse is the smallest ellipse on which the
+    stiffness K - W of the discrete problem is unstable. The unstable
+    eigenvector is the weight. The minimum is taken over nodes and
+    ellipses. `critical_aspect`, `critical_patch_extent` (m, along x and
+    y) and `critical_patch_area` (m²) describe the critical ellipse.
 
-    On a specimen each position has its own nucleation length: the length of the
-    shortest run of nodes on which the stiffness of the blocks is unstable. The
-    eigenvector is the weight. `critical_patch_length` (m) is the nucleation length at
-    the critical position. With a machine, stable slip lowers the mean stress below
-    `critical_load`. The returned stresses include an estimate of this reduction, for
-    the critical patch alone. The slip of other patches is unknown, so the stresses
-    are too high. In six set-ups in mode II, stresses and `critical_load` were too
-    high by 0.2 to 5 %. A pusher near the interface causes events long before the
-    interface slides. `critical_stress` is then far too low.
+    On a specimen each position has its own nucleation length: the
+    length of the shortest run of nodes on which the stiffness of the
+    blocks is unstable. The eigenvector is the weight.
+    `critical_patch_length` (m) is the nucleation length at the critical
+    position. With a machine, stable slip lowers the mean stress below
+    `critical_load`. The returned stresses include an estimate of this
+    reduction, for the critical patch alone. The slip of other patches
+    is unknown, so the stresses are too high. In six set-ups in mode II,
+    stresses and `critical_load` were too high by 0.2 to 5 %. A pusher
+    near the interface causes events long before the interface slides.
+    `critical_stress` is then far too low.
 
     Examples
     --------
@@ -117,7 +122,8 @@ class LocalCriterion:
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time for a sample on a core, s."""
-        # The numbers are measured. The time on planes is mostly transforms over several ellipses.
+        # The numbers are measured. The time on planes is mostly
+        # transforms over several ellipses.
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
 
@@ -139,10 +145,11 @@ class LocalCriterion:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the onset from below and from above.
 
-        The onset is bounded from below because the weights are positive, except with
-        a machine, because the criterion neglects the slip of other patches. It is
-        bounded from above because load <g, p> <= <g, tau_p - tau_i> at each position.
-        Averaged over all positions between half-spaces, this is load <p> <= <tau_p -
+        The onset is bounded from below because the weights are
+        positive, except with a machine, because the criterion neglects
+        the slip of other patches. It is bounded from above because load
+        <g, p> <= <g, tau_p - tau_i> at each position. Averaged over all
+        positions between half-spaces, this is load <p> <= <tau_p -
         tau_i>. An interface that ends has no bounds.
         """
         # Nodes beyond an end take over stress, but do not count in means.
@@ -168,8 +175,8 @@ class LocalCriterion:
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether exact onsets may differ by more than 1 % in mean or scatter.
 
-        The quick test applies to lines between half-spaces without ends. In other
-        cases the result is True.
+        The quick test applies to lines between half-spaces without
+        ends. In other cases the result is True.
         """
         # The quick test needs the signs of K and a law with one piece.
         interface = problem.interface
@@ -189,8 +196,8 @@ class LocalCriterion:
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
         """Return a solver for samples of a problem.
 
-        Raises an `InputError` if the weakening rate varies along the interface, or if
-        a critical patch does not fit on it.
+        Raises an `InputError` if the weakening rate varies along the
+        interface, or if a critical patch does not fit on it.
         """
         check_law(problem)
         interface = problem.interface
@@ -202,7 +209,8 @@ class LocalCriterion:
             excess, profile = excess_of(sample), sample.load_profile
             load, patch = np.empty(len(excess)), np.empty((len(excess), 4))
             place = np.empty((len(excess), 2) if interface.is_plane else len(excess))
-            # The rate, and with it the nucleation length, may differ between samples.
+            # The rate, and with it the nucleation length, may differ
+            # between samples.
             for weakening_rate, rows in _weakening_rates(sample):
                 # 1.
                 windows = windows_of(problem, weakening_rate)
@@ -213,7 +221,8 @@ class LocalCriterion:
                 if interface.is_plane:
                     patches = [(y.aspect, *y.extents, y.area) for y in windows]
                     patch[rows] = np.array(patches)[chosen]
-            # Arrested events are not known, so the first instability is the onset.
+            # Arrested events are not known, so
+            # the first instability is the onset.
             stress = sample.mean_stress(load)
             values = {
                 "critical_load": load,
@@ -233,7 +242,8 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     """Return the onset of each specimen, at its weakest position."""
     _warn_if_coarse(problem, sample)
     excess, spacing = excess_of(sample), problem.interface.spacing
-    # The weakest window of each sample: its load, its first node, and its number of nodes.
+    # The weakest window of each sample: its load, its first node, and
+    # its number of nodes.
     load, start, width, relief = np.zeros((4, sample.samples))
     allowed, blocks = np.empty(problem.interface.size), problem.blocks
     for weakening_rate, rows in _weakening_rates(sample):
@@ -256,8 +266,9 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                     " criterion does not hold; use st.Equilibrium()"
                 )
             width[i] = windows.widths[c]
-            # 3. Under a dead load, slip does not change the mean stress, unless it
-            # transfers stress to nodes beyond an extent.
+            # 3. Under a dead load, slip does not change
+            # the mean stress, unless it transfers
+            # stress to nodes beyond an extent.
             if blocks.relief > 0.0 or problem.interface.is_held:
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
@@ -275,15 +286,15 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
 def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> float:
     """Step 3: return the mean stress that slip on a patch releases before its instability.
 
-    Slip on the patch alone solves (K - W) slip = drive, up to a multiple of the
-    unstable mode. An additional equation fixes the multiple: the slips at the two
-    ends add up to zero. In reality, slip does not vanish at a free end, and releases
-    more stress.
+    Slip on the patch alone solves (K - W) slip = drive, up to a
+    multiple of the unstable mode. An additional equation fixes the
+    multiple: the slips at the two ends add up to zero. In reality, slip
+    does not vanish at a free end, and releases more stress.
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - W * np.eye(len(matrix) - 1)
-    # The last row and column are the added equation and its unknown force, scaled
-    # like the others.
+    # The last row and column are the added equation and its unknown
+    # force, scaled like the others.
     matrix[[0, -2], -1] = matrix[-1, [0, -2]] = W
     # The slip of a part that would move back counts as zero.
     slip = np.zeros(len(drive))
@@ -295,11 +306,12 @@ def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> fl
 def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
-    tau_n is the load tau_0 at which an isolated patch of length h_n centred at x
-    becomes unstable. It is the average of tau_p - tau_i over h_n, with the critical
-    slip-rate profile as weight, divided by the same average of the load profile
-    (Uenishi and Rice, 2003, Eq. 14; Albertini et al., 2020, Eq. 9). On a plane tau_n
-    is the minimum over five ellipses.
+    tau_n is the load tau_0 at which an isolated patch of length h_n
+    centred at x becomes unstable. It is the average of tau_p - tau_i
+    over h_n, with the critical slip-rate profile as weight, divided by
+    the same average of the load profile (Uenishi and Rice, 2003, Eq.
+    14; Albertini et al., 2020, Eq. 9). On a plane tau_n is the minimum
+    over five ellipses.
 
     Parameters
     ----------
@@ -311,14 +323,14 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     Returns
     -------
     (samples, *shape) or (*shape) array, Pa
-        Nucleation stress, between the smallest and the largest (tau_p - tau_i)/p in
-        the profile.
+        Nucleation stress, between the smallest and the largest (tau_p -
+        tau_i)/p in the profile.
 
     Raises
     ------
     InputError
-        If the weakening rate varies along the interface, or if a critical patch
-        does not fit on it.
+        If the weakening rate varies along the interface, or if a
+        critical patch does not fit on it.
 
     Examples
     --------
@@ -341,8 +353,8 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     windows = windows_of(problem, weakening_rate)
     samples = averages(interface, windows, excess, profile)
     result = np.array([np.minimum.reduce(list(fields)) for fields in samples])
-    # These bounds hold for the exact average. Round-off of the transforms may
-    # exceed them.
+    # These bounds hold for the exact average. Round-off of the
+    # transforms may exceed them.
     ratio = windows[0].total * (excess / profile)
     low, high = (end(axis=sample.axes, keepdims=True) for end in (ratio.min, ratio.max))
     result = np.clip(result, low, high)

@@ -7,9 +7,9 @@ Does a line have an equilibrium at the load tau_0? An equilibrium is a slip d >=
 
     K d + max(tau_p - W d, tau_r) >= tau_i + tau_0 p ?
 
-A predicted load is right to 1 % if there is an equilibrium at 0.99 times the load
-and no equilibrium at 1.01 times the load. Otherwise, wider brackets show how large
-the error is.
+A predicted load is right to 1 % if there is an equilibrium at 0.99
+times the load and no equilibrium at 1.01 times the load. Otherwise,
+wider brackets show how large the error is.
 
 Algorithm
 ---------
@@ -19,19 +19,20 @@ and never has to be reduced (R. Chandrasekaran, Opsearch 7, 1970, for linear
 problems). `slides` starts from d = 0:
 
 1. Compute the overstress f = tau_i + tau_0 p - K d - strength, Pa.
-2. The interface slides if the load exceeds the mean strength. It also slides if a
-   run of residual nodes is so long that the fracture energy cannot stop a crack of
-   this length (Griffith, 1921).
-3. Let S be the nodes that slip or are overstressed. If no node is overstressed, d
-   is an equilibrium.
-4. Use Newton's method: d_S grows by x with (K - W)_SS x = f, until the first node
-   reaches its residual strength.
-5. If K - W is not positive definite on S, a patch is unstable. Then take a few
-   steps with frozen strengths, K_SS x = f, which never pass the least equilibrium.
+2. The interface slides if the load exceeds the mean strength. It also
+   slides if a run of residual nodes is so long that the fracture energy
+   cannot stop a crack of this length (Griffith, 1921).
+3. Let S be the nodes that slip or are overstressed. If no node is
+   overstressed, d is an equilibrium.
+4. Use Newton's method: d_S grows by x with (K - W)_SS x = f, until the
+   first node reaches its residual strength.
+5. If K - W is not positive definite on S, a patch is unstable. Then
+   take a few steps with frozen strengths, K_SS x = f, which never pass
+   the least equilibrium.
 
-Departures from the source: strength has a corner, and steps end at a tolerance. If
-thousands of nodes slip, the test remains undecided, because each step solves a
-dense system.
+Departures from the source: strength has a corner, and steps end at a
+tolerance. If thousands of nodes slip, the test remains undecided,
+because each step solves a dense system.
 """
 
 import numpy as np
@@ -60,8 +61,8 @@ GRIFFITH_MARGIN = 1.5
 def rms_difference(problem: Problem, sample: Sample, stress: Array) -> float:
     """Return the relative rms difference between exact and predicted onsets over samples.
 
-    The result is an estimate. Differences below the narrowest bracket, 1 %, count as
-    zero. The result is infinite if a sample is undecided.
+    The result is an estimate. Differences below the narrowest bracket,
+    1 %, count as zero. The result is infinite if a sample is undecided.
 
     Parameters
     ----------
@@ -128,7 +129,8 @@ def slides(
         overstress = load - np.fft.irfft(symbol * np.fft.rfft(slip), nodes) - strength
         # 2.
         intact = np.flatnonzero(slip < critical)
-        # A run of residual nodes lies between two neighbours among the intact nodes.
+        # A run of residual nodes lies between two neighbours among the
+        # intact nodes.
         run = (
             np.diff(intact, append=intact[:1] + nodes).max(initial=0) if intact.size else nodes
         )
@@ -140,7 +142,8 @@ def slides(
         force = np.maximum(overstress[moving], 0.0)
         if force.max(initial=0.0) < REST_RTOL * scale:
             return False
-        # K is a Toeplitz matrix: its entries depend on the distance of two nodes.
+        # K is a Toeplitz matrix: its entries
+        # depend on the distance of two nodes.
         stiffness = column[np.abs(np.subtract.outer(moving, moving))]
         # 4.
         # A step beyond a corner may pass the least equilibrium.
@@ -166,9 +169,9 @@ def _unstoppable_nodes(
 ) -> float:
     """Return the length, in nodes, of an unstoppable crack. Infinite without a stress drop.
 
-    Griffith's length is 4 G* E/(pi D^2), with the largest fracture energy E and the
-    smallest stress drop D. Between half-spaces, K_0 is pi G*/4 divided by the
-    spacing.
+    Griffith's length is 4 G* E/(pi D^2), with the largest fracture
+    energy E and the smallest stress drop D. Between half-spaces, K_0 is
+    pi G*/4 divided by the spacing.
     """
     drop = float(np.min(load - residual))
     energy = float(np.max((peak - residual) ** 2 / (2.0 * weakening_rate)))

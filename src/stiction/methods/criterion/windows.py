@@ -16,12 +16,14 @@ On a line, the window has the nucleation length h_n, and y is the eigenfunction 
 K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights for the nodes
 (`eigenfunction`). On a plane, the window is an ellipse. For each of five aspects:
 
-1. Start with a small box of nodes, made periodic with the stiffness between its own
-   nodes. A block of a Toeplitz matrix is a block of a circulant matrix, so the
-   problem on an ellipse of at most half the length of the box stays the same. The
-   cost depends on the size of the ellipse, not of the plane.
-2. Find by bisection the smallest ellipse in the box whose lowest eigenvalue is at
-   most W (`_smallest_unstable`), with LOBPCG (`elasticity.operator`).
+1. Start with a small box of nodes, made periodic with the stiffness
+   between its own nodes. A block of a Toeplitz matrix is a block of a
+   circulant matrix, so the problem on an ellipse of at most half the
+   length of the box stays the same. The cost depends on the size of the
+   ellipse, not of the plane.
+2. Find by bisection the smallest ellipse in the box whose lowest
+   eigenvalue is at most W (`_smallest_unstable`), with LOBPCG
+   (`elasticity.operator`).
 3. If every ellipse in the box is stable, double the box and repeat step 2. If the
    box is already the whole plane, the window does not fit.
 
@@ -43,8 +45,9 @@ from stiction.methods.criterion.eigenfunction import around, grid_weights
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 
-# Aspects of the ellipses, relative to the middle ellipse. With the paper's
-# strength nine shapes from 0.8 to 2 lower the bound by less than 0.05 % more.
+# Aspects of the ellipses, relative to the middle ellipse. With the
+# paper's strength nine shapes from 0.8 to 2 lower the bound by less
+# than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
 EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
 MAX_ELLIPSE_ITERATIONS = 500
@@ -74,9 +77,10 @@ def windows_of(
 ) -> list[Window]:
     """Return the critical windows for a weakening rate (Pa/m), or raise an `InputError`.
 
-    A line has a single window. A plane has a window for each multiple of the aspect
-    1/sqrt(1 - nu), because the critical length in mode II is 1/(1 - nu) times the
-    critical length in mode III. Every window must fit on the interface.
+    A line has a single window. A plane has a window for each multiple
+    of the aspect 1/sqrt(1 - nu), because the critical length in mode II
+    is 1/(1 - nu) times the critical length in mode III. Every window
+    must fit on the interface.
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(W)[0]
@@ -182,8 +186,9 @@ def _smallest_unstable(
 ) -> Ellipse | None:
     """Step 2: find the smallest unstable ellipse up to `max_square` (m²), or `None`, by bisection.
 
-    `column` holds the stress (Pa) at each node of the box due to unit slip at node
-    (0, 0). Ellipses up to `stable_square` are known to be stable.
+    `column` holds the stress (Pa) at each node of
+    the box due to unit slip at node (0, 0). Ellipses
+    up to `stable_square` are known to be stable.
     """
     symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, W, column.shape)._replace(

@@ -21,8 +21,9 @@ _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a war
 
 def warn_if_coarse(problem: Problem, rows: Sample) -> None:
     """Warn if the grid does not resolve the nucleation length, with the expected error."""
-    # A power law through the largest errors of rough fields, relative to 126 nodes: 16 %, 3 % and
-    # 0.6 % at 8, 16 and 32 nodes (docs/validation.md).
+    # A power law through the largest errors of rough fields, relative
+    # to 126 nodes: 16 %, 3 % and 0.6 % at 8, 16 and 32 nodes
+    # (docs/validation.md).
     nodes = min(problem.nodes_in_nucleation_length(rows.steepest_weakening_rate))
     percent = 3.0 * (16.0 / nodes) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
@@ -57,7 +58,8 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
 def at_first_slip(run: Run) -> RuptureState | None:
     """Return the state of rest at the first slip, or `None` if the load never causes slip.
 
-    If loading is too fast for the grid, raise an `InputError` or issue a warning.
+    If loading is too fast for the grid,
+    raise an `InputError` or issue a warning.
     """
     time, step = run.first_slip(), run.medium.step
     if time is None or time >= run.setting.thresholds.end_time:
@@ -100,8 +102,8 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
     """Return the rise of the load while shear waves cross the nucleation length, and its rate.
 
-    The rise is a share of the stress scale, and the rate is in Pa/s. Both are zero without
-    arrested events.
+    The rise is a share of the stress scale, and the rate is in Pa/s.
+    Both are zero without arrested events.
     """
     first_slip = run.first_slip()
     if first_slip is None or not result["arrested_events"] > 0:
@@ -130,7 +132,8 @@ def check_finite(run: Run, state: RuptureState, reason: int) -> None:
     """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
     if reason == Reason.NOT_FINITE:
         now = state.now
-        # In an implicit step only the attempt was non-finite, and all nodes have values.
+        # In an implicit step only the attempt was non-finite, and all
+        # nodes have values.
         places = [
             f" {run.medium.interface.describe_node(node)} (node {node}),"
             for node in np.flatnonzero(~np.isfinite(state.slip_rate))[:1]

@@ -6,10 +6,11 @@ Find the slip increments u >= 0 (m) in a step, such that at every node
 
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
-g is the stress at the end of a step without slip (`tables.trial_stress`). M is a
-circulant matrix with positive eigenvalues (`tables.symbol`, Pa/m): elasticity,
-memory and radiation. The strength of a node follows a straight line, b - w u. As u
-grows, the node may pass to a different line. w is the weakening rate of the node
+g is the stress at the end of a step without slip
+(`tables.trial_stress`). M is a circulant matrix with positive
+eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and radiation.
+The strength of a node follows a straight line, b - w u. As u grows, the
+node may pass to a different line. w is the weakening rate of the node
 (`tables.falling`), and g - b is `tables.driving`.
 
 Algorithm (`solve_increment`)
@@ -18,21 +19,22 @@ The algorithm is a semismooth Newton iteration in the form of a primal-dual acti
 set (M. Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13,
 2002):
 
-1. Begin with the set S of nodes that already slip or whose trial stress exceeds
-   their strength. Use the straight lines of the first guess.
-2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere (`_solve`).
-   This uses conjugate gradients (M. Hestenes and E. Stiefel, Journal of Research of
-   the National Bureau of Standards 49, 1952), preconditioned with M^-1 restricted
-   to S. The letters are the same as in this source: residual r, direction p, z =
-   M^-1 r.
-3. Nodes outside S whose stress exceeds their strength join S, and nodes with u < 0
-   leave S. Every node moves to the straight line that belongs to its u.
+1. Begin with the set S of nodes that already slip or whose trial stress
+   exceeds their strength. Use the straight lines of the first guess.
+2. On S solve (M - W) u = g - b, W = diag(w), with u = 0 elsewhere
+   (`_solve`). This uses conjugate gradients (M. Hestenes and E.
+   Stiefel, Journal of Research of the National Bureau of Standards 49,
+   1952), preconditioned with M^-1 restricted to S. The letters are the
+   same as in this source: residual r, direction p, z = M^-1 r.
+3. Nodes outside S whose stress exceeds their strength join S, and nodes
+   with u < 0 leave S. Every node moves to the straight line that
+   belongs to its u.
 4. Repeat from step 2 until no node changes.
 
-Departures: the search ends without a result after too many iterations, or at a
-direction of negative curvature (a patch is then unstable at this step size). With a
-curved law, a node counts as changed only if its strength changes by more than a
-bound.
+Departures: the search ends without a result after too many iterations,
+or at a direction of negative curvature (a patch is then unstable at
+this step size). With a curved law, a node counts as changed only if its
+strength changes by more than a bound.
 """
 
 from typing import Any
@@ -111,9 +113,10 @@ def solve_increment(
 ) -> Any:
     """Find the slip increments of an implicit step. Return whether they were found.
 
-    `tables.increment` and `tables.slipping` hold the first guess, and then the solution. The stress
-    is accurate to `accuracy` (Pa). The strength may differ by `line_accuracy` (Pa) from the
-    straight line that replaces it.
+    `tables.increment` and `tables.slipping` hold the first guess, and
+    then the solution. The stress is accurate to `accuracy` (Pa). The
+    strength may differ by `line_accuracy` (Pa) from the straight line
+    that replaces it.
     """
     u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
     driving, falling, product = tables.driving, tables.falling, tables.product

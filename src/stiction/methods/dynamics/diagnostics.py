@@ -6,50 +6,58 @@ Waves carry away the unbalanced stress, so the mean stress on the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-If the interface has an extent, <tau> is the mean over all nodes (`whole_stress`),
-and the nodes beyond the extent take over stress without any waves. Results are
-means over the nodes that can break (`mean_stress`).
+If the interface has an extent, <tau> is the mean over all nodes
+(`whole_stress`), and the nodes beyond the extent take over stress
+without any waves. Results are means over the nodes that can break
+(`mean_stress`).
 
-An instability is slip that the load does not drive: after a maximum of <tau>,
-waves lower <tau> by `EVENT_DROP` of the stress scale (`docs/theory.md`). The
-instability began at that maximum. A falling load also lowers <tau>, but without an
-instability. Therefore the relevant fall is
+An instability is slip that the load does not drive: after a maximum of
+<tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
+(`docs/theory.md`). The instability began at that maximum. A falling
+load also lowers <tau>, but without an instability. Therefore the
+relevant fall is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
-It counts only if the mean strength of all nodes has fallen as far as <tau> ever did since
-the maximum. Slipping nodes carry their strength, and static stress transfer only takes load
-off them (the sum of K d over them is not negative). So the sum of (1) over them says that Z <V>
-grows by no more than strength falls and the load on them rises. In a slow instability strength
-falls by ten times as much as <tau>. If locked nodes at their residual strength slip again because
-the load rises, waves may overshoot and lower <tau>, but strength does not fall. A stress above the
-strength at the start counts as strength, because the release of this stress is also an
-instability.
+It counts only if the mean strength of all nodes has fallen as far as
+<tau> ever did since the maximum. Slipping nodes carry their strength,
+and static stress transfer only takes load off them (the sum of K d over
+them is not negative). So the sum of (1) over them says that Z <V> grows
+by no more than strength falls and the load on them rises. In a slow
+instability strength falls by ten times as much as <tau>. If locked
+nodes at their residual strength slip again because the load rises,
+waves may overshoot and lower <tau>, but strength does not fall. A
+stress above the strength at the start counts as strength, because the
+release of this stress is also an instability.
 
 Algorithm, after each step of a run (`observe`)
 -----------------------------------------------
 1. Compute the fall (2).
 2. While <tau> is practically at its maximum, the fastest node is the place of the
-   maximum. At slow loading, all creeping patches are about equally slow at the
-   maximum. The unstable patch is faster only just after the maximum.
-3. An instability ends when <tau> rises above the maximum at which it began. It
-   was arrested if a node slipped faster than `Thresholds.unstable_slip_rate`, which
-   the waves of an earlier instability do not reach. The present <tau> is the next
-   maximum. (Explicit steps also end an instability when the interface is calm (see
-   `explicit`).)
-4. Between instabilities a higher <tau> is the next maximum, and a fall by
-   `EVENT_DROP` begins an instability. The onset is the instability with the
-   highest maximum so far.
-5. Note <tau> once all nodes that can break are at their residual strength. From
-   then on no instability can begin. Reaching this state is not an instability by
-   itself, because the last nodes beside the end of an extent may creep to this
-   state. If they do, the interface slid in the previous instability, which then
-   does not count as arrested.
+   maximum. At slow loading, all creeping patches are
+   about equally slow at the maximum. The unstable
+   patch is faster only just after the maximum.
+3. An instability ends when <tau> rises above the maximum at which it
+   began. It was arrested if a node slipped faster than
+   `Thresholds.unstable_slip_rate`, which the waves of an earlier
+   instability do not reach. The present <tau> is the next maximum.
+   (Explicit steps also end an instability when the interface is calm
+   (see `explicit`).)
+4. Between instabilities a higher <tau> is the next maximum, and a fall
+   by `EVENT_DROP` begins an instability. The onset is the instability
+   with the highest maximum so far.
+5. Note <tau> once all nodes that can break are at their
+   residual strength. From then on no instability can begin.
+   Reaching this state is not an instability by itself, because
+   the last nodes beside the end of an extent may creep to this
+   state. If they do, the interface slid in the previous
+   instability, which then does not count as arrested.
 
-This has two consequences. A maximum without such a fall, for example the largest
-load or the stress that returns when slip ends, is not an instability. If the stress
-is above the strength at the start, the maximum is the mean stress before the first
-slip, with which a run begins (`Run.start`).
+This has two consequences. A maximum without such a fall, for example
+the largest load or the stress that returns when slip ends, is not an
+instability. If the stress is above the strength at the start, the
+maximum is the mean stress before the first slip, with which a run
+begins (`Run.start`).
 """
 
 from typing import Any, NamedTuple
@@ -93,9 +101,10 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
         max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
-    The second term is the drop that the load provides. If strengths are similar, the scale is the
-    mean of tau_p - tau_r. Nodes far stronger than the load, or unbreakable, do not raise
-    it. The scale grows as the load becomes able to break them.
+    The second term is the drop that the load provides. If strengths are
+    similar, the scale is the mean of tau_p - tau_r. Nodes far stronger
+    than the load, or unbreakable, do not raise it. The scale grows as
+    the load becomes able to break them.
     """
     peak, residual = nodes.peak, nodes.residual
     profile, initial = nodes.profile, nodes.initial
@@ -191,8 +200,9 @@ def finish_step(
 ) -> Any:
     """Update diagnostics, arrivals and the record. Return the fall of the mean stress, Pa.
 
-    `increments` is the slip of the nodes in the step (m), and `strength` is their strength after
-    the step (Pa). If the record has no rows, it stays empty.
+    `increments` is the slip of the nodes in the step (m), and
+    `strength` is their strength after the step (Pa). If the record has
+    no rows, it stays empty.
     """
     now = state.diagnostics[0]
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
@@ -208,10 +218,12 @@ def finish_step(
             margin, margin_node = stress[i] + strength[i], i
         if slip[i] >= residual_slip[i]:
             weakened += 1
-        # A node that does not weaken has d_c = 0: there the first slip counts.
+        # A node that does not weaken has d_c
+        # = 0: there the first slip counts.
         front = thresholds.front_share * residual_slip[i]
         if np.isnan(arrival[i]) and slip[i] > 0.0 and slip[i] >= front:
-            # Assume that slip grew at a constant rate in the step, and interpolate.
+            # Assume that slip grew at a constant rate in the step, and
+            # interpolate.
             passed = (slip[i] - front) / max(increments[i], 1e-300)
             arrival[i] = step.time - step.size * min(1.0, passed)
         slip_sum += slip[i]

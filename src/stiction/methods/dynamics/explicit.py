@@ -9,8 +9,8 @@ rate V_hat acts for the whole step and leads to the slip d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 
-The state of a node follows from the stress that it would carry at rest and its
-strength s(d):
+The state of a node follows from the stress that it would carry at rest
+and its strength s(d):
 
     V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.            (2)
 
@@ -18,16 +18,16 @@ Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 19
 ----------------------------------------------------------------------------------
 1. Predict: the present rate V_0 acts for the whole step (`_transfer`), and (2)
    gives the rate V* at the end (`_predict`).
-2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The slip grows
-   by h times this mean, and (2) gives the rate and the stress at the end
-   (`_correct`).
+2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The
+   slip grows by h times this mean, and (2) gives the rate and the
+   stress at the end (`_correct`).
 3. Advance slip and memory of the modes by the same mean
    (`memory.advance_memory`).
-4. Update the diagnostics (`diagnostics`). Return if the run ends, or if the
-   interface is so calm that implicit steps can take over (`_calm`).
+4. Update the diagnostics (`diagnostics`). Return if the run ends, or if
+   the interface is so calm that implicit steps can take over (`_calm`).
 
-The step is stable below the limit of `medium.largest_step`. By (2) a node cannot
-slip backwards.
+The step is stable below the limit of `medium.largest_step`. By (2) a
+node cannot slip backwards.
 """
 
 from typing import Any
@@ -119,13 +119,14 @@ def _correct(
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
     """Step 4: count successive calm steps. Return whether they suffice for implicit steps.
 
-    Slip rates due to waves come and go. Creep is slow, or as fast as when the count
-    began.
+    Slip rates due to waves come and go. Creep is slow, or as fast as
+    when the count began.
     """
     scale, before, top = now.scale, now.calm_slip_rate, now.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
-    # Once all nodes have broken only the load drives steady slip, however fast it is.
+    # Once all nodes have broken only the load drives steady slip,
+    # however fast it is.
     slid = thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable
     slow = top < STEADY_STRESS * scale / impedance or slid
     if quiet or (steady and slow):
@@ -146,7 +147,8 @@ def explicit_steps(
 ) -> Any:
     """Take up to `count` explicit steps in place. Return (steps taken, reason).
 
-    `state.phase` is EXPLICIT. `record` has at least `count` rows, or no rows to keep no record.
+    `state.phase` is EXPLICIT. `record` has at least `count` rows, or no
+    rows to keep no record.
     """
     n, impedance, step = state.slip.size, grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
@@ -160,7 +162,8 @@ def explicit_steps(
         forward(grid.transform, state.slip_rate, slip_rate_hat)
         _transfer(grid, slip_hat, state.memory_sum, tables)
         _predict(state, setting, tables, load, impedance)
-        # 2. Correct. The transform is linear, so average the transforms of both rates.
+        # 2. Correct. The transform is linear, so average the transforms
+        # of both rates.
         forward(grid.transform, tables.predicted, tables.shared)
         for q in range(slip_rate_hat.size):
             slip_rate_hat[q] = 0.5 * (slip_rate_hat[q] + tables.shared[q])

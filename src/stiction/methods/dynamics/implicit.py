@@ -9,30 +9,32 @@ order the slip rate at the end of the step is
 
     V = u/h + r (u/h - V'),                                                                   (1)
 
-as in the two-step backward differences of C. F. Curtiss and J. O. Hirschfelder
-(Proceedings of the National Academy of Sciences 38, 1952). In the step, the rate
-changes linearly with the slope a = 2 r (u/h - V')/h. If there is no previous step,
-r = 0, and the step is of first order. The stress at the end is, mode by mode,
+as in the two-step backward differences of C. F. Curtiss and J. O.
+Hirschfelder (Proceedings of the National Academy of Sciences 38, 1952).
+In the step, the rate changes linearly with the slope a = 2 r (u/h -
+V')/h. If there is no previous step, r = 0, and the step is of first
+order. The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
         + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
 
-with S, B and R of `memory`. This is linear in u, so u solves the complementarity
-problem of `complementarity` with a circulant matrix.
+with S, B and R of `memory`. This is linear in u, so u solves the
+complementarity problem of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
 1. Choose a size: as proposed, but smaller if the load would rise too much. The step
-   is cut short at a turning point of the load or at the end time (`_choose_size`).
+   is cut short at a turning point of the load or at the end time
+   (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
-4. Go to step 1 with half the size if no u is found (a patch is unstable at this
-   size), if a node weakens too much (`_effect`), or if the interface accelerates
-   too much (`_accelerates`). If half the size is below the smallest size, explicit
-   steps take over.
+4. Go to step 1 with half the size if no u is found (a patch is unstable
+   at this size), if a node weakens too much (`_effect`), or if the
+   interface accelerates too much (`_accelerates`). If half the size is
+   below the smallest size, explicit steps take over.
 5. Take the step (`_accept`), and update the diagnostics (`diagnostics`).
-6. Choose the next size from the weakening of the nodes (`_next_size`). Sizes
-   change by powers of sqrt 2, so that tables can be used again.
+6. Choose the next size from the weakening of the nodes (`_next_size`).
+   Sizes change by powers of sqrt 2, so that tables can be used again.
 """
 
 from typing import Any, NamedTuple
@@ -70,8 +72,8 @@ _SMALL_DROP = 0.1  # a node with a smaller tau_p - tau_r is not resolved to `sli
 _FREE_LOAD_RISE = 5e-7  # rise of the load in a step with any acceleration
 _NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
 _MAX_ACCELERATION = 1.3  # largest factor of this growth
-# Sizes are powers of sqrt(2) times the smallest size, up to round-off, which must
-# not decide.
+# Sizes are powers of sqrt(2) times the smallest size, up to round-off,
+# which must not decide.
 _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
@@ -120,7 +122,8 @@ def _assemble(
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
     size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
     impedance = grid.impedance
-    # Tables of the size and a matrix of size and ratio often serve many steps.
+    # Tables of the size and a matrix of
+    # size and ratio often serve many steps.
     other_size = not tables.filled[0] or size != tables.valid_for[0]
     if other_size:
         tabulate(grid, size, tables)
@@ -158,7 +161,8 @@ def _effect(
 ) -> Any:
     """Step 4: return (largest weakening of a node, total slip, Z <V>) due to slip increments u.
 
-    Weakening is a share of tau_p - tau_r. Creep at the residual strength counts if it is fast.
+    Weakening is a share of tau_p - tau_r. Creep at the residual
+    strength counts if it is fast.
     """
     nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
@@ -188,8 +192,8 @@ def _accelerates(
     noticed = _NOTICED_RADIATION * now.scale
     allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
     growing = radiated > noticed and radiated > allowed
-    # At the smallest size, waves of an arrested event alone are no reason for
-    # explicit steps.
+    # At the smallest size, waves of an arrested event alone are no
+    # reason for explicit steps.
     halved = 0.5 * attempt.size >= _JUST_BELOW * thresholds.smallest_step
     shorter = halved or largest > 0.1 * thresholds.slip_step
     return growing and matters and shorter and attempt.ratio > 0.0
@@ -261,8 +265,8 @@ def implicit_steps(
 ) -> Any:
     """Take up to `count` accepted implicit steps in place. Return (steps, next size, reason).
 
-    The parameters are described in `explicit_steps`. `state.phase` is IMPLICIT, and `step` is the
-    first size to try.
+    The parameters are described in `explicit_steps`. `state.phase` is
+    IMPLICIT, and `step` is the first size to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
     smallest = _JUST_BELOW * thresholds.smallest_step

@@ -2,14 +2,15 @@
 
 A run goes through phases (`Run.take_steps`):
 
-1. It begins at rest at the first slip, or at an equilibrium (`Run.start`).
-   Implicit steps come first, unless the stress is above the strength by more than
-   round-off.
+1. It begins at rest at the first slip, or at an equilibrium
+   (`Run.start`). Implicit steps come first, unless the stress is above
+   the strength by more than round-off.
 2. Implicit steps follow creep until their size falls below
-   `Thresholds.smallest_step`. Then the memory is rescaled and explicit steps take
-   over (`_to_explicit`).
-3. Explicit steps follow waves until the interface has been calm for a while. Then
-   implicit steps take over. The first of these is of first order (`_to_implicit`).
+   `Thresholds.smallest_step`. Then the memory is rescaled and explicit
+   steps take over (`_to_explicit`).
+3. Explicit steps follow waves until the interface has been calm for a
+   while. Then implicit steps take over. The first of these is of first
+   order (`_to_implicit`).
 4. The run ends for one of the reasons in `Run.ending`.
 """
 
@@ -69,9 +70,9 @@ class Run:
     setting: Setting
     stop: str  # as `Rupture.stop`
     steepest_weakening_rate: float  # largest at any slip of nodes that may break, Pa/m
-    # Load below which no patch runs away: the mean strength of the weakest nodes
-    # that make up half a nucleation length, Pa. A few nodes of almost no strength
-    # hardly lower this mean.
+    # Load below which no patch runs away: the mean strength of the
+    # weakest nodes that make up half a nucleation length, Pa. A few
+    # nodes of almost no strength hardly lower this mean.
     least_load: float
     # Tables of the last kind of step only, since they are large.
     tables: ExplicitTables | ImplicitTables | None = None
@@ -128,8 +129,8 @@ class Run:
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
         """Phase 1: return the state at rest, or in equilibrium with a slip, with an empty memory.
 
-        If any stress exceeds the strength by more than round-off, explicit steps come
-        first.
+        If any stress exceeds the strength by more than round-off,
+        explicit steps come first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
@@ -142,8 +143,8 @@ class Run:
         limit = self.strength_after(delta)
         excess = stress - limit
         slip_rate = np.maximum(excess, 0.0) / impedance
-        # A node that has just reached its strength has not begun to slip: drop
-        # round-off.
+        # A node that has just reached its strength has not begun to
+        # slip: drop round-off.
         slip_rate[slip_rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
         stress = stress - impedance * slip_rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
@@ -217,7 +218,8 @@ class Run:
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
         """Continue to the end of the run, or to `max_steps` in total. Return (ending, `Reason`).
 
-        The ending is `None` if the run has not ended. The reason is then NOT_FINITE or DONE.
+        The ending is `None` if the run has not ended. The reason is
+        then NOT_FINITE or DONE.
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
@@ -232,12 +234,14 @@ class Run:
     ) -> tuple[int, int]:
         """Take up to `count` steps in place. Return (steps taken, reason).
 
-        The reason is DONE after `count` steps or at the end time, otherwise ALL_SLID, DROPPED,
-        AT_REST or NOT_FINITE. Each step fills a row of `record`.
+        The reason is DONE after `count` steps or at the end time,
+        otherwise ALL_SLID, DROPPED, AT_REST or NOT_FINITE. Each step
+        fills a row of `record`.
         """
         taken = 0
         while taken < count:
-            # 2. and 3. A compiled loop takes steps of one type, until it returns a reason.
+            # 2. and 3. A compiled loop takes steps of one type, until
+            # it returns a reason.
             rest_of_record = StepRecord(*(rows[taken:] for rows in record))
             steps = self._explicit if state.explicit else self._implicit
             steps_taken, reason = steps(state, count - taken, rest_of_record)
@@ -258,14 +262,15 @@ class Run:
     def _follow_event(self, state: RuptureState, rests: bool) -> None:
         """Keep the open event if it has come to rest. Open the event that has just begun.
 
-        An event comes to rest when the interface is calm (`rests`). If the next event
-        begins before, the open event ends at the maximum of the mean stress at which
-        the next event begins.
+        An event comes to rest when the interface is calm (`rests`). If
+        the next event begins before, the open event ends at the maximum
+        of the mean stress at which the next event begins.
         """
         now, slip, load, work = state.now, state.maximum_slip, "maximum_load", "maximum_work"
         if rests:
             slip, load, work = state.slip, "load", "work"
-        # A sliding interface can be calm, too. Its event has not come to rest.
+        # A sliding interface can be calm,
+        # too. Its event has not come to rest.
         thresholds = self.setting.thresholds
         slides = rests and now["all_broken"] and not thresholds.held
         slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate

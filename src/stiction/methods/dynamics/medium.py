@@ -11,13 +11,13 @@ matrix is larger than 1.
 Algorithm: our own
 ------------------
 1. Raise kappa in steps of 0.1 until an eigenvalue is larger than 1
-   (`_largest_kappa`). If it is larger after the first step, the error of the
-   memory kernel makes long waves grow, and no step is stable.
+   (`_largest_kappa`). If it is larger after the first step, the error
+   of the memory kernel makes long waves grow, and no step is stable.
 2. Bisect between the last two values of kappa.
-3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie on the
-   rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ in length and in
-   their share of mode II. The waves on the axes and in the corner grow first, so
-   take the smallest of their steps.
+3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie
+   on the rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ
+   in length and in their share of mode II. The waves on the axes and in
+   the corner grow first, so take the smallest of their steps.
 """
 
 import dataclasses
@@ -49,8 +49,8 @@ class Medium:
     grid: Grid
     step: float  # explicit time step, s
     largest_step: float  # limit of stability of the explicit step, s
-    # Kept for lines only: on a plane it would leave no memory for the tables of
-    # implicit steps.
+    # Kept for lines only: on a plane it would leave no memory for the
+    # tables of implicit steps.
     step_table: tuple[Floats, Floats] | None
 
     @property
@@ -79,8 +79,9 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
     eta, speed = solid.wave_speed_ratio, solid.shear_wave_speed
     names = ("II", "III") if interface.is_plane else (mode,)
     kernels = [kernel_sum(name, eta, tolerance) for name in names]
-    # A run needs most memory in implicit steps: memory variables and tables (on a
-    # line also the tables of explicit steps), and forty arrays of nodes.
+    # A run needs most memory in implicit steps: memory variables and
+    # tables (on a line also the tables of explicit steps), and forty
+    # arrays of nodes.
     modes, pairs = interface.wavenumbers.size, sum(kernel.poles.size for kernel in kernels)
     tables = 6 * modes / 2 if interface.is_plane else 10 * modes
     size = 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
@@ -100,8 +101,9 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """Return stiffness and memory on the modes of the interface.
 
-    On a plane a wave vector has the share a = (kx/k)² of mode II and b = 1 - a of mode III
-    (P. Geubelle and J. Rice, 1995), in K and in the memory (G k/2)[a C_II + b C_III] * V.
+    On a plane a wave vector has the share a = (kx/k)² of mode II and b
+    = 1 - a of mode III (P. Geubelle and J. Rice, 1995), in K and in the
+    memory (G k/2)[a C_II + b C_III] * V.
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share

@@ -6,13 +6,15 @@ Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the convoluti
 
     S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
 
-It is therefore enough to store a memory variable for each pair (s_p, w_p) and mode,
+It is therefore enough to store a memory variable for each pair (s_p,
+w_p) and mode,
 
     psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
 
-The real and the imaginary part of V are two real signals. Each signal has a complex
-psi_p. On a plane the pairs before `Grid.split` have the weight (kx/k)² w_p. The
-pairs of mode III follow, with the weight (1 - (kx/k)²) w_p.
+The real and the imaginary part of V are two real signals. Each signal
+has a complex psi_p. On a plane the pairs before `Grid.split` have the
+weight (kx/k)² w_p. The pairs of mode III follow, with the weight (1 -
+(kx/k)²) w_p.
 
 Algorithm
 ---------
@@ -21,24 +23,26 @@ of Computational Physics 176, 2002): psi' = z/h psi + V is integrated exactly if
 slip rate is a polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and
 phi(z) = (exp(z) - 1)/z:
 
-1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h phi(z). The
-   variables are stored as y = psi/B, which saves a multiplication in each pass:
+1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h
+   phi(z). The variables are stored as y = psi/B, which saves a
+   multiplication in each pass:
 
        y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
 
-   (`advance_memory`). The sum is the part of S at the end of the next step that
-   is already known. The slip rate of that step adds V Re sum_p w_p B (`response`
-   of `step_table`).
-2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables are stored as psi:
+   (`advance_memory`). The sum is the part of S at the end of the next
+   step that is already known. The slip rate of that step adds V Re
+   sum_p w_p B (`response` of `step_table`).
+2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables
+   are stored as psi:
 
        psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
 
    (`advance_with_ramp`, with the tables of `tabulate`). Before that
-   `fading_memory` sums Re sum_p w_p E psi, the part of S at the end of the step
-   that is already known.
-3. Between the two types of steps, `to_explicit` divides by B and `to_implicit`
-   multiplies by B. Both set `Phase`, which states the form of
-   `RuptureState.memory`.
+   `fading_memory` sums Re sum_p w_p E psi, the part of S at the end of
+   the step that is already known.
+3. Between the two types of steps, `to_explicit` divides by B and
+   `to_implicit` multiplies by B. Both set `Phase`, which states the
+   form of `RuptureState.memory`.
 
 Layout
 ------
@@ -94,12 +98,14 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
         entry = np.maximum(np.arange(half[0]) - 1, 0)  # the mean has no memory
         copy, multiplicity = np.zeros_like(entry), 1
     else:
-        # Row r and row n - r have opposite kx, and share an entry as two copies.
+        # Row r and row n - r have opposite kx,
+        # and share an entry as two copies.
         row = np.arange(half[0])
         folded = np.minimum(row, half[0] - row)
         entry = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
         copy, multiplicity = np.repeat((row > half[0] // 2).astype(np.int64), half[1]), 2
-    # Copies of a block follow each other, and each has a real and an imaginary row.
+    # Copies of a block follow each other, and each has a real and an
+    # imaginary row.
     offset = (entry // ENTRIES * multiplicity + copy) * (2 * ENTRIES) + entry % ENTRIES
     return entry, offset, multiplicity
 
@@ -112,8 +118,8 @@ def blocks(entries: int) -> int:
 def zeros(size: int, kind: type = float) -> NDArray[Any]:
     """Return zeros that begin at a cache line, so that no vector in a pass crosses two lines.
 
-    NumPy's arrays may begin 16 bytes later. Every second load would then touch two lines, which
-    makes a pass a third slower.
+    NumPy's arrays may begin 16 bytes later. Every second load would
+    then touch two lines, which makes a pass a third slower.
     """
     buffer = np.zeros(size * np.dtype(kind).itemsize + CACHE_LINE, dtype=np.uint8)
     first = -buffer.ctypes.data % CACHE_LINE
@@ -123,9 +129,9 @@ def zeros(size: int, kind: type = float) -> NDArray[Any]:
 def work_arrays(count: int, size: int, kind: type) -> list[NDArray[Any]]:
     """Return work arrays whose distance is not a multiple of a page, to avoid waiting loads.
 
-    If two addresses are equal modulo 4096 bytes, processors assume that a load from the first
-    depends on an earlier store to the second. On grids with a power of two nodes, steps
-    would take 50 % longer.
+    If two addresses are equal modulo 4096 bytes, processors assume that
+    a load from the first depends on an earlier store to the second. On
+    grids with a power of two nodes, steps would take 50 % longer.
     """
     distance = -(-size // 8) * 8 + 80
     buffer = zeros(count * distance, kind)
@@ -181,13 +187,14 @@ def advance_memory(
 ) -> None:
     """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
-    `e` has four rows for each pair: the real and imaginary parts of E, and of w E B.
+    `e` has four rows for each pair: the real and imaginary parts of E,
+    and of w E B.
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):
-        # Views begin at zero, so that the compiler can exclude negative indices.
-        # Make them once per block and not for each pair, since a view costs as
-        # much as a few modes.
+        # Views begin at zero, so that the compiler can exclude negative
+        # indices. Make them once per block and not for each pair, since
+        # a view costs as much as a few modes.
         e = table[table_block * size :][:size]
         for copy in range(multiplicity):
             block = table_block * multiplicity + copy
@@ -201,7 +208,8 @@ def advance_memory(
             for p in range(pairs):
                 o = p * FOUR_ROWS
                 # (3) for 64 modes at once. Complex numbers are pairs of real ones in rows
-                # of constant length, so that the compiler vectorises the loop.
+                # of constant length, so that the
+                # compiler vectorises the loop.
                 for j in range(ENTRIES):
                     # E and w E B of the pair, which both signals share.
                     er, ei = e[o + j], e[o + ENTRIES + j]
@@ -229,7 +237,8 @@ def to_explicit(
     _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)
-    # The next explicit step needs the sum in (3), which only explicit steps update.
+    # The next explicit step needs the sum in (3), which only explicit
+    # steps update.
     y = state.memory.reshape(count, grid.multiplicity, pairs, 2, 2, ENTRIES)  # of both signals
     for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
         real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
@@ -293,11 +302,12 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
 def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
     """Step 2: write E, B and R of (4) for a step h, and their weighted sums.
 
-    E and B are written to `table` with the layout [block][pair][4][64], and R to `ramp`
-    with [block][pair][2][64]. Re sum w B and Re sum w R are written to `response` and
-    `ramp_response`. On a line |k| c_s is j + 1 times the lowest frequency, so the
-    exponentials for a pole are powers of the same number. Each takes one product, and
-    has a relative error of 1e-16 j.
+    E and B are written to `table` with the layout [block][pair][4][64],
+    and R to `ramp` with [block][pair][2][64]. Re sum w B and Re sum w R
+    are written to `response` and `ramp_response`. On a line |k| c_s is
+    j + 1 times the lowest frequency, so the exponentials for a pole are
+    powers of the same number. Each takes one product, and has a
+    relative error of 1e-16 j.
     """
     table, ramp = tables.table, tables.ramp
     response, ramp_response = tables.response, tables.ramp_response
@@ -308,7 +318,8 @@ def tabulate(grid: Grid, step: float, tables: ImplicitTables) -> None:
         pole, weight = grid.poles[p], grid.weights[p]
         unit = pole * (grid.frequency[0] * step)
         base = np.exp(unit)
-        # On a plane the lowest frequency is zero, and z is computed entry by entry.
+        # On a plane the lowest frequency is zero, and z is computed
+        # entry by entry.
         inverse = 1.0 / unit if grid.multiplicity == 1 else 0.0j
         decay = 1.0 + 0.0j
         for j in range(response.size):
@@ -346,7 +357,8 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(TWO_ROWS):
             sums[0, j] = sums[1, j] = 0.0
         for p in range(pairs):
-            # Views begin at zero, so that the compiler can exclude negative indices.
+            # Views begin at zero, so that the compiler can exclude
+            # negative indices.
             y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             e = tables.table[(block // multiplicity * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             out = sums[0 if p < split else 1]
@@ -359,8 +371,8 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(TWO_ROWS):
             tables.packed[block * TWO_ROWS + j] = sums[0, j]
             tables.second_packed[block * TWO_ROWS + j] = sums[1, j]
-    # The tables do not hold the shares of the modes on a plane: weight the two
-    # sums here.
+    # The tables do not hold the shares of the modes on a plane: weight
+    # the two sums here.
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]
         share_three = 1.0 - share
@@ -410,7 +422,8 @@ def grown_memory(
     """
     total = np.zeros(slip_rate_hat.size, dtype=np.complex128)
     slip_rate, entry, pairs = slip_rate_hat[1:], grid.entry[1:], grid.poles.size
-    # Place of each mode in the memory of the first pair: its block, and its column.
+    # Place of each mode in the memory of the
+    # first pair: its block, and its column.
     first = grid.offset[1:] // TWO_ROWS * pairs * FOUR_ROWS + grid.offset[1:] % ENTRIES
     for p in range(pairs):
         share = grid.mode_two[entry] if p < grid.split else 1.0 - grid.mode_two[entry]

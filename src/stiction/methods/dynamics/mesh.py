@@ -27,9 +27,10 @@ Algorithm (`make_mesh`)
 1. Place the rows. Compute elements, masses and the stencils that move nodes.
 2. Condense the static response: eliminate the rows from the top downwards
    (`condensed`; R. J. Guyan, AIAA Journal 3, 1965).
-3. Correct the static response: the K of the closed form minus the K of the mesh
-   acts on the slip of the interface.
-4. Find the stable step for mesh, viscosity and correction together (`_limit`).
+3. Correct the static response: the K of the closed form minus the K of
+   the mesh acts on the slip of the interface.
+4. Find the stable step for mesh, viscosity
+   and correction together (`_limit`).
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ class Mesh(NamedTuple):
     """Mass of a node of each row, kg/m."""
     elements: Array
     """Stiffness of the elements above each row but the last, (rows - 1, 2, 2, 2, 2, 2, 2), Pa. The
-    indices are lower or upper row, x or y, left or right, for the force and then for the
+    indices are lower or upper row, x or y, left or right, for the force
+    and then for the
     displacement."""
     strips: Array
     """Stiffness of the half cells at the ends, along x and y, (rows - 1, 2), Pa."""
@@ -157,7 +159,8 @@ def row_heights(height: float, spacing: float) -> Array:
         ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
     )
     count = max(int(np.searchsorted(np.cumsum(steps), height * (1.0 - 1e-9))) + 1, 2)
-    # Stretch the rows to end at the top, except the first, which fits the interface.
+    # Stretch the rows to end at the top, except the first, which fits
+    # the interface.
     steps = steps[:count]
     steps[1:] *= (height - spacing) / steps[1:].sum()
     return np.concatenate([[0.0], np.cumsum(steps)])
@@ -168,8 +171,8 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
-    # Weights of the corners (row, axis, column) in a mean strain, and in an
-    # hourglass mode.
+    # Weights of the corners (row, axis, column) in a mean strain, and
+    # in an hourglass mode.
     along = [np.multiply.outer([0.5, 0.5], np.outer(axis, sign)) for axis in axes]
     up = [0.5 * np.multiply.outer(sign, np.outer(axis, [1.0, 1.0])) for axis in axes]
     twist = [np.multiply.outer(sign, np.outer(axis, sign)) for axis in axes]
@@ -177,7 +180,8 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
     def times(stiffness: Any, left: Array, right: Array) -> Array:
         return np.multiply.outer(stiffness * np.ones_like(b), np.multiply.outer(left, right))
 
-    # Energy of u alone: stretching along x, shear by du/dy, and the hourglass mode.
+    # Energy of u alone: stretching along x, shear by du/dy, and the
+    # hourglass mode.
     elements = times(c11 * b / a, along[0], along[0]) + times(shear * a / b, up[0], up[0])
     elements += times((c11 * b / a + shear * a / b) / 12.0, twist[0], twist[0])
     stretched = 0.0
@@ -197,20 +201,21 @@ def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Arra
 def _stencils(elements: Array, strips: Array) -> Array:
     """Return the coefficients (rows, axis, 5, 3) of the force on a node.
 
-    The last index is the row below, the row of the node, and the row above. The
-    five coefficients belong to
+    The last index is the row below, the row of the node, and the row
+    above. The five coefficients belong to
 
     - the sum of both neighbours in a row, and the node itself,
     - the difference of both neighbours in the other component,
-    - at the left end, with a single neighbour, the node itself, and its other component. At the
-      right end the other component has the opposite sign.
+    - at the left end, with a single neighbour, the node itself, and its
+      other component. At the right end the other component has the
+      opposite sign.
     """
     stencils = np.zeros((len(elements) + 1, 2, 5, 3))
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
         for up in (0, 1):
             for axis in (0, 1):
-                # The stiffness gives the force that holds a node. The force on the node is
-                # its negative.
+                # The stiffness gives the force that holds a node. The
+                # force on the node is its negative.
                 same, cross = element[up, axis, :, :, axis], element[up, axis, :, :, 1 - axis]
                 end = same[0, :, 0].copy()
                 end += strip[axis] * np.where(np.arange(2) == up, 1.0, -1.0)
@@ -237,8 +242,8 @@ def _limit(
 ) -> float:
     """Return the largest stable step, s, for mesh, viscosity and correction together."""
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
-    # Bound of the squared frequency of an element, then of the correction on the
-    # interface.
+    # Bound of the squared frequency of an element, then of the
+    # correction on the interface.
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
     stiffest = float(
         scipy.linalg.eigvalsh(correction, subset_by_index=[len(correction) - 1] * 2)[0]
@@ -253,7 +258,8 @@ def _limit(
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
     """Return the stiffness of an element row, for u and v at the lower and then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
-    # Elements share nodes with their neighbours. Both matrices select the nodes of a side.
+    # Elements share nodes with their neighbours. Both matrices select
+    # the nodes of a side.
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))
     for i, to_column in enumerate(columns):
@@ -269,8 +275,8 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
     """Return K of the mesh at a given force (Pa/m), q, and C (Pa). See `elasticity.blocks`.
 
-    Motions that are even and odd about the middle of the block are independent, which
-    halves the matrices.
+    Motions that are even and odd about the middle of the block are
+    independent, which halves the matrices.
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)
@@ -289,8 +295,9 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
 def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
     """Return stiffness, force and compliance for the even or the odd motion.
 
-    Rows are eliminated from the top downwards. The matrices `folds`, of shape (nodes, half), map
-    the unknowns of half a row to u and v at all its nodes.
+    Rows are eliminated from the top downwards. The matrices `folds`, of
+    shape (nodes, half), map the unknowns of half a row to u and v at
+    all its nodes.
     """
     nodes, size = folds[0].shape
     fold = sp.csr_matrix(scipy.linalg.block_diag(*folds, *folds))
@@ -303,7 +310,8 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
     compliance = 0.0
 
     def eliminated(inner: Array, between: Any, force: Array) -> tuple[Array, Array, float]:
-        # The Schur complement, by the inverse of a Cholesky factor (LAPACK's dpotri).
+        # The Schur complement, by the inverse of a Cholesky factor
+        # (LAPACK's dpotri).
         factor = scipy.linalg.cholesky(inner, overwrite_a=True, check_finite=False)
         inverse = scipy.linalg.lapack.dpotri(factor, overwrite_c=True)[0]
         inverse = np.triu(inverse) + np.triu(inverse, 1).T

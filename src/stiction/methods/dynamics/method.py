@@ -70,60 +70,68 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 class Rupture:
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, and explicit steps follow
-    its rupture. Initial stress may exceed the strength. Such a patch breaks at once,
-    at zero load.
+    Adaptive implicit steps follow the creeping interface, and explicit
+    steps follow its rupture. Initial stress may exceed the strength.
+    Such a patch breaks at once, at zero load.
 
     Parameters
     ----------
     loading_rate : float, optional
-        d tau_0/dt, Pa/s, positive. Between half-spaces, give either this or `load`.
+        d tau_0/dt, Pa/s, positive. Between half-spaces, give either
+        this or `load`.
     kernel_tolerance : float
-        Largest error (1) of the memory kernel. The kernel is a sum of exponentials,
-        which is fitted once for each solid and stored on disk. The fit takes 1 s at
-        1e-6 (22 pairs) or half a minute at 1e-8 (35 pairs). Above about 1e-3, waves
-        may grow at any time step. This raises an error.
+        Largest error (1) of the memory kernel. The kernel is a sum of
+        exponentials, which is fitted once for each solid and stored on
+        disk. The fit takes 1 s at 1e-6 (22 pairs) or half a minute at
+        1e-8 (35 pairs). Above about 1e-3, waves may grow at any time
+        step. This raises an error.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
     slip_step : float
-        Largest slip of a weakening node in an implicit step, in units of its d_c.
+        Largest slip of a weakening node in an
+        implicit step, in units of its d_c.
     load_step : float
-        Largest rise of the load in an implicit step, in units of the stress scale
-        (see Notes).
+        Largest rise of the load in an implicit step, in units of the
+        stress scale (see Notes).
     start : {"equilibrium", "rest"}
-        "rest" starts at the first slip. "equilibrium" starts on the quasi-static
-        path, as close below the first instability as the estimated error allows.
-        `start_load` is the load at the start, and `start_error` the estimated
-        error (Pa). These runs always start at the first slip: with `load`, if the
-        loading rate is too high, if a node loses half of its strength before the
-        first instability, on planes, with curved friction laws, with an extent,
-        and with stress above the strength.
+        "rest" starts at the first slip. "equilibrium" starts on the
+        quasi-static path, as close below the first instability as the
+        estimated error allows. `start_load` is the load at the start,
+        and `start_error` the estimated error (Pa). These runs always
+        start at the first slip: with `load`, if the loading rate is too
+        high, if a node loses half of its strength before the first
+        instability, on planes, with curved friction laws, with an
+        extent, and with stress above the strength.
     end_time : float, optional
         Latest end of a run, s. The last explicit step may exceed it.
     load : (times, values), optional
-        Samples of tau_0(t), Pa, from t = 0 s, instead of a constant rate. They
-        are interpolated linearly, and the last slope continues.
+        Samples of tau_0(t), Pa, from t = 0 s, instead
+        of a constant rate. They are interpolated
+        linearly, and the last slope continues.
     arrival : float
-        Share of tau_p - tau_r that a node has lost when the front arrives, in (0, 1].
-        Use 0.5 for the middle of the cohesive zone, and 1e-3 for its tip.
+        Share of tau_p - tau_r that a node has lost when the front
+        arrives, in (0, 1]. Use 0.5 for the middle of the cohesive zone,
+        and 1e-3 for its tip.
     stop : {"sliding", "onset", "rest", "time"}
-        End of a run. "sliding": every node that can break is at its residual
-        strength and, if the interface has an extent, has come to rest. "onset":
-        the first instability has begun. "rest": after an instability, slip has
-        ended or only follows the load. An interface that slides and is never
-        unloaded also ends there. "time": at `end_time`. A sliding interface takes
-        explicit steps until then. Every run but "time" also ends when no node
-        slips and the load has stopped rising.
+        End of a run. "sliding": every node that can break is at its
+        residual strength and, if the interface has an extent, has come
+        to rest. "onset": the first instability has begun. "rest": after
+        an instability, slip has ended or only follows the load. An
+        interface that slides and is never unloaded also ends there.
+        "time": at `end_time`. A sliding interface takes explicit steps
+        until then. Every run but "time" also ends when no node slips
+        and the load has stopped rising.
     implicit : bool
-        If false, only explicit steps are taken. Slow loading then needs a million
-        steps.
+        If false, only explicit steps are taken. Slow loading then needs
+        a million steps.
     max_steps : int
-        Number of steps after which a run, or an event on a specimen, is abandoned.
+        Number of steps after which a run, or
+        an event on a specimen, is abandoned.
     events : int
-        Also return this number of events for each sample over 'event', padded with
-        NaN. Events have the variables of `equilibrium_path` and `event_duration` (s).
-        Between half-spaces they also have `event_time` (s) and
-        `event_radiated_energy` (J/m).
+        Also return this number of events for each sample over 'event',
+        padded with NaN. Events have the variables of `equilibrium_path`
+        and `event_duration` (s). Between half-spaces they also have
+        `event_time` (s) and `event_radiated_energy` (J/m).
 
     Raises
     ------
@@ -152,56 +160,62 @@ class Rupture:
     radiate. Events that did not happen have the value NaN, with a warning. An
     overstressed start has no `critical_load`.
 
-    **Speeds.** Use `median_rupture_speed` as the speed of a rupture. `rupture_speed`
-    is the largest apparent speed. It exceeds all wave speeds if a part twice as long
-    as the nucleation length breaks almost at once.
+    **Speeds.** Use `median_rupture_speed` as the speed of a rupture.
+    `rupture_speed` is the largest apparent speed. It exceeds all wave
+    speeds if a part twice as long as the nucleation length breaks
+    almost at once.
 
-    **Arrested events.** `arrested_events` counts instabilities in which Z V at a
-    node exceeds 7.5 % of the median tau_p - tau_r before the mean stress is as
-    high again or all is calm. `Equilibrium` also counts smaller jumps. If the
-    last nodes beside the end of an extent creep to their residual strength, the
-    interface slides in the last instability before, which is not arrested. A run that
-    stops at "rest" ends before this can be known.
+    **Arrested events.** `arrested_events` counts instabilities in which
+    Z V at a node exceeds 7.5 % of the median tau_p - tau_r before the
+    mean stress is as high again or all is calm. `Equilibrium` also
+    counts smaller jumps. If the last nodes beside the end of an extent
+    creep to their residual strength, the interface slides in the last
+    instability before, which is not arrested. A run that stops at
+    "rest" ends before this can be known.
 
-    **Stress scale.** At each node, it is the smaller of tau_p - tau_r and three
-    times the drop tau_0 p + tau_i - tau_r at the largest load so far, so that
-    nodes far stronger than the load do not count. The stress scale is the mean
-    over nodes.
+    **Stress scale.** At each node, it is the smaller of tau_p - tau_r
+    and three times the drop tau_0 p + tau_i - tau_r at the largest load
+    so far, so that nodes far stronger than the load do not count. The
+    stress scale is the mean over nodes.
 
-    **End.** `kinetic_stress` is the mean stress after the first step in which
-    every node that can break is at its residual strength. Energies and moment
-    refer to the end of the run. A sliding interface ends with that step, in which
-    radiated energy and moment grow by about 2 %. The last nodes beside the end of
-    an extent may creep to their residual strength while the load still rises.
-    This is no instability, and `critical_stress` remains the mean stress at the
-    highest instability before. It is NaN if all nodes that can break did so
-    without an instability.
+    **End.** `kinetic_stress` is the mean stress after the first step in
+    which every node that can break is at its residual strength.
+    Energies and moment refer to the end of the run. A sliding interface
+    ends with that step, in which radiated energy and moment grow by
+    about 2 %. The last nodes beside the end of an extent may creep to
+    their residual strength while the load still rises. This is no
+    instability, and `critical_stress` remains the mean stress at the
+    highest instability before. It is NaN if all nodes that can break
+    did so without an instability.
 
-    With "onset" and "rest", critical values belong to the highest instability,
-    which need not end in sliding. With "onset", all values that are not final are
-    NaN: kinetic stress, stress drop, moment, energies, rupture speeds and
-    arrested events.
+    With "onset" and "rest", critical values belong to the highest
+    instability, which need not end in sliding. With "onset", all values
+    that are not final are NaN: kinetic stress, stress drop, moment,
+    energies, rupture speeds and arrested events.
 
-    **Events.** An event is followed from its onset until the interface is calm,
-    or until the next event begins. The table of `events` holds it if a node
-    slipped so fast as an arrested event must. Its moment, energies and stress
-    drops are the values at its end, and `event_duration` is the time from its
-    first to its last fast slip. An event that the end of the run cuts short is
-    left out, such as the sliding of an interface without ends.
+    **Events.** An event is followed from its onset until the interface
+    is calm, or until the next event begins. The table of `events` holds
+    it if a node slipped so fast as an arrested event must. Its moment,
+    energies and stress drops are the values at its end, and
+    `event_duration` is the time from its first to its last fast slip.
+    An event that the end of the run cuts short is left out, such as the
+    sliding of an interface without ends.
 
-    **Slow loading.** Let r be the rise of the load while shear waves cross the
-    nucleation length, as a share of the stress scale. On 60 heterogeneous faults
-    of 43 nucleation lengths (mode III, peak strength 25.2 to 36 MPa, residual
-    strength 25 MPa), the moment of all events together was too large by 2 % at r
-    = 1e-4, 15 % at 3e-4, 38 % at 1e-3 and 97 % at 3e-3, and the critical load by
-    0.06, 0.2, 0.6 and 2 %. The number of arrested events rose from 9 to 14, 13,
-    14 and 19 (``validation/faults.py``). If there are arrested events and r is
-    above 1e-3, a warning gives r and the rate to use.
+    **Slow loading.** Let r be the rise of the load while shear waves
+    cross the nucleation length, as a share of the stress scale. On 60
+    heterogeneous faults of 43 nucleation lengths (mode III, peak
+    strength 25.2 to 36 MPa, residual strength 25 MPa), the moment of
+    all events together was too large by 2 % at r = 1e-4, 15 % at 3e-4,
+    38 % at 1e-3 and 97 % at 3e-3, and the critical load by 0.06, 0.2,
+    0.6 and 2 %. The number of arrested events rose from 9 to 14, 13, 14
+    and 19 (``validation/faults.py``). If there are arrested events and
+    r is above 1e-3, a warning gives r and the rate to use.
 
-    **No reverse slip.** A node whose slip rate would become negative sticks, keeps its weakened
-    strength, and slips again only when the stress reaches it. If the stress fell below minus the
-    strength, a warning gives the place. The boundary integral in Fourier space follows Breitenfeld
-    and Geubelle (1998).
+    **No reverse slip.** A node whose slip rate would become negative
+    sticks, keeps its weakened strength, and slips again only when the
+    stress reaches it. If the stress fell below minus the strength, a
+    warning gives the place. The boundary integral in Fourier space
+    follows Breitenfeld and Geubelle (1998).
     """
 
     loading_rate: Positive | None = None
@@ -249,8 +263,8 @@ class Rupture:
         if len(shape) == 1:
             usual = 0.1 if self.start == "rest" else 0.05
             return 8e-3 + usual * (shape[0] / 1024) ** 2
-        # The number of steps grows with the nodes of the longer side, the time of
-        # a step with all nodes.
+        # The number of steps grows with the nodes of the longer side,
+        # the time of a step with all nodes.
         return 1.5 * (max(shape) / 128) * (problem.interface.size / 128**2)
 
     def supports(self, problem: Problem) -> list[str]:
@@ -265,8 +279,9 @@ class Rupture:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        A rupture begins at a maximum of the mean stress, which is not below the stress of the first
-        slip. Specimens are in equilibrium up to each event.
+        A rupture begins at a maximum of the mean stress, which is not
+        below the stress of the first slip. Specimens are in equilibrium
+        up to each event.
         """
         if problem.specimen is None:
             return True, False
@@ -355,7 +370,8 @@ def make_run(
     """Return the run for a sample. It records every step at the nodes `stations`."""
     strength, residual = rows.strength[sample], rows.residual_strength[sample]
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
-    # Unbreakable nodes have an infinite strength, and an infinite residual slip.
+    # Unbreakable nodes have an infinite strength, and an infinite
+    # residual slip.
     friction, finite = medium.problem.friction, np.isfinite(strength)
     with np.errstate(over="ignore"):
         residual_slip = friction.reach * friction.critical_slip_of(
@@ -373,7 +389,8 @@ def make_run(
     load = method.load
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
-    # Implicit steps end at these times, because a step across a peak would cut it off.
+    # Implicit steps end at these times, because a step across a peak
+    # would cut it off.
     rising = np.sign(np.diff(load.values))
     setting = Setting(
         law=friction.parameters,
@@ -393,8 +410,8 @@ def make_run(
 def _least_load(medium: Medium, nodes: Nodes, steepest: float) -> float:
     """Return the mean load, Pa, at which the weakest nodes of half a nucleation length slip."""
     interface = medium.interface
-    # Half the nucleation length of a line. On a plane, half the lengths along x
-    # and y multiplied.
+    # Half the nucleation length of a line. On a plane, half the lengths
+    # along x and y multiplied.
     half = float(np.prod(medium.problem.half_spaces.nucleation_lengths(2.0 * steepest)))
     weakens = np.isfinite(nodes.peak) & (nodes.residual_slip > 0.0)
     # Nodes that never weaken cannot start a rupture.
@@ -408,9 +425,9 @@ def _thresholds(
 ) -> Thresholds:
     """Return the thresholds at which steps change or end.
 
-    A run is calm if, while shear waves cross the interface, no node slips faster than
-    in a crack with half the length of the interface that only the load drives, or if
-    no node slips faster than before.
+    A run is calm if, while shear waves cross the interface, no node
+    slips faster than in a crack with half the length of the interface
+    that only the load drives, or if no node slips faster than before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()

@@ -1,7 +1,7 @@
 """Stored results of a rupture: frames, a record of every step, and a folder on disk.
 
-A folder holds files of frames, a checkpoint from which the run resumes, and at
-the end a summary.
+A folder holds files of frames, a checkpoint from which the run resumes,
+and at the end a summary.
 """
 
 from __future__ import annotations
@@ -134,13 +134,14 @@ class Save:
     fields : sequence of {"slip", "slip_rate", "shear_stress", "strength"}
         Fields to keep in frames.
     every : int
-        Explicit steps between frames. While the interface creeps, a frame follows
-        after a tenth as many implicit steps, at least one. Steps shorten as slip
-        accelerates, so that frames are dense in time around the onset.
+        Explicit steps between frames. While the interface creeps, a
+        frame follows after a tenth as many implicit steps, at least
+        one. Steps shorten as slip accelerates, so that frames are dense
+        in time around the onset.
     stations : mapping of str to float or (float, float)
-        Names and places of stations, x or on a plane (x, y), m. Slip, slip rate
-        and shear stress (traction) are recorded after every step at the node
-        nearest to the place.
+        Names and places of stations, x or on a plane (x, y), m. Slip,
+        slip rate and shear stress (traction) are recorded after every
+        step at the node nearest to the place.
     to : path, optional
         Folder to write to during the run. Memory then stays bounded, and the
         result holds no fields; read them with
@@ -169,8 +170,8 @@ class Save:
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
         """Return the flat node numbers of stations, which must lie on the interface.
 
-        Warn about positions that are nearly zero, and about stations at nodes that
-        cannot break.
+        Warn about positions that are nearly zero, and about stations at
+        nodes that cannot break.
         """
         lengths, numbers = interface.lengths, []
         for name, place in self.stations.items():
@@ -181,7 +182,8 @@ class Save:
                     f"stations[{name!r}]: {place} is not on the interface of {reach} m. Give"
                     f" {' and '.join(interface.dims)} in m, from the first node"
                 )
-            # The nearest node. On a periodic interface the end is the first node.
+            # The nearest node. On a periodic
+            # interface the end is the first node.
             nodes = x / interface.spacings
             index = tuple(np.round(nodes).astype(int) % interface.shape)
             numbers.append(np.ravel_multi_index(index, interface.shape))
@@ -201,7 +203,8 @@ class Recorder:
         self.run, self.save, self.attributes = run, save, attributes
         interface = run.medium.interface
         self._saved = repr([save.fields, save.stations])  # part of the digest of a folder
-        # Steps write to these rows. `take_steps` copies the rows that were filled.
+        # Steps write to these rows. `take_steps` copies the rows that
+        # were filled.
         rows, stations = save.every, len(save.stations)
         self._record = StepRecord(
             np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
@@ -275,7 +278,8 @@ class Recorder:
     def begin(self, state: RuptureState) -> bool:
         """Open the folder. Return whether it holds the same run in its finished state.
 
-        If it holds a part of the same run, the state takes the values that were written last.
+        If it holds a part of the same run, the state takes the values
+        that were written last.
         """
         folder = self.save.to
         if folder is None:
@@ -293,8 +297,8 @@ class Recorder:
         read_checkpoint(checkpoint, self.run, state, self._saved)
         if (folder / _SUMMARY).exists():
             return True
-        # Frames after the checkpoint will be computed again. They come from a run that was
-        # killed between the two files.
+        # Frames after the checkpoint will be computed again. They come
+        # from a run that was killed between the two files.
         for path in folder.glob(_FRAME_FILES):
             if int(path.stem.removeprefix("frames-")) > state.steps:
                 path.unlink()
@@ -303,12 +307,13 @@ class Recorder:
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
         """Write frames and steps if there are enough, or `at_once`. Also write the checkpoint.
 
-        With `last` there is no checkpoint: a run that resumes with more steps may have no frame at
+        With `last` there is no checkpoint: a run that
+        resumes with more steps may have no frame at
         the step at which `max_steps` ended it.
         """
         folder, steps = self.save.to, sum(rows["step_time"].size for rows in self._steps)
-        # A file for every frame would be slow, and a single file would have to
-        # fit in memory.
+        # A file for every frame would be slow, and a single file would
+        # have to fit in memory.
         full = len(self._frames) >= FRAMES_PER_FILE or steps >= _MAX_STEPS_PER_FILE
         if folder is None or not (full or ((at_once or last) and self._frames)):
             return
@@ -378,14 +383,14 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     ----------
     folder : path
     fields : sequence of str, optional
-        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load. By default all
-        fields are loaded.
+        Fields over ('time', 'x'), or ('time', 'x', 'y'), to load. By
+        default all fields are loaded.
 
     Returns
     -------
     xarray.Dataset
-        The dataset of `simulate_rupture`. Variables of the whole run are there
-        once it has ended.
+        The dataset of `simulate_rupture`. Variables of the whole run
+        are there once it has ended.
 
     Raises
     ------
@@ -406,7 +411,8 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
             data_vars="minimal", coords="minimal", compat="override", join="override",
         )  # fmt: skip
 
-    # Frames and steps have different lengths in each file: join them separately.
+    # Frames and steps have different lengths
+    # in each file: join them separately.
     framed = joined("time", "step").merge(joined("step", "time"))
     framed.attrs = parts[-1].attrs
     if (place / _SUMMARY).exists():

@@ -27,15 +27,16 @@ def write_scec(
 ) -> list[Path]:
     """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
-    The direction along strike is x, the direction of slip, and the direction
-    down-dip is y. On lines y is 0. Slip has no vertical component. Times count
-    from the onset of the first event of the run, and records begin there.
+    The direction along strike is x, the direction of slip, and the
+    direction down-dip is y. On lines y is 0. Slip has no vertical
+    component. Times count from the onset of the first event of the run,
+    and records begin there.
 
     Parameters
     ----------
     run : xarray.Dataset
-        Result of `simulate_rupture` with slip, slip rate and shear stress, and
-        with stations.
+        Result of `simulate_rupture` with slip, slip rate and shear
+        stress, and with stations.
     folder : path
     origin : float or (float, float)
         Origin of distances on the interface, m.
@@ -47,16 +48,17 @@ def write_scec(
     Returns
     -------
     list of pathlib.Path
-        A file for each station, such as ``faultst075dp045.txt`` for 7.5 km along
-        strike and 4.5 km down-dip, and ``cplot.txt`` with the distances j and k
-        (m) and the rupture time t (s), 1e9 for nodes that do not break. Names
-        have decimals of 100 m if stations are closer.
+        A file for each station, such as ``faultst075dp045.txt``
+        for 7.5 km along strike and 4.5 km down-dip, and
+        ``cplot.txt`` with the distances j and k (m) and the
+        rupture time t (s), 1e9 for nodes that do not break.
+        Names have decimals of 100 m if stations are closer.
 
     Raises
     ------
     InputError
-        If the run has no stations or lacks a variable, if stations share a node,
-        or if the normal stress is positive.
+        If the run has no stations or lacks a variable, if stations
+        share a node, or if the normal stress is positive.
 
     Examples
     --------
@@ -101,8 +103,8 @@ def write_scec(
     for name, file, (j, k) in zip(run.station.values, files, places, strict=True):
         record = run.sel(station=name)
         place = {dim: float(record[f"station_{dim}"]) for dim in dims}
-        # The record begins after the first step. The first frame is the state
-        # before it.
+        # The record begins after the first step. The first frame is the
+        # state before it.
         start = run.isel(time=0).sel(place, method="nearest")
         time = np.append(start.time, record.step_time) - begin
         recorded = time >= 0.0

@@ -39,59 +39,66 @@ def simulate_rupture(
 ) -> xr.Dataset:
     """Simulate an interface from its first slip to global sliding, in space and time.
 
-    On a specimen, simulate an event from an unstable equilibrium until all is at
-    rest.
+    On a specimen, simulate an event from an unstable equilibrium until
+    all is at rest.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of a single sample, or several profiles by name, as in
-        `onset`. If the initial stress is above the strength, slip begins at once.
+        Peak strength (Pa) of a single sample, or several profiles by
+        name, as in `onset`. If the initial stress is above the
+        strength, slip begins at once.
     method : Rupture
-        Load, numerical options and end of the run. The run begins at the first slip,
-        regardless of `start`, and keeps its results if `max_steps` ends it.
+        Load, numerical options and end of the run. The run begins at
+        the first slip, regardless of `start`, and keeps its results if
+        `max_steps` ends it.
     save : Save, optional
-        Results to keep and the place to store them. By default, slip, slip rate
-        and shear stress are kept every ten explicit steps, in memory.
+        Results to keep and the place to store them.
+        By default, slip, slip rate and shear stress
+        are kept every ten explicit steps, in memory.
     event : int, optional
-        On specimens, the number of the event in order, from 0. By default it is
-        the sliding event.
+        On specimens, the number of the event in order, from 0. By
+        default it is the sliding event.
     progress : bool or callable
-        True shows progress on standard error after a second. A callable receives the
-        number of steps taken and 0.
+        True shows progress on standard error after a second. A callable
+        receives the number of steps taken and 0.
 
     Returns
     -------
     xarray.Dataset
-        Over ('time', 'x'): the fields. Over 'time': `load`, `mean_stress`,
-        `mean_slip`, `top_slip_rate`, `weakened_fraction`, `seismic_moment`,
-        `moment_rate`, `work` and energies. Over 'step': `step_time`, and some of
-        the above after every step. Over ('step', 'station'): `station_slip`,
+        Over ('time', 'x'): the fields. Over 'time': `load`,
+        `mean_stress`, `mean_slip`, `top_slip_rate`,
+        `weakened_fraction`, `seismic_moment`, `moment_rate`, `work` and
+        energies. Over 'step': `step_time`, and some of the above after
+        every step. Over ('step', 'station'): `station_slip`,
         `station_slip_rate` and `station_shear_stress`. Over 'station':
-        `station_x` (and `station_y`), the places of the nodes. Over 'x':
-        `peak_strength` and `arrival_time`. Over 'event': the table of events,
-        with the variables of `equilibrium_path`, `event_time`, `event_duration`
-        and `event_radiated_energy`. Over 'frequency': `moment_rate_spectrum`, the
-        amplitude spectrum of the moment rate from the onset to the next event or
-        to the end of the run, which cuts off an interface that slides. The
-        scalars of `Rupture` refer to the run so far. The attribute `stopped` is
+        `station_x` (and `station_y`), the places of the nodes. Over
+        'x': `peak_strength` and `arrival_time`. Over 'event': the table
+        of events, with the variables of `equilibrium_path`,
+        `event_time`, `event_duration` and `event_radiated_energy`. Over
+        'frequency': `moment_rate_spectrum`, the amplitude spectrum of
+        the moment rate from the onset to the next event or to the end
+        of the run, which cuts off an interface that slides. The scalars
+        of `Rupture` refer to the run so far. The attribute `stopped` is
         the reason why the run ended.
 
         On a specimen, there are also `machine_stress` (with a thickness
-        `machine_force`, N) and `drive_travel` over 'time', and energies relative
-        to the stress at which the event began. `block_velocity` over ('snapshot',
-        'height', 'x') is the velocity along x in the upper block (m/s) at a few
-        times. The lower block is its mirror image and moves the opposite way.
-        The table of events holds all events of the path that came to rest. There
-        is no 'step'.
+        `machine_force`, N) and `drive_travel` over 'time', and energies
+        relative to the stress at which the event began.
+        `block_velocity` over ('snapshot', 'height', 'x') is the
+        velocity along x in the upper block (m/s) at a few times. The
+        lower block is its mirror image and moves the opposite way. The
+        table of events holds all events of the path that came to rest.
+        There is no 'step'.
 
     Raises
     ------
     InputError
         If any argument is invalid. The message lists every mistake.
     StoreError
-        If `save.to` cannot be written. Frames that were written stay readable.
+        If `save.to` cannot be written. Frames
+        that were written stay readable.
 
     Examples
     --------
@@ -212,7 +219,7 @@ def _complete(
         events, of_events = arrested_events(run), event_variables(interface, inertia=True)
         values |= event_table(problem, rows, 0, events, of_events)
     variables |= of_events
-    # Energies and moment are there already, over 'time'. Their last value is the
-    # total.
+    # Energies and moment are there already, over 'time'. Their last
+    # value is the total.
     added = {name: value for name, value in values.items() if name not in SCALARS}
     return dataset.merge(to_dataset(added, variables, {"frequency": frequency}, {}, interface))

@@ -1,9 +1,10 @@
 """`simulate_rupture` on specimens: an event in space and time, and the velocity of the block.
 
 1. Follow the path of the sample to sliding, and choose the event.
-2. Run the event once as a trial, which shows the duration and the amount of slip.
-3. Run the event again and keep frames. Pictures of the block are spread evenly over
-   the slip.
+2. Run the event once as a trial, which shows the duration and the
+   amount of slip.
+3. Run the event again and keep frames. Pictures of the block are spread
+   evenly over the slip.
 """
 
 from __future__ import annotations
@@ -82,7 +83,8 @@ def simulate_event(
     sample = sample_of(rows, program.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
         path = follow_to_sliding(program, sample)  # 1.
-        # Arrested events began at `before`. The path ends with the sliding event, if any.
+        # Arrested events began at `before`. The path ends with the
+        # sliding event, if any.
         states = [event.before for event in path.events]
         states += [path.last] if path.last.status == PathStatus.UNSTABLE else []
         meter.advance(len(states))
@@ -106,8 +108,8 @@ def simulate_event(
 class EventRecord:
     """Frames of an event up to now, with pictures of the block.
 
-    A trial of the event shows the amount of slip, so that the pictures are spread
-    evenly over the slip.
+    A trial of the event shows the amount of slip, so that the pictures
+    are spread evenly over the slip.
     """
 
     def __init__(
@@ -157,8 +159,8 @@ class EventRecord:
                 "drive_travel": 2.0 * now["travel"],
             }
         )
-        # Pictures at given shares of the slip show the event better than at equal
-        # times.
+        # Pictures at given shares of the slip show the event better
+        # than at equal times.
         while self._due and self._due[0] <= waves.slip.mean():
             self._due.pop(0)
             self.pictures.append(waves.u_rate.copy())
@@ -166,18 +168,21 @@ class EventRecord:
 
     def _energies(self) -> dict[str, float]:
         """Return the energies of both blocks, J/m, in the middle of the last step."""
-        # Rates are known in the middle of a step, and displacements at its end.
+        # Rates are known in the middle of a
+        # step, and displacements at its end.
         mesh, waves, now = self.event.mesh, self.event.waves, self.event.waves.now
         velocities = np.hstack([waves.u_rate, waves.v_rate]).astype(float)
         lag = mesh.viscous_time + 0.5 * mesh.step
-        # w holds displacement and viscous time times rate, at the end of the step.
+        # w holds displacement and viscous time times rate, at the end
+        # of the step.
         w = np.hstack([waves.u, waves.v]).astype(float) - lag * velocities
         # Twice the energy of a block, for both blocks.
         strain = 0.0
         for row, matrix in enumerate(self._layers):
             corners = np.concatenate([w[row], w[row + 1]])
             strain += float(corners @ (matrix @ corners))
-        # Slip in the middle of the step. The correction of K stores energy, too.
+        # Slip in the middle of the step. The correction of K stores
+        # energy, too.
         added = waves.slip - self._begun - 0.5 * mesh.step * waves.slip_rate
         strain += 0.5 * mesh.spacing * float(added @ (mesh.correction @ added))
         speed = now["speed"]
@@ -199,7 +204,8 @@ class EventRecord:
         problem, interface, event = self.problem, self.problem.interface, self.event
         arrival = event.waves.arrival
         length = problem.nucleation_lengths(self.rows.steepest_weakening_rate)[0]
-        # If the front arrived nowhere, the event began where slip grew fastest.
+        # If the front arrived nowhere, the
+        # event began where slip grew fastest.
         first = int(event.before.direction.argmax())
         if np.isfinite(arrival).any():
             first = int(np.nanargmin(arrival))

@@ -13,22 +13,25 @@ Asymptotics of a fold: near the onset, the distance of slip from its limit falls
 as (tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0 grows as exp(a t) with
 a = R/(2 D).
 
-1. Find the onset tau_c by equilibrium. Begin with a distance D in which shear
-   waves cross the nucleation length `_CROSSINGS` times.
-2. Find the equilibria at tau_c - D and a little before. Their difference gives
-   the mean slip rate, and its growth the slip rate V at tau_c - D (`_state_at`).
-3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z) in each
-   memory variable, psi' = z psi + V with z = s_p |k| c_s (`memory.grown_memory`).
-4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>. Then stress
-   that follows V without delay needs no further force, and the remaining stress
-   is inertia (the kernel is even in a, except for the radiation of the mean).
-5. At the slipping nodes, the difference of stress and strength estimates the
-   error of the state, and as a stress the amount by which the onset may be
-   misplaced. If this error exceeds `_MAX_ERROR` of the stress scale, go to step 2
-   with a larger D: V falls as D^(-1/2), and its second derivative falls as
-   D^(-5/2).
-6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The run then
-   begins at rest.
+1. Find the onset tau_c by equilibrium. Begin with a distance D in which
+   shear waves cross the nucleation length `_CROSSINGS` times.
+2. Find the equilibria at tau_c - D and a little before. Their
+   difference gives the mean slip rate, and its growth the slip rate V
+   at tau_c - D (`_state_at`).
+3. Slip that grows as exp(a t) leaves a permanent part psi = V/(a - z)
+   in each memory variable, psi' = z psi + V with z = s_p |k| c_s
+   (`memory.grown_memory`).
+4. Raise the load by the radiation of the mean slip rate, Z <V>/<p>.
+   Then stress that follows V without delay needs no further force, and
+   the remaining stress is inertia (the kernel is even in a, except for
+   the radiation of the mean).
+5. At the slipping nodes, the difference of stress and strength
+   estimates the error of the state, and as a stress the amount by which
+   the onset may be misplaced. If this error exceeds `_MAX_ERROR` of the
+   stress scale, go to step 2 with a larger D: V falls as D^(-1/2), and
+   its second derivative falls as D^(-5/2).
+6. Give up after `_MAX_TRIALS`, or if no state is known well enough. The
+   run then begins at rest.
 """
 
 import numpy as np
@@ -99,8 +102,9 @@ def _state_at(
 ) -> RuptureState | None:
     """Steps 2 to 5: return the state at a distance (Pa) below the onset. `None` if unknown.
 
-    It is unknown if a node is beyond the first piece of its law, where the linear programme does
-    not hold, or if a front has arrived, since the time of arrival is not known.
+    It is unknown if a node is beyond the first piece of its law, where
+    the linear programme does not hold, or if a front has arrived, since
+    the time of arrival is not known.
     """
     nodes, grid = run.setting.nodes, run.medium.grid
     # 2. Two equilibria, and the slip rate between them.
@@ -134,7 +138,8 @@ def _state_at(
     for name in ("mean_stress", "whole_stress", "maximum_stress", "maximum_breakable"):
         now[name] = stress.mean()
     now["maximum_radiated"] = now["previous_radiated"] = radiated
-    # The slow path radiates no energy. Set its work so that the balance gives zero.
+    # The slow path radiates no energy. Set
+    # its work so that the balance gives zero.
     now["work"] -= energy_balance(run, state)["radiated_energy"]
     now["maximum_work"] = now["work"]
     now["start_error"] = missed.max(initial=0.0)

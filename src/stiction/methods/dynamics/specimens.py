@@ -10,13 +10,13 @@ path continues from the final state of the waves.
 Algorithm of an event: our own
 ------------------------------
 1. Begin at the static state that becomes unstable. Raise the drive slightly,
-   because it continues to rise, and let slip grow slightly along the unstable
-   direction (`begin`).
-2. Follow the waves. The block is at rest when no node slips while shear waves
-   cross the block and return (`DynamicEvent.run`).
+   because it continues to rise, and let slip grow slightly along the
+   unstable direction (`begin`).
+2. Follow the waves. The block is at rest when no node slips while shear
+   waves cross the block and return (`DynamicEvent.run`).
 3. Let slip that is still under way come to rest in a static state
-   (`RuptureProgram.jump`). Nodes that waves carried beyond this equilibrium count
-   as stopped.
+   (`RuptureProgram.jump`). Nodes that waves carried beyond this
+   equilibrium count as stopped.
 """
 
 from __future__ import annotations
@@ -96,8 +96,8 @@ class DynamicEvent:
     start : (n,) array
         Stress in the static state at the start, minus the initial stress, Pa.
     front : (n,) array
-        Slip, m, at which the front arrives at a node. The front does not arrive again
-        at a node that has already slipped so far.
+        Slip, m, at which the front arrives at a node. The front does
+        not arrive again at a node that has already slipped so far.
     slides : bool
         Whether every node has slipped.
     steps : int
@@ -147,7 +147,8 @@ def begin(
 ) -> DynamicEvent:
     """Step 1: return an event that is about to run.
 
-    `arrival` is the slip, in units of d_c, at which a front counts as arrived.
+    `arrival` is the slip, in units of d_c,
+    at which a front counts as arrived.
     """
     fall = (sample.excess - sample.residual)[np.isfinite(sample.excess)]
     load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
@@ -157,8 +158,8 @@ def begin(
     growth = INITIAL_GROWTH * sample.critical[fastest] / max(float(z[fastest]), 1e-300)
     slip = before.slip + growth * z
     start = load * sample.profile - stiffness @ slip
-    # The initial growth is not the arrival of a front: put the threshold just
-    # above it.
+    # The initial growth is not the arrival of a front: put the
+    # threshold just above it.
     front = arrival * sample.critical
     front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), front)
     waves = block_at_rest(mesh, slip)
@@ -170,8 +171,8 @@ def begin(
 class RuptureProgram(DenseProgram):
     """Search for equilibria of a specimen, with waves between equilibria.
 
-    Between events loading is slow. Nodes that waves carried beyond the next
-    equilibrium then rest below their strength.
+    Between events loading is slow. Nodes that waves carried beyond the
+    next equilibrium then rest below their strength.
 
     Parameters
     ----------

@@ -1,21 +1,22 @@
 """State of a rupture: constants of the run, variables, and diagnostics at every step.
 
-A run takes two types of steps. Implicit steps with adaptive size follow a creeping
-interface (`implicit`), and explicit steps with fixed size follow its waves
-(`explicit`). The diagnostic `phase` states which type comes next. Both solve, at
-every node,
+A run takes two types of steps. Implicit steps with adaptive size follow
+a creeping interface (`implicit`), and explicit steps with fixed size
+follow its waves (`explicit`). The diagnostic `phase` states which type
+comes next. Both solve, at every node,
 
     tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
 
-tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the impedance and f
-the stress that slip at other nodes transfers. It is computed mode by mode with the
-memory kernel C from `elasticity.memory_kernels`:
+tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the
+impedance and f the stress that slip at other nodes transfers. It is
+computed mode by mode with the memory kernel C from
+`elasticity.memory_kernels`:
 
     f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
 
 Fields of the interface and their transforms are flat, also on planes.
-`Grid.transform` knows the shape. Modes q = 0, 1, ... are in the order of the real
-transform, and q = 0 is the mean.
+`Grid.transform` knows the shape. Modes q = 0, 1, ... are in the order
+of the real transform, and q = 0 is the mean.
 """
 
 from enum import IntEnum
@@ -98,13 +99,13 @@ DIAGNOSTICS = np.dtype(
         ("maximum_load", "f8"),
         ("maximum_work", "f8"),
         ("maximum_node", "i8"),  # the fastest
-        # Instabilities. Stresses, times and loads have a meaning after the first
-        # instability.
+        # Instabilities. Stresses, times and loads have a meaning after
+        # the first instability.
         ("instabilities", "i8"),  # number of instabilities so far
         ("in_event", "i8"),  # whether an instability is under way
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
-        # The event that `Run` follows until all is calm, or until the next one
-        # begins.
+        # The event that `Run` follows until all is calm, or until the
+        # next one begins.
         ("event_open", "i8"),  # whether there is one
         ("event_begun", "i8"),  # whether one has just begun,
         ("event_calm", "i8"),  # or has just ended

@@ -1,12 +1,16 @@
 """Scalars of a run: loads, moment, energies and rupture speeds.
 
-1. The critical load carries the critical stress statically (`_critical_load`).
-2. The work of the load is dissipated by friction, stored as strain energy or radiated. The first
-   two follow from the slip alone, so the radiated energy is the difference (`_energies`).
-3. The front arrives at a node when the node has lost a share of its strength. The distance of two
-   nodes on a line over the difference of their arrival times is an apparent speed
-   (`rupture_speed`). Each speed is a mean over a window of two or half a nucleation length.
-4. The spectrum is the Fourier integral of the moment rate of one event (`rate_spectrum`).
+1. The critical load carries the critical stress statically
+   (`_critical_load`).
+2. The work of the load is dissipated by friction, stored as strain
+   energy or radiated. The first two follow from the slip alone, so the
+   radiated energy is the difference (`_energies`).
+3. The front arrives at a node when the node has lost a share of its
+   strength. The distance of two nodes on a line over the difference of
+   their arrival times is an apparent speed (`rupture_speed`). Each
+   speed is a mean over a window of two or half a nucleation length.
+4. The spectrum is the Fourier integral of the moment rate of one event
+   (`rate_spectrum`).
 """
 
 from typing import Any
@@ -59,9 +63,10 @@ _SCALARS: dict[str, Variable] = {
 def scalars(interface: Interface) -> dict[str, Variable]:
     """Return the additional variables of a run.
 
-    Planes have median speeds along x and y, and no largest speed: the apparent speed of a front
-    that arrives at an angle can exceed all wave speeds. On a line this happens only if a
-    long part breaks almost at once.
+    Planes have median speeds along x and y, and no largest speed: the
+    apparent speed of a front that arrives at an angle can exceed all
+    wave speeds. On a line this happens only if a long part breaks
+    almost at once.
     """
     variables = {name: per_area(interface, variable) for name, variable in _SCALARS.items()}
     if interface.is_plane:
@@ -76,13 +81,15 @@ def rate_spectrum(
 ) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
     """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N, or N m on a plane.
 
-    The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with straight lines between the
-    times (s), from one period in all to the waves that the nodes and times resolve. It is empty
-    with fewer than three times.
+    The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with
+    straight lines between the times (s), from one period in all to the
+    waves that the nodes and times resolve. It is empty with fewer than
+    three times.
     """
     frequencies = np.empty(0)
     if time.size > 2:
-        # Waves shorter than a few spacings and changes within a step are not resolved.
+        # Waves shorter than a few spacings and changes within a step
+        # are not resolved.
         spacing = max(problem.interface.spacings)
         resolved = problem.solid.shear_wave_speed / (NODES_IN_SHORTEST_WAVE * spacing)
         steps = np.diff(time)
@@ -90,7 +97,8 @@ def rate_spectrum(
         frequencies = np.geomspace(1.0 / np.ptp(time), highest, FREQUENCIES)
     amplitude = np.empty(frequencies.size)
     for i, omega in enumerate(2.0 * np.pi * frequencies):
-        # Integrated twice by parts: a straight line leaves the changes of its slope.
+        # Integrated twice by parts: a straight line leaves the changes
+        # of its slope.
         phases = np.exp(-1j * omega * (time - time[0]))
         ends = moment_rate[0] * phases[0] - moment_rate[-1] * phases[-1]
         bends = np.diff(phases) @ (np.diff(moment_rate) / steps)
@@ -107,10 +115,10 @@ def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
 def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[str, float]:
     """Return the energies for a slip, its transform, and the work that the load has done.
 
-    The static strain energy is the sum over modes of K(k)|delta_k|²/2. Waves carry
-    away the work minus the work of friction and the strain energy. The stress of a
-    slipping node equals its strength, so the work of friction follows from the slip
-    alone.
+    The static strain energy is the sum over modes of K(k)|delta_k|²/2.
+    Waves carry away the work minus the work of friction and the strain
+    energy. The stress of a slipping node equals its strength, so the
+    work of friction follows from the slip alone.
     """
     nodes, grid, friction = run.setting.nodes, run.medium.grid, run.medium.problem.friction
     # Unbreakable nodes have infinite strength and dissipate no energy.
@@ -202,7 +210,8 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
         **{name: int(now[name]) for name in ("implicit_steps", "explicit_steps")},
     }
     for name in ("critical_position", *SPEEDS):
-        # A number on a line, and on a plane a number along x and a number along y.
+        # A number on a line, and on a plane a number along x and a
+        # number along y.
         along = np.where(unstable, values[name], np.nan)
         values[name] = along if interface.is_plane else along[0]
     if interface.is_plane:
@@ -215,7 +224,8 @@ def front_speeds(
 ) -> dict[str, float]:
     """Return the speeds of a front along a line of nodes, m/s, or NaN, by the names of `SPEEDS`.
 
-    `arrival` (s) holds the times along this axis, and `nucleation` is the nucleation length (m).
+    `arrival` (s) holds the times along this axis, and `nucleation` is
+    the nucleation length (m).
     """
     spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
     front = {}
@@ -233,10 +243,10 @@ def front_speeds(
 def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
     """Return the apparent speed of a front at each node on a line, m/s, or NaN.
 
-    `arrival` (s) is periodic, and NaN at nodes that the front did not reach. The
-    speed is a mean over `window` (m). It is NaN unless the arrival is strictly
-    monotone over the window. This excludes the birth of patches and the meeting of
-    fronts.
+    `arrival` (s) is periodic, and NaN at nodes that the front did not
+    reach. The speed is a mean over `window` (m). It is NaN unless the
+    arrival is strictly monotone over the window. This excludes the
+    birth of patches and the meeting of fronts.
     """
     # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))

@@ -15,20 +15,21 @@ America 89, 1999). Velocities are known in the middle of a step of size h, displ
 end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step
 processes the rows:
 
-1. Compute the forces F on the row from its elements (`_force`). They depend on w
-   alone, so only w is stored.
-2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h + theta) u' - theta (u' before)
-   (`_move`).
-3. Move the interface in the same way, with friction (`_slide`): a node slips at the rate at which
-   its stress equals its strength, and rests if this rate would be negative.
-   `Mesh.correction`, the K of the closed form minus the K of the mesh, acts on the slip of
-   the interface.
-4. Move the top with its platen (`_move_platen`), or let the pusher act on the ends
-   (`_move_pusher`). The spring of the machine is semi-implicit. An infinitely
-   stiff machine does not move.
+1. Compute the forces F on the row from its elements (`_force`). They
+   depend on w alone, so only w is stored.
+2. Move the row: u' <- ((1 - a) u' + h F/M)/(1 + a) and w <- w + (h +
+   theta) u' - theta (u' before) (`_move`).
+3. Move the interface in the same way, with friction
+   (`_slide`): a node slips at the rate at which its stress
+   equals its strength, and rests if this rate would be
+   negative. `Mesh.correction`, the K of the closed form minus
+   the K of the mesh, acts on the slip of the interface.
+4. Move the top with its platen (`_move_platen`), or let the pusher act
+   on the ends (`_move_pusher`). The spring of the machine is
+   semi-implicit. An infinitely stiff machine does not move.
 
-The force on row j + 1 needs row j before it moves, so the force on a row is computed before the
-row below it moves.
+The force on row j + 1 needs row j before it moves, so the force on a
+row is computed before the row below it moves.
 """
 
 from typing import Any, NamedTuple
@@ -45,9 +46,9 @@ from stiction.methods.equilibrium.sample import StaticSample, strength_at
 class Waves(NamedTuple):
     """The displacements and velocities of a block.
 
-    Single precision is enough, because displacements are counted from the static
-    state. u and v are the sums w (displacement plus viscous time times rate) that the
-    elements need.
+    Single precision is enough, because displacements are counted from
+    the static state. u and v are the sums w (displacement plus viscous
+    time times rate) that the elements need.
     """
 
     u: Array
@@ -106,11 +107,12 @@ def _force(
 ) -> None:
     """Step 1: write the force on a row along an axis.
 
-    x0, x1 and x2 are the displacements along the axis in the row below, the row, and
-    the row above. y0, y1 and y2 are the other components.
+    x0, x1 and x2 are the displacements along the axis in the row below,
+    the row, and the row above. y0, y1 and y2 are the other components.
     """
     n = force.shape[0]
-    # Coefficients in registers: of both neighbours, of the node, and of the other component.
+    # Coefficients in registers: of both neighbours, of the node, and of
+    # the other component.
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
     d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
     g, h, k = stencil[2, 0], stencil[2, 1], stencil[2, 2]
@@ -159,7 +161,8 @@ def _slide(
         # In double precision, since slip adds up many small increments.
         before = np.float64(velocities[i])
         strength = strength_at(sample, slip, i)
-        # The velocity without friction, and with friction at the strength of the node.
+        # The velocity without friction, and with friction at the
+        # strength of the node.
         free = keep * before + gain * (force[i] + dx * (start[i] - waves.corrected[i]))
         after = free - gain * dx * strength
         if after > 0.0:
@@ -169,12 +172,14 @@ def _slide(
             after = 0.0
             waves.stress[i] = free / (gain * dx)
         added = 2.0 * step * after  # both blocks move
-        # Slip grows evenly within the step, so interpolate the time of arrival.
+        # Slip grows evenly within the step,
+        # so interpolate the time of arrival.
         if slip[i] < front[i] <= slip[i] + added:
             waves.arrival[i] = now.time + step * (front[i] - slip[i]) / added
         slip[i] += added
         waves.slip_rate[i] = 2.0 * after
-        # The work of friction, with the mean of the rates before and after the step.
+        # The work of friction, with the mean of the rates before and
+        # after the step.
         now.friction += 0.5 * dx * step * waves.stress[i] * (before + after)
         u[i] += np.float32(step * after + mesh.viscous_time * (after - before))
         velocities[i] = np.float32(after)
@@ -183,8 +188,8 @@ def _slide(
     if fast:
         now.fast_since = now.fast_since if now.fast else now.time
         now.fast, now.fast_until = 1, now.time
-    # Update the stress of the correction by the added slip only: most nodes rest
-    # most of the time.
+    # Update the stress of the correction by the added slip only: most
+    # nodes rest most of the time.
     for j in range(slip.shape[0]):
         added = step * waves.slip_rate[j]
         if added > 0.0:
@@ -226,11 +231,12 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     """Step 4: move the pusher with its spring, or hold the pusher. Apply its force to the block.
 
-    The force F changes the speed of the pusher from v to v + g F, with the mobility g of the pushed
-    nodes.
+    The force F changes the speed of the pusher from v to v + g F, with
+    the mobility g of the pushed nodes.
     """
     now, step, last = waves.totals[0], mesh.step, waves.u.shape[1] - 1
-    # The pusher moves as the mean of the pushed nodes, weighted by their shares of the force.
+    # The pusher moves as the mean of the pushed nodes, weighted by
+    # their shares of the force.
     mobility = speed = 0.0
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):
@@ -262,9 +268,9 @@ def wave_steps(
 ) -> int:  # fmt: skip
     """Advance the waves by up to `steps` time steps, and return the number of steps taken.
 
-    If `ends` is true, stop once all nodes have slipped. `start` is the stress in the static
-    state minus the initial stress (Pa). `front` is the slip (m) at which the front counts as
-    arrived at a node.
+    If `ends` is true, stop once all nodes have slipped. `start` is the
+    stress in the static state minus the initial stress (Pa). `front` is
+    the slip (m) at which the front counts as arrived at a node.
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)
@@ -277,8 +283,8 @@ def wave_steps(
     u, v, u_rate, v_rate = waves.u, waves.v, waves.u_rate, waves.v_rate
     for taken in range(steps):
         never = n
-        # Forces on row j and motion of row j - 1 alternate, so that two rows of
-        # forces suffice.
+        # Forces on row j and motion of row j - 1 alternate, so that two
+        # rows of forces suffice.
         for j in range(rows + 1):
             # 1. Forces on row j.
             if j < rows:  # stencils are zero beyond the interface and the top
@@ -289,7 +295,8 @@ def wave_steps(
             i = j - 1
             if i < 0:
                 continue
-            # 2. to 4. Move row j - 1. The forces on row j have used it already.
+            # 2. to 4. Move row j - 1. The forces
+            # on row j have used it already.
             force, gain = along[i % 2], np.float32(gains[i])  # the row above has felt this row
             if i == 0:
                 never = _slide(sample, start, front, mesh, waves, force, keep, gains[0])

@@ -6,25 +6,29 @@ An event takes an interface at rest from the slip d_0 to the slip d_1. With delt
 d_1 - d_0, the event releases the stress K delta, at the load at which it begins.
 The table holds these measures:
 
-1. The patch of an event is the region around the largest delta in which delta
-   exceeds the share `MIN_ADDED_SLIP` of its largest value. The patch has extents,
-   an area and a mean slip. Outside the patch, slip also grows a little.
-2. The moment is G times the integral of delta. On a plane, the magnitude follows
-   from the moment: Mw = (log10 M_0 - 9.1)/1.5 with M_0 in N m (Hanks and Kanamori,
-   1979, in SI units).
-3. There are three stress drops (Noda, Lapusta and Kanamori, 2013). The first is the
-   mean of K delta over the patch. The second is the mean of K delta weighted by
-   delta. The third is twice the energy that the slip releases beyond friction at
-   the residual strength, over the integral of delta. Waves and weakening share this
-   energy. If the stress comes to rest at the residual strength at a constant load,
-   the third equals the second. In a rupture both shares of the energy are known.
-   They contain the work of the load, which rises during the event.
+1. The patch of an event is the region around the largest delta in which
+   delta exceeds the share `MIN_ADDED_SLIP` of its largest value. The
+   patch has extents, an area and a mean slip. Outside the patch, slip
+   also grows a little.
+2. The moment is G times the integral of delta. On a plane, the
+   magnitude follows from the moment: Mw = (log10 M_0 - 9.1)/1.5 with
+   M_0 in N m (Hanks and Kanamori, 1979, in SI units).
+3. There are three stress drops (Noda, Lapusta and Kanamori,
+   2013). The first is the mean of K delta over the patch. The
+   second is the mean of K delta weighted by delta. The third is
+   twice the energy that the slip releases beyond friction at the
+   residual strength, over the integral of delta. Waves and
+   weakening share this energy. If the stress comes to rest at
+   the residual strength at a constant load, the third equals the
+   second. In a rupture both shares of the energy are known. They
+   contain the work of the load, which rises during the event.
 4. The fracture energy is the energy dissipated above the residual strength.
-5. Methods with inertia also give the duration of an event. Between half-spaces,
-   they give the time at which the event begins and the radiated energy.
+5. Methods with inertia also give the duration of an event. Between
+   half-spaces, they give the time at which the event begins and the
+   radiated energy.
 
-With a machine, the load is the drive: the mean stress that the drive would cause
-without slip. Slip lowers the actual stress.
+With a machine, the load is the drive: the mean stress that the drive
+would cause without slip. Slip lowers the actual stress.
 """
 
 from collections.abc import Mapping, Sequence
@@ -66,8 +70,8 @@ MIN_ADDED_SLIP = 1e-3
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:
     """Return the variables of events. `inertia` adds the variables that a rupture provides."""
 
-    # On a plane, positions have two components, and an area replaces the length. `per_area`
-    # changes the units of energies and moments.
+    # On a plane, positions have two components, and an area replaces
+    # the length. `per_area` changes the units of energies and moments.
     def variable(units: str, text: str) -> Variable:
         return Variable(units, text, ("event",))
 
@@ -110,7 +114,8 @@ def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
 class ArrestedEvent(NamedTuple):
     """The states before and after an instability that came to rest.
 
-    `timed` holds, by name, the variables that only a method with inertia provides.
+    `timed` holds, by name, the variables that only a method with
+    inertia provides.
     """
 
     before: EquilibriumState
@@ -128,11 +133,12 @@ def event_table(
 ) -> dict[str, Array]:
     """Return the variables of the events in one sample as arrays (events, ...).
 
-    With `most`, the arrays hold the first `most` events. If there are fewer, they are
-    padded with NaN.
+    With `most`, the arrays hold the first `most` events. If there are
+    fewer, they are padded with NaN.
     """
     events = events[:most]
-    # Methods that lack a variable do not ask for it, so `_measures` may return more.
+    # Methods that lack a variable do not ask for it, so `_measures` may
+    # return more.
     measured = [_measures(problem, rows, row, *event) for event in events]
     table = {}
     for name, variable in variables.items():
@@ -166,8 +172,9 @@ def _measures(
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
     moment = moment_of(problem, added)
-    # 3. and 4. Stress drops and fracture energy. Waves and weakening share what the mean of the
-    # stress before and after, at a constant load, does on the slip beyond the residual strength.
+    # 3. and 4. Stress drops and fracture energy. Waves and weakening
+    # share what the mean of the stress before and after, at a constant
+    # load, does on the slip beyond the residual strength.
     drop, residual = problem.released_stress(added), rows.residual_strength[row]
     # `above` is the stress before the event, less the residual strength.
     above = rows.initial_stress[row] + before.load * rows.load_profile - residual
@@ -177,7 +184,8 @@ def _measures(
     dissipated = [law.dissipated(slip, weakening, rows.weakening_rate[row]) for slip in slips]
     fracture = float((dissipated[1] - dissipated[0]).sum()) * interface.cell
     released = 0.5 * float(((2.0 * above - drop) * added).sum()) * interface.cell
-    # With inertia, the energies are known. They include the work of the load that rises.
+    # With inertia, the energies are known. They include the work of the
+    # load that rises.
     if "event_radiated_energy" in timed:
         released = fracture + timed["event_radiated_energy"]
     values = {

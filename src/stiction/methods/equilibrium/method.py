@@ -46,39 +46,44 @@ ON_NODES = {
 class Equilibrium:
     """Exact quasi-static onset with all interactions between patches.
 
-    A line of 1024 nodes takes under a millisecond, a plane of 128 x 128 nodes
-    about 0.15 s.
+    A line of 1024 nodes takes under a millisecond, a plane of 128 x 128
+    nodes about 0.15 s.
 
-    The load rises until there is no equilibrium. While strength falls linearly, this
-    is a linear programme, which is solved to round-off with a certificate. After the
-    first instability, or after the first corner of a `PiecewiseWeakening`, the
-    equilibria are followed event by event. This is also exact. It takes 5 times as
-    long for two pieces and 50 times as long for 32. On planes the path between events
-    is followed in steps of the load. Weakening rate, residual strength, initial
+    The load rises until there is no equilibrium. While strength
+    falls linearly, this is a linear programme, which is solved
+    to round-off with a certificate. After the first instability,
+    or after the first corner of a `PiecewiseWeakening`, the
+    equilibria are followed event by event. This is also exact.
+    It takes 5 times as long for two pieces and 50 times as long
+    for 32. On planes the path between events is followed in
+    steps of the load. Weakening rate, residual strength, initial
     stress and load profile may vary along the interface.
 
-    On planes the programme is solved with Fourier transforms. The distance between
-    its bounds is the share `gap` of the load. Results contain the lower bound, at
-    which there is an equilibrium.
+    On planes the programme is solved with Fourier transforms. The
+    distance between its bounds is the share `gap` of the load. Results
+    contain the lower bound, at which there is an equilibrium.
 
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at fixed weakening
-        rates. The sensitivity is NaN if a law steepens and a node passes a corner
-        before the first instability, and on planes if the turning point is not found.
-        If a node of a specimen stops before the first instability, the derivatives
-        are difference quotients, which need a path for every node.
+        Also return d first_instability / d tau_p at every node, at
+        fixed weakening rates. The sensitivity is NaN if a law steepens
+        and a node passes a corner before the first instability, and on
+        planes if the turning point is not found. If a node of a
+        specimen stops before the first instability, the derivatives are
+        difference quotients, which need a path for every node.
     slip : bool
         Also return the slip at the first instability.
     events : int
-        Also return this number of arrested events for each sample over 'event',
-        padded with NaN. If an interface ends, the event in which it slides is
-        included. The events form a sequence: stress and slip continue from event to
-        event. The variables are described in `equilibrium_path`.
+        Also return this number of arrested events for each sample over
+        'event', padded with NaN. If an interface ends, the event in
+        which it slides is included. The events form a sequence: stress
+        and slip continue from event to event. The variables are
+        described in `equilibrium_path`.
     gap : float
-        On planes, the distance between the bounds as a share of the load, 1e-10 to
-        1e-2. Lines are solved to round-off, or to 1e-9 if thousands of nodes slip.
+        On planes, the distance between the bounds as a share of the
+        load, 1e-10 to 1e-2. Lines are solved to round-off, or to 1e-9
+        if thousands of nodes slip.
 
     Notes
     -----
@@ -89,17 +94,19 @@ class Equilibrium:
     `sliding_position` (m), which differs from `critical_position` only after an arrested
     event.
 
-    Arrest is decided in equilibrium. Inertia may carry a rupture further. There is no
-    upper bound, and `certificate_gap` is NaN, if a law steepens and a node passes a
-    corner before the first instability, or if a node of a specimen stops before the
-    first instability.
+    Arrest is decided in equilibrium. Inertia may carry a rupture
+    further. There is no upper bound, and `certificate_gap` is NaN, if a
+    law steepens and a node passes a corner before the first
+    instability, or if a node of a specimen stops before the first
+    instability.
 
     On planes, positions have two components, along 'direction'.
-    `critical_patch_extent` (m, along 'direction') and `critical_patch_area` (m²)
-    replace the length. `certified` is true if the bounds are rigorous, which
-    requires that no node reaches its residual strength before the first
-    instability. Slipping nodes belong to the same patch if their cells share an
-    edge, also across the borders.
+    `critical_patch_extent` (m, along 'direction') and
+    `critical_patch_area` (m²) replace the length. `certified` is true
+    if the bounds are rigorous, which requires that no node reaches its
+    residual strength before the first instability. Slipping nodes
+    belong to the same patch if their cells share an edge, also across
+    the borders.
 
     Examples
     --------
@@ -154,23 +161,26 @@ class Equilibrium:
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
 
-        The bound from below holds because no node slips at a load below min (tau_p -
-        tau_i)/p. With a machine, slip lowers the mean stress, but `critical_stress`
-        is the largest stress on the way. The bound from above holds because stress is
-        at most strength at every node. With a machine, the first instability need not
-        happen, and has no bound. If the interface ends, slip lowers the mean stress
-        of the part that can break.
+        The bound from below holds because no node slips at a load below
+        min (tau_p - tau_i)/p. With a machine, slip lowers the mean
+        stress, but `critical_stress` is the largest stress on the way.
+        The bound from above holds because stress is at most strength at
+        every node. With a machine, the first instability need not
+        happen, and has no bound. If the interface ends, slip lowers the
+        mean stress of the part that can break.
         """
         if problem.interface.is_held:
             return False, False
-        # A stiff machine lets the interface slide without an instability, which is then NaN.
+        # A stiff machine lets the interface slide without an
+        # instability, which is then NaN.
         certain = not (problem.has_machine and event == "first_instability")
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
         """Return the variables of the solver's results."""
         interface = problem.interface
-        # On planes, positions and extents have a component along each direction.
+        # On planes, positions and extents have
+        # a component along each direction.
         variables = onset_variables(interface) | VARIABLES
         variables |= OF_PLANES if interface.is_plane else OF_LINES
         for name in {"sliding_position", "critical_patch_extent"} & variables.keys():

@@ -1,8 +1,8 @@
 """Number, position and extent of patches of slipping nodes on a line or plane.
 
-Nodes on a plane are connected if their cells share an edge (four neighbours), also
-across the borders. In these functions, `interface` is an `Interface`. Kernels do
-not depend on the file that defines it.
+Nodes on a plane are connected if their cells share an edge (four
+neighbours), also across the borders. In these functions, `interface` is
+an `Interface`. Kernels do not depend on the file that defines it.
 """
 
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ Mask = NDArray[np.bool_]
 MIN_PATCH_WEIGHT = 0.1
 """Share of the largest weight above which a node of a plane belongs to the critical patch.
 
-At the border of a patch y falls off over a few nodes. Half or twice the share changes areas by a
-sixth to a quarter, and no other result.
+At the border of a patch y falls off over a few nodes. Half or twice the
+share changes areas by a sixth to a quarter, and no other result.
 """
 
 
@@ -46,15 +46,17 @@ def count_patches(slip: Array) -> int:
 def main_patch(field: Array) -> tuple[int, int, float]:
     """Return the first node, length and centroid (in nodes, 0 to n) of the run with the peak.
 
-    A run is a sequence of positive entries. No entry of the field is negative. If all
-    entries are positive, the run is centred at the peak.
+    A run is a sequence of positive entries. No
+    entry of the field is negative. If all entries
+    are positive, the run is centred at the peak.
     """
     n = field.shape[0]
     peak = 0
     for i in range(n):
         if field[i] > field[peak]:
             peak = i
-    # Go left from the peak to the first node of the run, and then right to the last.
+    # Go left from the peak to the first node of the run, and then right
+    # to the last.
     start = peak
     length = 1
     while length < n and field[start - 1 if start else n - 1] > 0.0:
@@ -69,8 +71,8 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     if length == n:
         # The run has no ends: cut the circle opposite the peak.
         start = (peak + n // 2 + 1) % n
-    # The centroid is taken along the run, so that it is defined across the ends
-    # of the circle.
+    # The centroid is taken along the run, so that it is defined across
+    # the ends of the circle.
     weight = 0.0
     moment = 0.0
     for q in range(length):
@@ -99,13 +101,15 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
-    # scipy's labels stop at the borders. Join the patches that meet across them.
+    # scipy's labels stop at the borders. Join the patches that meet
+    # across them.
     first = np.concatenate((pieces[0, :], pieces[:, 0]))
     last = np.concatenate((pieces[-1, :], pieces[:, -1]))
     meet = (first > 0) & (last > 0)
     graph = coo_array((np.ones(meet.sum()), (first[meet], last[meet])), (count + 1, count + 1))
     patches, numbers = connected_components(graph, directed=False)
-    # Node 0 of the graph is the background. Number the other components from 1.
+    # Node 0 of the graph is the background.
+    # Number the other components from 1.
     order = np.zeros(patches, dtype=np.int64)
     order[np.delete(np.arange(patches), numbers[0])] = np.arange(1, patches)
     return order[numbers][pieces], patches - 1
@@ -114,7 +118,8 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 def span(occupied: Mask, peak: int) -> tuple[int, int]:
     """Return the beginning and the length of the shortest arc that contains all occupied places.
 
-    If every place is occupied, the arc is the whole circle, cut opposite the peak.
+    If every place is occupied, the arc is the whole circle, cut
+    opposite the peak.
     """
     n = occupied.size
     places = np.flatnonzero(occupied)
@@ -146,8 +151,8 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
 def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
     """Return the nodes of the patch around the largest weight, and the patch.
 
-    The weight is not negative, and positive somewhere. Nodes belong to a patch if
-    their weight exceeds a share of the largest weight.
+    The weight is not negative, and positive somewhere. Nodes belong to
+    a patch if their weight exceeds a share of the largest weight.
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:  # a line
@@ -164,10 +169,11 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
     """Return the patch that becomes unstable, from the multiplier y >= 0. NaN if y is zero.
 
-    On a line, the patch is the run with the largest y. On a plane, it is the
-    connected area around the largest y in which y exceeds a tenth of its largest
-    value. Slipping nodes with a smaller y do not count, because with a rough strength
-    they extend across the whole plane.
+    On a line, the patch is the run with the largest y. On a
+    plane, it is the connected area around the largest y in
+    which y exceeds a tenth of its largest value. Slipping
+    nodes with a smaller y do not count, because with a
+    rough strength they extend across the whole plane.
     """
     if not multiplier.any():
         nowhere = (np.nan,) * len(interface.shape)

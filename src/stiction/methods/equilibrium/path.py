@@ -9,11 +9,12 @@ Algorithm
 ---------
 1. Follow the sample to global sliding. This gives the arrested events and the last
    load.
-2. For each load before sliding, start from the nearest known state: the equilibrium
-   after the last event, or the equilibrium at the previous load.
-3. Follow the stable path from there to the load. If this fails close to an event,
-   use the state that is about to jump. If it fails at other loads, the load is
-   within round-off of sliding.
+2. For each load before sliding, start from the
+   nearest known state: the equilibrium after the last
+   event, or the equilibrium at the previous load.
+3. Follow the stable path from there to the load. If this fails close to
+   an event, use the state that is about to jump. If it fails at other
+   loads, the load is within round-off of sliding.
 """
 
 from collections.abc import Iterator
@@ -82,16 +83,20 @@ def _states_at(
     """Yield the equilibrium at each of the rising loads, until the interface slides."""
     events = path.all_events
     starts = [at_rest(sample), *(event.after for event in events)]
-    # Each state begins where the state before ended, because a path only goes up.
+    # Each state begins where the state before ended, because a path
+    # only goes up.
     state = starts[0]
     for load in map(float, loads):
-        # An interface that ends still creeps after the event in which it slides.
+        # An interface that ends still creeps
+        # after the event in which it slides.
         if load > path.last.load and path.sliding is None:
             return
-        # 2. After an event, the path continues from the state to which the event led.
+        # 2. After an event, the path continues from the state to which
+        # the event led.
         n_passed = sum(event.before.load < load for event in events)
         state = max(starts[n_passed], state, key=lambda start: start.load)
-        # 3. Close to an event, round-off may hide the equilibrium that is about to jump.
+        # 3. Close to an event, round-off may hide the equilibrium that
+        # is about to jump.
         reached = program.at(sample, state, load)
         if reached is None and n_passed < len(events):
             about_to_jump = events[n_passed].before
@@ -108,15 +113,15 @@ def equilibrium_path(
 ) -> xr.Dataset:
     """Return the slip and stress of an interface at rising loads, and the arrested events.
 
-    Patches grow, merge and become unstable. An instability that comes to rest is
-    an arrested event.
+    Patches grow, merge and become unstable. An instability that comes
+    to rest is an arrested event.
 
     Parameters
     ----------
     problem : Problem
     profiles : array, mapping of arrays, xarray.Dataset or Sample
-        Peak strength (Pa) of a single sample, or several profiles by name, as in
-        `onset`.
+        Peak strength (Pa) of a single sample, or several profiles by
+        name, as in `onset`.
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
     method : Rupture, optional
@@ -125,42 +130,49 @@ def equilibrium_path(
     Returns
     -------
     xarray.Dataset
-        Over 'load' and the nodes: `slip` (m) and `stress` (Pa). Over 'load':
-        `mean_stress` (Pa), `arrested_events` so far, and `sliding`. After the
-        onset of global sliding, slip and stress are NaN and `sliding` is true.
+        Over 'load' and the nodes: `slip` (m) and `stress` (Pa). Over
+        'load': `mean_stress` (Pa), `arrested_events` so far, and
+        `sliding`. After the onset of global sliding, slip and stress
+        are NaN and `sliding` is true.
 
-        Over 'event', all arrested events up to global sliding, even beyond the
-        given loads, and the event in which an interface that ends slides:
-        `event_load` (tau_0, Pa), `event_stress` (mean stress on the interface,
-        Pa), `event_position` (m), `event_length` of the patch that slipped (m),
-        `event_mean_slip` over that length (m), `event_largest_slip` (m),
-        `event_moment`, G times the integral of the added slip (N per unit depth),
-        and `event_fracture_energy`, the energy dissipated above the residual strength
-        (J/m). There are three stress drops (Pa). `event_area_stress_drop` is the mean
-        over the patch. `event_slip_stress_drop` is the mean weighted by the added
-        slip. `event_energy_stress_drop` is twice the energy that the slip releases
-        beyond friction at the residual strength, over the integral of the slip. With
-        a `Rupture` as the method, events have `event_duration` (s).
-        `stiction.external.event_table` converts the events to a data frame.
+        Over 'event', all arrested events up to global sliding, even
+        beyond the given loads, and the event in which an interface that
+        ends slides: `event_load` (tau_0, Pa), `event_stress` (mean
+        stress on the interface, Pa), `event_position` (m),
+        `event_length` of the patch that slipped (m), `event_mean_slip`
+        over that length (m), `event_largest_slip` (m), `event_moment`,
+        G times the integral of the added slip (N per unit depth), and
+        `event_fracture_energy`, the energy dissipated above the
+        residual strength (J/m). There are three stress drops (Pa).
+        `event_area_stress_drop` is the mean over the patch.
+        `event_slip_stress_drop` is the mean weighted by the added slip.
+        `event_energy_stress_drop` is twice the energy that the slip
+        releases beyond friction at the residual strength, over the
+        integral of the slip. With a `Rupture` as the method, events
+        have `event_duration` (s). `stiction.external.event_table`
+        converts the events to a data frame.
 
-        On specimens, `load` is the mean stress that the drive would cause without
-        slip. `travel` is the sum of the travels of both drives (m).
-        `crosshead_travel` (m) adds the deformation of the machine, force over
-        stiffness, and is NaN under a dead load. Events also have `event_stress_drop`
-        (fall of the mean stress, Pa), `event_travel` and `event_crosshead_travel`
-        before the event (m), `event_travel_step` (m) and `event_start`, the left end
-        of the patch (m). With a thickness, width or area, mean stresses are also
-        given as forces: `force`, `event_force` and `event_force_drop` (N).
+        On specimens, `load` is the mean stress that the drive would
+        cause without slip. `travel` is the sum of the travels of both
+        drives (m). `crosshead_travel` (m) adds the deformation of the
+        machine, force over stiffness, and is NaN under a dead load.
+        Events also have `event_stress_drop` (fall of the mean stress,
+        Pa), `event_travel` and `event_crosshead_travel` before the
+        event (m), `event_travel_step` (m) and `event_start`, the left
+        end of the patch (m). With a thickness, width or area, mean
+        stresses are also given as forces: `force`, `event_force` and
+        `event_force_drop` (N).
 
-        On planes, positions have two components, along 'direction'.
-        `event_extent` (m) and `event_area` (m²) replace the length, the moment is
-        in N m, and `event_magnitude` is Mw = (log10 M_0 - 9.1)/1.5.
+        On planes, positions have two components, along
+        'direction'. `event_extent` (m) and `event_area`
+        (m²) replace the length, the moment is in N m, and
+        `event_magnitude` is Mw = (log10 M_0 - 9.1)/1.5.
 
     Raises
     ------
     InputError
-        If there are several samples, if the loads do not rise, or if `onset` would
-        raise an error.
+        If there are several samples, if the loads do not rise, or if
+        `onset` would raise an error.
 
     Notes
     -----
@@ -177,9 +189,9 @@ def equilibrium_path(
     >>> path.sliding.values
     array([False,  True])
 
-    A table for pandas holds variables over the same dimensions: here 2 loads by
-    512 nodes, and 2 loads. ``path.drop_dims(["load", "x"]).to_dataframe()`` has a
-    row for each event.
+    A table for pandas holds variables over the same dimensions: here 2
+    loads by 512 nodes, and 2 loads. ``path.drop_dims(["load",
+    "x"]).to_dataframe()`` has a row for each event.
 
     >>> len(path[["slip", "stress"]].to_dataframe()), len(path.mean_stress.to_dataframe())
     (1024, 2)
@@ -227,7 +239,8 @@ def equilibrium_path(
         "slip": slip.reshape(wide),
         "stress": stress.reshape(wide),
         "mean_stress": interface.mean(stress.reshape(wide)),
-        # The event in which an interface slides is the last, and is not arrested.
+        # The event in which an interface slides
+        # is the last, and is not arrested.
         "arrested_events": np.minimum(n_events, len(path.events)),
         "sliding": sliding,
     }

@@ -1,9 +1,9 @@
 """Samples, equilibrium states, and the protocol for the search for equilibria.
 
-Strength falls with slip along straight pieces. A law with M pieces has M corners,
-and piece M is the residual strength. Between corners the equations are linear, so
-solvers step from corner to corner. The linear law has a single piece, which starts
-exactly at tau_p.
+Strength falls with slip along straight pieces. A law with M pieces has
+M corners, and piece M is the residual strength. Between corners the
+equations are linear, so solvers step from corner to corner. The linear
+law has a single piece, which starts exactly at tau_p.
 """
 
 from collections.abc import Mapping
@@ -24,15 +24,16 @@ from stiction.problem.sample import Sample
 
 CONSTANT_STRENGTH_RTOL = 1e-11
 """Smallest fall of strength, as a share of the mean strength, with which a node counts as
-weakening. A smaller fall is within the round-off of K d: an instability of such nodes adds no slip
+weakening. A smaller fall is within the round-off of K d: an instability
+of such nodes adds no slip
 and never ends."""
 
 
 class Pieces(NamedTuple):
     """Falling, piecewise linear function f of u = slip/d_c. It is the same at every node.
 
-    At a node, W is the weakening rate of the first piece. The relative slope of this
-    piece is therefore 1.
+    At a node, W is the weakening rate of the first piece. The relative
+    slope of this piece is therefore 1.
     """
 
     ends: Array  # (M,): u at the end of each piece; the last is 1
@@ -118,7 +119,8 @@ def make_sample(
 ) -> StaticSample:
     """Return a sample, or many samples along the first axis.
 
-    If strength falls by no more than round-off at a node, it is constant there.
+    If strength falls by no more than round-off at a node, it is
+    constant there.
     """
     fall = excess - residual
     largest = max(excess.max(), residual.max(), -excess.min(), -residual.min())
@@ -139,8 +141,8 @@ def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> S
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
     excess = (rows.strength[row] - initial).reshape(shape)
     residual = (rows.residual_strength[row] - initial).reshape(shape)
-    # Copy the rate: numba would compile each kernel again for a read-only array,
-    # as laws return.
+    # Copy the rate: numba would compile each kernel again for a
+    # read-only array, as laws return.
     weakening_rate = rows.weakening_rate[row].reshape(shape).copy()
     return make_sample(excess, residual, rows.load_profile.flatten(), weakening_rate, pieces)
 
@@ -172,12 +174,12 @@ class EquilibriumState:
     gap: float | None = None  # distance to a load without equilibrium, Pa, if it is known
     certified: bool = True  # a multiplier proves the gap
     stopped: bool = False  # a slipping node stopped on the way
-    # Largest mean stress on the way here, divided by the mean of the load
-    # profile, Pa. Without a machine it is the load itself (None).
+    # Largest mean stress on the way here, divided by the mean of the
+    # load profile, Pa. Without a machine it is the load itself (None).
     peak: float | None = None
     K_direction: Array | None = None  # (n,): K times the direction, if it is known
-    # The exact y with <p, y> = 1, if the direction is exact; otherwise the
-    # direction replaces it.
+    # The exact y with <p, y> = 1, if the direction is exact; otherwise
+    # the direction replaces it.
     multiplier: Array | None = None
 
     @property
@@ -212,7 +214,8 @@ class Jump(NamedTuple):
 class Program(Protocol):
     """Thread-safe protocol for the search for equilibria: `DenseProgram` or `PlaneProgram`.
 
-    `widest_gap` is the largest certificate gap without a warning, as a share of the load.
+    `widest_gap` is the largest certificate gap without a warning, as a
+    share of the load.
     """
 
     pieces: Pieces
@@ -228,8 +231,8 @@ class Program(Protocol):
     ) -> Jump:
         """Let an unstable state jump to a new equilibrium, or to sliding.
 
-        If an interface ends, the jump stops when all nodes that can break slip. With
-        `to_rest`, it goes on.
+        If an interface ends, the jump stops when all nodes that can
+        break slip. With `to_rest`, it goes on.
         """
 
     def at(
@@ -240,8 +243,9 @@ class Program(Protocol):
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the derivative (n,) of an instability's stress with respect to the strengths.
 
-        The stress is the mean stress divided by the mean of the load profile. The strengths are the
-        present pieces of the law, continued to zero slip.
+        The stress is the mean stress divided by the mean of the load
+        profile. The strengths are the present pieces of the law,
+        continued to zero slip.
         """
 
     def stress_released(self, state: EquilibriumState) -> Array:
@@ -319,7 +323,8 @@ def step_to_corner(
 ) -> float:
     """Move slip along a direction until the first node reaches a corner, and return the step.
 
-    The step is at most `longest`. If the step is infinite, slip does not change.
+    The step is at most `longest`. If the
+    step is infinite, slip does not change.
     """
     step = longest
     ends = sample.pieces.ends

@@ -8,21 +8,22 @@ profile. Slip d is an equilibrium at a load if
 
     load p - K d <= s(d),  with '=' where d > 0.                                              (1)
 
-Follow the least equilibrium, which an interface without inertia takes, from rest to the
-load at which (1) has no solution: there the whole interface slides. Slip never goes
-back. The first instability is the load at which the path of equilibria turns first,
-and a patch jumps.
+Follow the least equilibrium, which an interface without inertia takes,
+from rest to the load at which (1) has no solution: there the whole
+interface slides. Slip never goes back. The first instability is the
+load at which the path of equilibria turns first, and a patch jumps.
 
 Algorithm for a sample
 ----------------------
 The algorithm is our own (`follow_to_sliding`). A `Program` supplies the two searches:
 
-1. Start from rest and raise the load to the next instability (`Program.next`).
+1. Start from rest and raise the load to the next instability
+   (`Program.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
 3. Let the unstable patch jump at constant load (`Program.jump`). If no
    equilibrium stops it, the interface slides: stop.
-4. If the patch comes to rest, this is an arrested event. Go to step 1 from the new
-   equilibrium.
+4. If the patch comes to rest, this is an arrested event. Go to step 1
+   from the new equilibrium.
 """
 
 from typing import Any, NamedTuple
@@ -76,12 +77,14 @@ STRENGTH_STEP = 1e-7
 class SamplePath(NamedTuple):
     """The course of a sample until it slides.
 
-    `first` is the first instability, and `last` is the last equilibrium. `known` is false
-    if a jump or a path was not followed to its end. The load of `last` is then a lower
-    bound. `peak` is the largest mean stress on the way, divided by the mean of the load
-    profile (Pa). With inertia, `arrival` is the time at which the front of the last event
-    reached each node (s). If the interface ends, `last` is the last instability, and
-    `sliding` is its event, if the event was followed to its end.
+    `first` is the first instability, and `last` is the last
+    equilibrium. `known` is false if a jump or a path was not followed
+    to its end. The load of `last` is then a lower bound. `peak` is the
+    largest mean stress on the way, divided by the mean of the load
+    profile (Pa). With inertia, `arrival` is the time at which the front
+    of the last event reached each node (s). If the interface ends,
+    `last` is the last instability, and `sliding` is its event, if the
+    event was followed to its end.
     """
 
     first: EquilibriumState
@@ -103,9 +106,10 @@ def follow_to_sliding(
 ) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
-    Without inertia, a patch stops at the least equilibrium at the same load. Inertia may carry it
-    further. An interface that ends slides as soon as every node that can break slips. Pass
-    `to_rest` to follow this last event until it stops.
+    Without inertia, a patch stops at the least equilibrium at the same
+    load. Inertia may carry it further. An interface that ends slides as
+    soon as every node that can break slips. Pass `to_rest` to follow
+    this last event until it stops.
     """
     ends, sliding = not np.isfinite(sample.excess).all(), None
     first: EquilibriumState | None = None
@@ -170,7 +174,8 @@ class OnsetSolver:
             MIN_NODES_IN_NUCLEATION_LENGTH,
             ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)],
         )
-        # One after the other, so that the result of a sample depends on this sample alone.
+        # One after the other, so that the result of a sample depends on
+        # this sample alone.
         samples, table, flags = sample_of(rows, self.program.pieces), [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
@@ -184,7 +189,8 @@ class OnsetSolver:
             flags.append((path.known, path.first.certified, path.first.stopped))
             table.append(self._values(rows, row, sample, path))
         values = {name: np.array([row[name] for row in table]) for name in table[0]}
-        # Loads become mean stresses: add the initial stress, multiply by the mean profile.
+        # Loads become mean stresses: add the initial stress, multiply
+        # by the mean profile.
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.mean(rows.load_profile)
@@ -198,7 +204,8 @@ class OnsetSolver:
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)
-        # After an arrested event another patch may let go of the whole interface.
+        # After an arrested event another patch
+        # may let go of the whole interface.
         if last is not first and last.direction.any():
             sliding_patch = critical_patch(last.direction, interface)
         values: dict[str, Any] = {
@@ -220,7 +227,8 @@ class OnsetSolver:
             values["certified"] = first.certified
         else:
             values["critical_patch_length"] = patch.area
-        # Behind a stiff machine, or within a short extent, an interface can slide without any
+        # Behind a stiff machine, or within a short
+        # extent, an interface can slide without any
         # instability. Then there is no critical patch.
         stable = first.status == PathStatus.STABLE
         if stable:
@@ -258,7 +266,8 @@ class OnsetSolver:
     ) -> None:
         """Warn about exceptional samples. `values` holds all samples, with stresses in Pa."""
         first, unproved = values["first_instability"], ~certified
-        # Gaps are compared with the load. A stress of zero must not divide them.
+        # Gaps are compared with the load. A stress of zero must not
+        # divide them.
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
@@ -293,7 +302,8 @@ class OnsetSolver:
             " NaN",
             stopped & np.isfinite(first),
         )
-        # Compare the peak with the stress of sliding, on the scale of the fall of strength.
+        # Compare the peak with the stress of sliding, on the scale of
+        # the fall of strength.
         residual = rows.mean(rows.residual_strength)
         falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)
         falls = falls[:, np.isfinite(falls[0])]
@@ -321,17 +331,17 @@ def _sensitivity(
 ) -> Array:
     """Return the derivative (n,) of an instability's stress with respect to peak strengths.
 
-    The derivative is NaN if a law steepens and a node passed a corner before the
-    instability.
+    The derivative is NaN if a law steepens and a node passed a corner
+    before the instability.
     """
     pieces = sample.pieces
     if state.stopped:
         return _quotients(problem, program, sample, state)
     if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
-    # The program's derivative is by the present piece continued to zero slip,
-    # which is share tau_p + (1 - share) tau_r. The chain rule gives the
-    # derivative by tau_p.
+    # The program's derivative is by the present piece continued to zero
+    # slip, which is share tau_p + (1 - share) tau_r. The chain rule
+    # gives the derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
     return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 
@@ -341,7 +351,8 @@ def _quotients(
 ) -> Array:
     """Return derivatives of a first instability as difference quotients, with a path for each node.
 
-    Between events paths are straight, so a small step gives the exact derivative.
+    Between events paths are straight, so a
+    small step gives the exact derivative.
     """
     stress_before = first.load - problem.relief(first.slip)
     # At nodes that cannot break, the derivative is zero.

@@ -1,8 +1,9 @@
 """Strength at a given slip for any friction law, inside compiled kernels.
 
-A law passes its parameters to kernels as a NamedTuple of its own type. When a
-kernel is compiled, this type selects the formula for the strength. A new law
-therefore changes no kernel, and it costs only as much as its own formula.
+A law passes its parameters to kernels as a NamedTuple of its own type.
+When a kernel is compiled, this type selects the formula for the
+strength. A new law therefore changes no kernel, and it costs only as
+much as its own formula.
 """
 
 from collections.abc import Callable
@@ -16,8 +17,8 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_allocating
 from stiction.problem.friction.parameters import Linear
 
-# numba compares the names of arguments with their annotations, so functions by type
-# have none.
+# numba compares the names of arguments with their annotations, so
+# functions by type have none.
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -69,15 +70,16 @@ def line_at(
 ) -> tuple[float, float]:
     """Return the straight line that the strength follows at ``slip + ahead``.
 
-    The line is given by its value at `slip` (Pa) and its weakening rate (Pa/m). For a
-    piecewise linear law it is the piece itself.
+    The line is given by its value at `slip` (Pa) and its weakening rate
+    (Pa/m). For a piecewise linear law it is the piece itself.
 
     Parameters
     ----------
     law : NamedTuple
         ``friction.parameters`` of the problem.
     peak, residual, rate, slip, ahead : float
-        tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m), and slips (m).
+        tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m),
+        and slips (m).
     """
     return _line(law, peak, residual, weakening_rate, slip, ahead)
 

@@ -1,7 +1,7 @@
 """Friction laws: strength that falls with slip from tau_p to tau_r.
 
-To add a law, write a subclass of `FrictionLaw`. Call `register` to allow it in
-study files.
+To add a law, write a subclass of `FrictionLaw`. Call `register` to
+allow it in study files.
 """
 
 from __future__ import annotations
@@ -49,9 +49,10 @@ _VALID = {
 class FrictionLaw(ABC):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), in which f falls from 1 to 0.
 
-    A law consists of the function f in its `parameters`, and the integral and inverse
-    of f. A law takes the arguments of `LinearWeakening`, with W = -f'(0) (tau_p -
-    tau_r)/d_c and Gamma = (tau_p - tau_r) d_c times the integral of f.
+    A law consists of the function f in its `parameters`, and the
+    integral and inverse of f. A law takes the arguments of
+    `LinearWeakening`, with W = -f'(0) (tau_p - tau_r)/d_c and Gamma =
+    (tau_p - tau_r) d_c times the integral of f.
     """
 
     family: ClassVar[str] = "laws"
@@ -149,8 +150,8 @@ class FrictionLaw(ABC):
     def weakening_rate_of(self, drop: Array, scale: str, value: Any) -> Array:
         """Return the weakening rate W at zero slip, Pa/m.
 
-        `drop` is tau_p - tau_r, Pa. `value` is the value of a scale, in Pa/m, m or
-        J/m².
+        `drop` is tau_p - tau_r, Pa. `value` is the value of a scale, in
+        Pa/m, m or J/m².
         """
         value = np.asarray(value, dtype=np.float64)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -167,8 +168,8 @@ class FrictionLaw(ABC):
     def dissipated(self, slip: Array, drop: Array, weakening_rate: Array) -> Array:
         """Return the energy that slip up to `slip` dissipates above the residual strength, J/m².
 
-        `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa) and `weakening_rate` = W
-        (Pa/m) have shape (nodes,).
+        `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa)
+        and `weakening_rate` = W (Pa/m) have shape (nodes,).
         """
         if self.linear:
             # Slip beyond d_c dissipates no more.
@@ -187,10 +188,10 @@ class LinearWeakening(FrictionLaw):
     Parameters
     ----------
     weakening_rate, critical_slip, fracture_energy : float or (nodes,) array, optional
-        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W = (tau_p -
-        tau_r)/d_c varies with the strength. With Gamma, W = (tau_p - tau_r)²/(2
-        Gamma) also varies. Leave all three out if the scale is a profile or random
-        (`RandomInterface`).
+        W (Pa/m), d_c (m) or Gamma (J/m²), positive. With d_c, W =
+        (tau_p - tau_r)/d_c varies with the strength. With Gamma, W =
+        (tau_p - tau_r)²/(2 Gamma) also varies. Leave all three out if
+        the scale is a profile or random (`RandomInterface`).
     residual_strength, residual_ratio : float or (nodes,) array, optional
         tau_r (Pa) or tau_r/tau_p in [0, 1).
 
@@ -223,8 +224,9 @@ class LinearWeakening(FrictionLaw):
 class ExponentialWeakening(FrictionLaw):
     """Strength that decays with slip: tau_r + (tau_p - tau_r) exp(-d/d_c).
 
-    The law has the same parameters as `LinearWeakening`. W is the rate at zero slip.
-    At the slip d_c, 1/e of tau_p - tau_r remains. Gamma is (tau_p - tau_r) d_c.
+    The law has the same parameters as `LinearWeakening`. W is the rate
+    at zero slip. At the slip d_c, 1/e of tau_p - tau_r remains. Gamma
+    is (tau_p - tau_r) d_c.
 
     Examples
     --------
@@ -262,13 +264,14 @@ class PiecewiseWeakening(FrictionLaw):
     Parameters
     ----------
     slip : sequence of float
-        Corners u = d/d_c, rising from above 0 to 1. The corner at zero slip is
-        implied.
+        Corners u = d/d_c, rising from above 0 to 1. The corner at zero
+        slip is implied.
     strength : sequence of float
-        (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from below 1 to 0.
+        (tau_f - tau_r)/(tau_p - tau_r) at these corners, falling from
+        below 1 to 0.
     weakening_rate, critical_slip, fracture_energy, residual_strength, residual_ratio : optional
-        As for `LinearWeakening`. W is the rate of the first piece. The strength is
-        residual if the slip exceeds d_c.
+        As for `LinearWeakening`. W is the rate of the first piece. The
+        strength is residual if the slip exceeds d_c.
 
     Examples
     --------
@@ -326,7 +329,8 @@ class PiecewiseWeakening(FrictionLaw):
     def area(self, u: Any) -> Array:
         """Return the area under f up to u."""
         (corners, f), (slopes, areas) = self.corners, self._pieces
-        # The area up to the corner before u, and a trapezium from this corner to u.
+        # The area up to the corner before u, and a trapezium from this
+        # corner to u.
         at_corners = np.append(0.0, np.cumsum(areas))
         u = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
         piece = np.clip(np.searchsorted(corners, u, side="right") - 1, 0, len(self.slip) - 1)
@@ -351,9 +355,10 @@ class PiecewiseWeakening(FrictionLaw):
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
         """Approximate a law by linear pieces. `pieces` is their number, at least 2.
 
-        The corners lie on the curve of the law, at equal steps of strength. If the
-        law never reaches its residual strength, the last piece dissipates the same
-        energy as the remaining part of the law.
+        The corners lie on the curve of the law, at equal
+        steps of strength. If the law never reaches its
+        residual strength, the last piece dissipates the
+        same energy as the remaining part of the law.
 
         Examples
         --------
@@ -404,7 +409,8 @@ def contradictions(law: FrictionLaw) -> list[str]:
     """Return the mistakes in a user's law. Its f may rise, or contradict its other members."""
     if type(law).__module__.startswith("stiction."):
         return []
-    # Check first what the later checks need: an inverse, parameters, and f that compiles.
+    # Check first what the later checks need: an inverse, parameters,
+    # and f that compiles.
     name, parameters = type(law).__name__, law.parameters
     try:
         end = float(law.slip_at(0.0))
@@ -442,7 +448,8 @@ def contradictions(law: FrictionLaw) -> list[str]:
     }  # fmt: skip
     if violations := [text for text, is_so in wrong.items() if is_so]:
         return [f"{name}: {violations[0]}"]
-    # The law states its slope, its integral and its inverse. Compare them with f itself.
+    # The law states its slope, its integral and its inverse. Compare
+    # them with f itself.
     pairs: dict[str, tuple[Any, Any]] = {
         "initial_slope": (law.initial_slope, slope[0]),
         "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),

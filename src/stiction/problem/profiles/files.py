@@ -3,14 +3,17 @@
 Each reader takes these steps:
 
 1. Take the whole content of a regular file (`base/files.py`).
-2. Compare the size that the file states with a limit, before anything is unpacked.
-3. Let a library read the content. Any failure of the library becomes a line for the user.
+2. Compare the size that the file states with a limit, before anything
+   is unpacked.
+3. Let a library read the content. Any failure of the library becomes a
+   line for the user.
 4. Return an array with its names and units.
 
-A table is a text file or a sheet of a workbook. Its lines are split into cells here, and
-`tables.py` reads the numbers in them. For a text above `LARGE` bytes, both read the first
-lines. pandas then reads the other lines if all of them are alike. Otherwise the whole text
-is read line by line.
+A table is a text file or a sheet of a workbook. Its lines are split
+into cells here, and `tables.py` reads the numbers in them. For a text
+above `LARGE` bytes, both read the first lines. pandas then reads the
+other lines if all of them are alike. Otherwise the whole text is read
+line by line.
 """
 
 from __future__ import annotations
@@ -96,16 +99,17 @@ def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
 def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
     """Read a table of numbers from a text file or a sheet of a workbook.
 
-    Semicolons, tabs, commas or blanks separate columns. Lines that begin with ``#``
-    are comments. The last line above the numbers holds the names of the columns, or
-    their units below a line of names. If there is no such line, the last comment may
-    hold the names.
+    Semicolons, tabs, commas or blanks separate columns. Lines that
+    begin with ``#`` are comments. The last line above the numbers holds
+    the names of the columns, or their units below a line of names. If
+    there is no such line, the last comment may hold the names.
 
-    Columns become variables along 'row', with NaN in empty cells. A column without a
-    name has its number, from 0, as its name. The attributes are `lines` (the line
-    number of each row), `blocks` (the record number of each row), `comments`, and
-    `headed` (whether columns have names). If a column contains no number, its
-    attribute `text` describes the content.
+    Columns become variables along 'row', with NaN in empty cells. A
+    column without a name has its number, from 0, as its name. The
+    attributes are `lines` (the line number of each row), `blocks` (the
+    record number of each row), `comments`, and `headed` (whether
+    columns have names). If a column contains no number, its attribute
+    `text` describes the content.
     """
     content = content_of(path)
     if path.suffix.lower() == EXCEL:
@@ -184,8 +188,8 @@ def _separator(lines: Sequence[str]) -> str:
         if ends and 2 * sum(mark in line for line in ends) >= len(ends):
             return mark
     last = ends[-1] if ends else ""
-    # Blanks separate numbers with decimal commas, '0,1 1000,5', but commas '0.1,
-    # 1000.5'.
+    # Blanks separate numbers with decimal commas, '0,1 1000,5', but
+    # commas '0.1, 1000.5'.
     between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
     return " " if "," not in last or between else ","
 

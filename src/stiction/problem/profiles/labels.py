@@ -1,16 +1,17 @@
 """Take a profile from labelled data: choose the variable and its coordinates, convert to SI.
 
-A source is a file, an xarray object, a table of pandas, a surface, a quantity with
-a unit or an array. It may hold many variables, and their names and units follow no
-standard. A wrong choice would give a wrong number, so an ambiguous choice is
-refused. `labelled` takes these steps:
+A source is a file, an xarray object, a table of pandas, a surface, a
+quantity with a unit or an array. It may hold many variables, and their
+names and units follow no standard. A wrong choice would give a wrong
+number, so an ambiguous choice is refused. `labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
-2. Take a table without headings for a map if its comments, `rows` or `spacing` say so.
-3. Choose the variable and its coordinates by the argument. Without an argument,
-   choose by the name, and then by the unit.
-4. Name the dimensions 'x' and 'y', or 'row' for a list of points. The sample comes
-   first.
+2. Take a table without headings for a map if its comments, `rows` or
+   `spacing` say so.
+3. Choose the variable and its coordinates by the argument. Without an
+   argument, choose by the name, and then by the unit.
+4. Name the dimensions 'x' and 'y', or 'row' for a list of points. The
+   sample comes first.
 5. Convert values and coordinates to SI, and check them.
 """
 
@@ -121,8 +122,8 @@ def simplified(value: Any, quantity: str) -> Any:
 def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     """Return numbers without labels, and the unit if the source states a unit.
 
-    The unit belongs to a quantity, is the attribute `units`, or stands in the name of a
-    Series.
+    The unit belongs to a quantity, is the attribute `units`, or stands
+    in the name of a Series.
     """
     stated = ""
     if is_labelled(value) and not hasattr(value, "data_vars"):
@@ -143,8 +144,8 @@ def without_missing(array: Any, options: Options) -> Any:
 def of_pandas(value: Any) -> Any:
     """Return a Series or DataFrame with labels, or an array if its labels are 0, 1, 2, ...
 
-    Labels of type float are positions, m. A DataFrame with headings is read like a
-    file.
+    Labels of type float are positions, m. A DataFrame with headings is
+    read like a file.
     """
     import xarray as xr
 
@@ -202,8 +203,8 @@ def labelled(
 ) -> Any:
     """Return a quantity from `source` in SI, along `dims` or the directions of the source.
 
-    A dimension with a different name, such as the sample, comes first. It is the only
-    dimension if each sample has a single value.
+    A dimension with a different name, such as the sample, comes first.
+    It is the only dimension if each sample has a single value.
     """
     # 1. Make the source a DataArray or a Dataset.
     is_file = isinstance(source, str | Path)
@@ -282,7 +283,8 @@ def _of_array(values: Any, source: Any) -> Any:
 def _as_map(data: Any, dims: Any, rows: str | None, spacing: Any, value: Column) -> Any:
     """Return a matrix from a text file as a map. Return other data unchanged.
 
-    Comments may state the width, the height and the unit of a map, as Gwyddion writes them.
+    Comments may state the width, the height and the unit of a map, as
+    Gwyddion writes them.
     """
     import xarray as xr
 
@@ -405,8 +407,8 @@ def column_of(
 ) -> Any:
     """Return the wanted column in a table of tests, or the column whose name begins with a word.
 
-    If no name begins with such a word, return the column in a unit of `units`,
-    provided that only one column has such a unit.
+    If no name begins with such a word, return the column in a unit of
+    `units`, provided that only one column has such a unit.
     """
     names = list(table.data_vars)
     if wanted is not None:

@@ -1,15 +1,17 @@
 """Put values on the nodes of a line or a plane, and handle gaps.
 
-The nodes are x_i = i L/n in each direction. The interface is periodic, so points
-may come in any order and begin anywhere. On a specimen, the nodes are x_i = (i +
-1/2) L/n, and the profile stops at its ends. The steps are:
+The nodes are x_i = i L/n in each direction. The interface
+is periodic, so points may come in any order and begin
+anywhere. On a specimen, the nodes are x_i = (i + 1/2)
+L/n, and the profile stops at its ends. The steps are:
 
-1. Find the common offset of the points from the nodes, as a share of the spacing.
-   Warn about an offset. Refuse points that do not lie on nodes, unless the caller
-   wants to interpolate.
+1. Find the common offset of the points from the nodes, as a share of
+   the spacing. Warn about an offset. Refuse points that do not lie on
+   nodes, unless the caller wants to interpolate.
 2. Number the node of each point. Refuse two different values at a node.
 3. Give each node the value of its point, or interpolate between points.
-4. Refuse missing values, leave NaN, or fill gaps by linear interpolation on request.
+4. Refuse missing values, leave NaN, or fill gaps by linear
+   interpolation on request.
 """
 
 from __future__ import annotations
@@ -45,8 +47,9 @@ OF_A_PLANE = (
 def points_of(array: Any) -> tuple[Array, dict[str, Array], Any]:
     """Return values (..., points), positions (m) by direction, and a mask of measured points.
 
-    The mask is True if all points were measured. Values without coordinates keep
-    their shape, and their dictionary of positions is empty.
+    The mask is True if all points were measured.
+    Values without coordinates keep their shape,
+    and their dictionary of positions is empty.
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -63,7 +66,8 @@ def place(
 ) -> tuple[Array, Any]:
     """Return values at the nodes of an interface (..., *shape), and a mask of measured nodes.
 
-    The mask is False at filled and missing values. It is True if all values are there.
+    The mask is False at filled and missing values. It is True if all
+    values are there.
     """
     values, places, measured = points_of(array)
     if not places:
@@ -78,7 +82,8 @@ def place(
         raise InputError("has no values")
     # 1. Find the offset from the nodes.
     offsets = [_offset(dim, places[dim], interface, interpolate) for dim in interface.dims]
-    # 2. Number nodes. Between them, places differ if they are a millionth of a spacing apart.
+    # 2. Number nodes. Between them, places differ if they are a
+    # millionth of a spacing apart.
     finer = 10**6 if None in offsets else 1
     shape = tuple(finer * n for n in interface.shape)
     steps = [
@@ -126,8 +131,8 @@ def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
 def _offset(dim: str, x: Array, interface: Interface, interpolate: bool) -> float | None:
     """Return the common offset of the points from the nodes, in spacings, in (-0.5, 0.5] (step 1).
 
-    The offset is None if the points must be interpolated, for example if a line has
-    fewer points than nodes.
+    The offset is None if the points must be interpolated, for example
+    if a line has fewer points than nodes.
     """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
@@ -253,8 +258,8 @@ def close_gaps(
 def _filled(row: Array, hole: Mask, interface: Interface) -> Array:
     """Return values (*shape) with gaps filled by linear interpolation.
 
-    Free ends take the nearest value. On a plane, triangles connect the nodes around
-    each gap, and the period is repeated on all sides.
+    Free ends take the nearest value. On a plane, triangles connect the
+    nodes around each gap, and the period is repeated on all sides.
     """
     if not hole.any():
         return row

@@ -1,15 +1,16 @@
 """Read users' profiles in SI, and put them on the nodes of an interface.
 
-A profile enters in three ways: through `read_profile`, as an argument of a call or
-an object (`at_nodes`), or by its name in a study file (`profile_in_file`). The
-profiles of samples enter together (`placed_profiles`).
-`read_profile`, which study files also use, takes these steps. `at_nodes` takes
-steps 1 and 4:
+A profile enters in three ways: through `read_profile`, as an argument
+of a call or an object (`at_nodes`), or by its name in a study file
+(`profile_in_file`). The profiles of samples enter together
+(`placed_profiles`). `read_profile`, which study files also use, takes
+these steps. `at_nodes` takes steps 1 and 4:
 
 1. Find the quantity in the source, in SI (`labels.py`).
 2. Turn heights or grey values into strengths, if the caller gives a map.
 3. Move the coordinates by an offset, or to the centre of the interface.
-4. Put the values on the nodes (`placing.py`), or sort them if there is no interface.
+4. Put the values on the nodes (`placing.py`), or sort them if there is
+   no interface.
 """
 
 from __future__ import annotations
@@ -98,75 +99,83 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas are used, and units of pint and astropy. An
-        ``.npy`` file has the shape (nodes,) or (nx, ny). A ``.csv``, ``.txt``,
-        ``.dat``, ``.tsv`` or ``.xlsx`` file has columns, with or without a line of
-        names such as ``x (mm), strength (MPa)``. A ``.nc`` file has variables with
-        `units`, and x as a coordinate. A map over 'x' and 'y' is a table with both as
-        columns, a matrix without headings, a grey image (``.png``, ``.tif``), or a
+        Labels of xarray and pandas are used, and units of pint
+        and astropy. An ``.npy`` file has the shape (nodes,) or
+        (nx, ny). A ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or
+        ``.xlsx`` file has columns, with or without a line of
+        names such as ``x (mm), strength (MPa)``. A ``.nc`` file
+        has variables with `units`, and x as a coordinate. A map
+        over 'x' and 'y' is a table with both as columns, a matrix
+        without headings, a grey image (``.png``, ``.tif``), or a
         binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
-        Name, heading or number (from 0) of the column, coordinate or variable. By
-        default, columns are recognised by a name such as ``x`` or ``position``, and
-        ``strength`` or ``tau_p``, or else as the single column in a unit of length or
-        of `quantity`. If two columns have no headings, the first is x.
+        Name, heading or number (from 0) of the column, coordinate or
+        variable. By default, columns are recognised by a name such as
+        ``x`` or ``position``, and ``strength`` or ``tau_p``, or else as
+        the single column in a unit of length or of `quantity`. If two
+        columns have no headings, the first is x.
     unit, x_unit : str, optional
-        Units of the values and the positions, if the source does not state them. By
-        default SI.
+        Units of the values and the positions, if the source does not
+        state them. By default SI.
     quantity : str
-        'strength', 'residual_strength', 'initial_stress', 'normal_pressure' (Pa),
-        'critical_slip', 'height' (m), 'weakening_rate' (Pa/m), 'load_profile' or
+        'strength', 'residual_strength', 'initial_stress',
+        'normal_pressure' (Pa), 'critical_slip', 'height' (m),
+        'weakening_rate' (Pa/m), 'load_profile' or
         'friction_coefficient' (1).
     strength : callable, optional
-        Map from heights (m, an array), or from the grey values of an image, to
-        strengths (Pa): ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then
-        read.
+        Map from heights (m, an array), or from the grey values of an
+        image, to strengths (Pa): ``strength=lambda h: 1e6 + 5e11 * h``.
+        Heights are then read.
     missing : float, str or sequence of them, optional
-        Numbers and words that stand for a missing value, such as ``-9999`` or
-        ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always
-        do.
+        Numbers and words that stand for a missing value, such as
+        ``-9999`` or ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``,
+        ``***`` and ``#N/A`` always do.
     decimal : {".", ","}, optional
-        Decimal mark of a text file. It is needed if the mark could also separate
-        thousands.
+        Decimal mark of a text file. It is needed if the mark could also
+        separate thousands.
     skip : int
         Number of lines, or rows of a sheet, to pass over before the headings.
     sheet : int or str
         Number (from 0) or name of the sheet of a workbook.
     record : int, optional
-        Number (from 0) of the record, if empty lines or repeated headings separate
-        several.
+        Number (from 0) of the record, if empty lines or repeated
+        headings separate several.
     spacing : float or (float, float), optional
-        Distance between the points of an array, a matrix or an image along x, and
-        along y, m.
+        Distance between the points of an array, a matrix or an image
+        along x, and along y, m.
     rows : {"x", "y"}, optional
-        Direction in which the lines of a matrix in a text file follow each other. The
-        default is y if comments state the width and height of the map, as in files of
-        Gwyddion.
+        Direction in which the lines of a matrix in a text file follow
+        each other. The default is y if comments state the width and
+        height of the map, as in files of Gwyddion.
     interface : Interface, optional
-        Map the profile to the nodes x_i = i L/n, modulo L. Points may have any order.
+        Map the profile to the nodes x_i = i L/n, modulo L. Points may
+        have any order.
     offset : float, (float, float) or "centre"
-        Offset that is added to the coordinates, m. With "centre", the centre of the
-        record moves to the centre of the interface.
+        Offset that is added to the coordinates, m. With "centre", the
+        centre of the record moves to the centre of the interface.
     interpolate : bool
-        Interpolate linearly if the points of a line do not coincide with the nodes.
+        Interpolate linearly if the points of a line do not coincide
+        with the nodes.
     gaps : {"refuse", "fill", "skip"}
-        "refuse" raises an error for missing values (NaN, empty cells, missing
-        points). "fill" interpolates linearly (on planes within triangles). "skip"
-        leaves NaN, for `stiction.fit_field` or for `RandomField.given`, which draws
-        equally likely values. Without an interface, missing values always stay.
+        "refuse" raises an error for missing values (NaN, empty cells,
+        missing points). "fill" interpolates linearly (on planes within
+        triangles). "skip" leaves NaN, for `stiction.fit_field` or for
+        `RandomField.given`, which draws equally likely values. Without
+        an interface, missing values always stay.
 
     Returns
     -------
     xarray.DataArray
-        Profile over 'x' (m), or over 'x' and 'y' on a plane, with `units`. If there
-        are gaps, the coordinate 'measured' is False in a gap. Results have the same
-        coordinate.
+        Profile over 'x' (m), or over 'x' and 'y' on a plane, with
+        `units`. If there are gaps, the coordinate 'measured' is False
+        in a gap. Results have the same coordinate.
 
     Raises
     ------
     InputError
-        If the source cannot be read, a unit is unknown or unsuitable, columns are
-        ambiguous, or the profile does not fit the interface.
+        If the source cannot be read, a unit is
+        unknown or unsuitable, columns are ambiguous,
+        or the profile does not fit the interface.
 
     Warns
     -----
@@ -286,9 +295,9 @@ def at_nodes(
 ) -> tuple[Any, Any]:
     """Return the values of a quantity at the nodes, and a mask of the measured nodes.
 
-    `name` may be a dotted key. Numbers, and arrays with a different shape, are
-    returned unchanged, because the caller checks them. The mask is True if all values
-    are there.
+    `name` may be a dotted key. Numbers, and arrays with a different
+    shape, are returned unchanged, because the caller checks them. The
+    mask is True if all values are there.
     """
     quantity = quantity_of(name)
     with prefixed(name):
@@ -346,8 +355,8 @@ def quantity_of(key: str) -> str:
 def named_profiles(given: Any) -> dict[str, Any]:
     """Return profiles by name, from a mapping, a dataset or the strength alone.
 
-    The strength may consist of friction coefficients. Their name or their unit shows
-    this.
+    The strength may consist of friction coefficients. Their name or
+    their unit shows this.
     """
     if hasattr(given, "marginal") or hasattr(given, "members"):
         raise InputError(
@@ -372,9 +381,10 @@ def placed_profiles(
 ) -> tuple[dict[str, Array], Any, list[str]]:
     """Return users' profiles by name as (samples, *shape), a mask, and the mistakes in them.
 
-    The mask marks the nodes at which all profiles were measured. A profile with a mistake is
-    missing in the result. A pressure without values along the interface is a mean, which is
-    multiplied by `pressing`.
+    The mask marks the nodes at which all profiles were
+    measured. A profile with a mistake is missing in the
+    result. A pressure without values along the interface
+    is a mean, which is multiplied by `pressing`.
     """
     first = "strength" if "strength" in given else "friction_coefficient"
     if first not in given:
@@ -405,9 +415,9 @@ def placed_profiles(
 def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
     """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
 
-    A single profile (*shape) counts as one sample. If `samples` is given, a number, a
-    profile, or one number per sample with shape (samples, 1) is broadcast to
-    (samples, *shape).
+    A single profile (*shape) counts as one sample. If `samples` is
+    given, a number, a profile, or one number per sample with shape
+    (samples, 1) is broadcast to (samples, *shape).
     """
     shape, array = interface.shape, as_numbers(value)
     valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"

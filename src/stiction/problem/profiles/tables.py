@@ -1,15 +1,17 @@
 """Numbers and headings in the cells of tables that instruments and colleagues write.
 
-The format of a table is unknown: the decimal mark, the end of the headings and the
-place of the units. A wrong guess could change a value by a factor of a thousand, so
-a table that can be read in two ways is refused. The cells come from `files.py`. The
-steps are:
+The format of a table is unknown: the decimal mark, the end of the
+headings and the place of the units. A wrong guess could change a value
+by a factor of a thousand, so a table that can be read in two ways is
+refused. The cells come from `files.py`. The steps are:
 
-1. Find the first line of numbers. Lines above it are headings, units or remarks. Empty
-   lines separate records.
-2. Find the decimal mark, which is the same in the whole file. If points or commas may
-   also mark thousands, refuse the file unless the caller states `decimal`.
-3. Turn cells into numbers. Empty cells and words for a missing value become NaN.
+1. Find the first line of numbers. Lines above it are headings, units or
+   remarks. Empty lines separate records.
+2. Find the decimal mark, which is the same in the whole file. If points
+   or commas may also mark thousands, refuse the file unless the caller
+   states `decimal`.
+3. Turn cells into numbers. Empty cells and
+   words for a missing value become NaN.
 4. Split headings into names and units.
 """
 
@@ -36,8 +38,8 @@ _EMPTY = {
     "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
 }  # fmt: skip
 """Words for a missing value, in lower case. A row of stars is another."""
-# Patterns never return to letters that they have passed: time grows linearly with
-# the file.
+# Patterns never return to letters that they have passed: time grows
+# linearly with the file.
 WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
 NUMBER = re.compile(
     r"[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
@@ -189,7 +191,8 @@ def numbers_of(grid: Grid, options: Options) -> Table:
             raise InputError(
                 f"line {row.number} has {len(row.cells)} columns, line {most} has {width}"
             )
-    # Without a line of headings, the last comment may name as many columns as there are.
+    # Without a line of headings, the last comment may name as many
+    # columns as there are.
     if not header and grid.comments and not _SIZE.match(grid.comments[-1]):
         comment = grid.comments[-1]
         at_blanks = split_at_blanks(comment, words)
@@ -202,7 +205,8 @@ def numbers_of(grid: Grid, options: Options) -> Table:
         _check_pairs(columns, rows[0])
     # 2. Find the decimal mark.
     mark = _decimal_mark(columns, numeric, rows, separator, options.decimal)
-    # 3. Turn cells into numbers. A column may hold words only, or numbers only.
+    # 3. Turn cells into numbers. A column may hold words only, or
+    # numbers only.
     numbers, texts, mixed = np.empty((width, len(rows))), {}, []
     for column, cells in enumerate(columns):
         values = _numbers(cells, words, mark)
@@ -234,7 +238,8 @@ def _start(rows: Sequence[Row], words: set[str]) -> tuple[int, list[int]]:
         raise InputError("holds no numbers")
     numeric = [i for i, cell in enumerate(last.cells) if is_value(cell)]
 
-    # The last line with numbers shows which columns have numbers. A heading has a word there.
+    # The last line with numbers shows which columns have numbers. A
+    # heading has a word there.
     def is_header(row: Row) -> bool:
         cells = [row.cells[i] for i in numeric if i < len(row.cells)]
         return {*row.cells} <= {"", "-"} or any(not is_value(cell, True) for cell in cells)
@@ -276,8 +281,9 @@ def _decimal_mark(
 ) -> str | None:
     """Return the decimal mark of a file, or None if its numbers have no mark (step 2).
 
-    The number 1.020 means 1.02 in some countries and 1020 in others. Such a file is
-    refused unless the caller or a different cell decides.
+    The number 1.020 means 1.02 in some countries
+    and 1020 in others. Such a file is refused
+    unless the caller or a different cell decides.
     """
     # A cell such as 0.5 or 1.02 shows that its mark stands before decimals.
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
@@ -301,8 +307,8 @@ def _decimal_mark(
             f"{example[',']}, and {example['.']}: two decimal marks. Pass decimal=',' if points"
             " mark thousands, and decimal='.' if commas do"
         )
-    # Programs write the same number of decimals in a column: 980 above 1.020 means
-    # 1020.
+    # Programs write the same number of decimals in a column: 980 above
+    # 1.020 means 1020.
     whole = any(
         any(map(str.isdigit, columns[i])) and any("." in cell for cell in columns[i])
         for i in numeric

@@ -8,9 +8,9 @@ folder solves systems
 
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
 
-for sets S and rates W that change a little from one system to the next. A pivot
-that is not positive shows that A_SS is not positive definite. The equilibrium is
-then unstable.
+for sets S and rates W that change a little from one system to the next.
+A pivot that is not positive shows that A_SS is not positive definite.
+The equilibrium is then unstable.
 
 Algorithm
 ---------
@@ -18,31 +18,32 @@ L is updated instead of computed again (P. Gill, G. Golub, W. Murray and M.
 Saunders, Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix
 Computations, 2013, section 6.5).
 
-1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is (A_jj -
-   l'l)^1/2. If A_jj - l'l is not positive, the vector z = (-A_SS^-1 A_Sj, 1) has
-   z'Az = A_jj - l'l <= 0, and A z = 0 on S (`singular_direction`).
-2. Remove a node (`remove`). The rows below it move up, which leaves one entry above
-   the diagonal in each of these rows. Plane rotations of neighbouring columns make
-   the entry zero.
-3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e', where e is
-   the unit vector of the node. Plane rotations between the columns of L and a^1/2 e
-   make a^1/2 e zero.
-4. Factor A on any set of nodes (`factor_slipping`). Keep the leading rows whose
-   nodes still slip and weaken no more than before. Raise the entries of nodes that
-   weaken less, and append the other nodes.
+1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is
+   (A_jj - l'l)^1/2. If A_jj - l'l is not positive, the vector z =
+   (-A_SS^-1 A_Sj, 1) has z'Az = A_jj - l'l <= 0, and A z = 0 on S
+   (`singular_direction`).
+2. Remove a node (`remove`). The rows below it move up, which leaves one
+   entry above the diagonal in each of these rows. Plane rotations of
+   neighbouring columns make the entry zero.
+3. Raise a diagonal entry by a > 0 (`raise_diagonal`): A_SS + a e e',
+   where e is the unit vector of the node. Plane rotations between the
+   columns of L and a^1/2 e make a^1/2 e zero.
+4. Factor A on any set of nodes (`factor_slipping`). Keep the leading
+   rows whose nodes still slip and weaken no more than before. Raise the
+   entries of nodes that weaken less, and append the other nodes.
 
 Departures from the textbook, for speed:
 
-- The rows of L are stored one after the other in a flat array. Each row is padded
-  to a multiple of eight numbers. This takes half the memory of a square array, and
-  no two rows compete for the same cache sets.
-- Four rows are appended together, so that each row of L is read once for four new
-  rows.
-- A pivot counts as not positive if its square is below `PIVOT_RTOL` of the
-  diagonal entry.
+- The rows of L are stored one after the other in a flat array. Each row
+  is padded to a multiple of eight numbers. This takes half the memory
+  of a square array, and no two rows compete for the same cache sets.
+- Four rows are appended together, so that each row of L is read once
+  for four new rows.
+- A pivot counts as not positive if its square is below `PIVOT_RTOL` of
+  the diagonal entry.
 
-Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t` and
-`position`.
+Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t`
+and `position`.
 """
 
 import math
@@ -95,8 +96,8 @@ def _solve_two(
 ) -> None:
     """Solve L x = values for the entries k and k + 1, from two rows u and v of L.
 
-    The corner of L holds 1/u_k, v_k and 1/v_k+1. u_x and v_x are the inner products of
-    the rows with the first k entries of x.
+    The corner of L holds 1/u_k, v_k and 1/v_k+1. u_x and v_x are the
+    inner products of the rows with the first k entries of x.
     """
     x[k] = (x[k] - u_x) * corner[0]
     x[k + 1] = (x[k + 1] - v_x - corner[1] * x[k]) * corner[2]
@@ -106,8 +107,9 @@ def _solve_two(
 def _forward_substitute_four(factor: Array, n_rows: int) -> None:
     """Solve L x = values in place for four right sides, which are the rows after `n_rows` in L.
 
-    Two rows u and v of L are processed at a time. Eight running sums, of each row
-    times each right side, keep the processor's vector units busy.
+    Two rows u and v of L are processed at a time.
+    Eight running sums, of each row times each right
+    side, keep the processor's vector units busy.
     """
     x0 = factor[row_slice(n_rows, n_rows)]
     x1 = factor[row_slice(n_rows + 1, n_rows)]
@@ -157,8 +159,8 @@ def raise_diagonal(
     cosines, sines = rotations[0], rotations[1]
     for r in range(position, n_rows):
         row = factor[row_slice(r, r + 1)]
-        # The entry of this row in the column a^1/2 e, after the rotations of the
-        # rows above.
+        # The entry of this row in the column a^1/2 e, after the
+        # rotations of the rows above.
         added = math.sqrt(amount) if r == position else 0.0
         for k in range(position, r):
             L_rk = row[k]
@@ -263,9 +265,10 @@ class SlipState(NamedTuple):
 def append(workspace: Workspace, n_slipping: int, count: int) -> int:
     """Step 1: append queue[:count] to S and L, until all are appended or a pivot fails.
 
-    Appended nodes are marked in `is_slipping`. Returns the number of rows in L. If this
-    number is below n_slipping + count, the pivot for the next node in S failed. The row
-    of the failed node, without the pivot, then follows the last row in L.
+    Appended nodes are marked in `is_slipping`. Returns the number of
+    rows in L. If this number is below n_slipping + count, the pivot for
+    the next node in S failed. The row of the failed node, without the
+    pivot, then follows the last row in L.
     """
     factor, slipping, stiffness = workspace.factor, workspace.slipping, workspace.stiffness
     diagonal = workspace.diagonal
@@ -354,8 +357,8 @@ def factor_slipping(workspace: Workspace) -> int:
             rise = diagonal[i] - factored_diagonal[t]
             raise_diagonal(workspace.factor, n_kept, t, rise, workspace.rotations)
             factored_diagonal[t] = diagonal[i]
-    # Nodes that weaken no more come first. Most nodes of a growing crack are
-    # such, and the rows at the top of L are kept longest.
+    # Nodes that weaken no more come first. Most nodes of a growing
+    # crack are such, and the rows at the top of L are kept longest.
     count = ZERO
     for may_weaken in (False, True):
         for i in range(is_slipping.shape[0]):
@@ -396,7 +399,8 @@ def multiply_outside(
 ) -> None:
     """Multiply as in `multiply_slipping`, but do not change the product at the slipping nodes.
 
-    (On a line these entries are overwritten with the same product, up to round-off.)
+    (On a line these entries are overwritten with the same product, up
+    to round-off.)
     """
     apply_outside(
         workspace.stiffness, workspace.slipping, n_slipping, values, workspace.is_slipping,
@@ -408,8 +412,8 @@ def multiply_outside(
 def apply_stiffness_to_resting_slip(state: SlipState) -> None:
     """Write K times the slip of nodes that slipped and now rest to `workspace.K_resting`.
 
-    It is zero if no such node exists, as on a line. Overwrites `workspace.queue` and
-    `workspace.rhs`.
+    It is zero if no such node exists, as on a line. Overwrites
+    `workspace.queue` and `workspace.rhs`.
     """
     slip, workspace = state.slip, state.workspace
     nodes, values, count = workspace.queue, workspace.rhs, ZERO
@@ -450,9 +454,10 @@ def write_clipped(workspace: Workspace, n_slipping: int, values: Array, field: A
 def singular_direction(workspace: Workspace, n_factored: int, direction: Array) -> None:
     """Write z = (-A_SS^-1 A_Sj, 1), clipped at zero, after `append` failed at node j.
 
-    If K has no positive off-diagonal entry, z >= 0 and A z <= 0 everywhere. Then z is
-    a multiplier that bounds the load from above, and the direction in which slip
-    jumps. The entries of z in S, without clipping, are left in `workspace.solution`.
+    If K has no positive off-diagonal entry, z >= 0 and A z <= 0
+    everywhere. Then z is a multiplier that bounds the load from above,
+    and the direction in which slip jumps. The entries of z in S,
+    without clipping, are left in `workspace.solution`.
     """
     z = workspace.solution
     failed_row = workspace.factor[row_slice(n_factored, n_factored)]

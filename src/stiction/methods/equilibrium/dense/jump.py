@@ -9,39 +9,44 @@ stiffness (Pa/m), d >= 0 is the slip (m), s(d) is the strength minus initial str
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-A node is driven if load p - K d - s(d), its overload, is not negative. Suppose that
-K has no positive off-diagonal entry, and that strength only falls with slip. Then
-slip at which all slipping nodes are driven lies below the least equilibrium. So
-does the slip after steps 1 and 2.
+A node is driven if load p - K d - s(d), its overload, is not negative.
+Suppose that K has no positive off-diagonal entry, and that strength
+only falls with slip. Then slip at which all slipping nodes are driven
+lies below the least equilibrium. So does the slip after steps 1 and 2.
 
 Algorithm
 ---------
 The algorithm is our own. Its two types of step do not pass the least equilibrium.
 
-1. Elastic step. Hold all strengths at their present values, and solve K_SS d_S =
-   (load p - s)_S. Slip increases to this solution at nodes at which the solution is
-   larger. K_SS is factored once and only grows.
-2. Step with the true pieces. On S, let A = K - diag(W) with the weakening rates W
-   of the present pieces. If A_SS is positive definite, move towards the solution of
-   the linear problem for these pieces. If not, move along z >= 0 with A z <= 0
-   (step 1 in `cholesky`). The move ends when the first node reaches the next corner
-   of its law.
-3. After each step of either type, the resting nodes that are overstressed join S.
+1. Elastic step. Hold all strengths at their present values,
+   and solve K_SS d_S = (load p - s)_S. Slip increases to
+   this solution at nodes at which the solution is larger.
+   K_SS is factored once and only grows.
+2. Step with the true pieces. On S, let A = K - diag(W) with the
+   weakening rates W of the present pieces. If A_SS is positive
+   definite, move towards the solution of the linear problem for these
+   pieces. If not, move along z >= 0 with A z <= 0 (step 1 in
+   `cholesky`). The move ends when the first node reaches the next
+   corner of its law.
+3. After each step of either type, the resting nodes that are
+   overstressed join S.
 4. Step 1 is repeated as long as nodes join or pass corners, at most
-   `MAX_ELASTIC_STEPS` times in a row. Then step 2 follows, and so on. Step 2
-   requires a second factor. It is needed because step 1 alone creeps towards an
-   equilibrium without reaching it.
-5. The interface slides if all nodes slip, if its mean strength cannot carry the
-   load, if a run of nodes at their residual strength is longer than Griffith's
-   length, which no fracture energy can stop, or if step 2 is unbounded. It is
-   arrested if step 2 ends at the solution of the linear problem and no node joins.
+   `MAX_ELASTIC_STEPS` times in a row. Then step 2 follows, and so on.
+   Step 2 requires a second factor. It is needed because step 1 alone
+   creeps towards an equilibrium without reaching it.
+5. The interface slides if all nodes slip, if its mean strength cannot
+   carry the load, if a run of nodes at their residual strength is
+   longer than Griffith's length, which no fracture energy can stop, or
+   if step 2 is unbounded. It is arrested if step 2 ends at the solution
+   of the linear problem and no node joins.
 
-On a specimen, K may have positive off-diagonal entries (`may_stop`), so that a step
-may unload a slipping node. Slip does not go back. In step 1 such a node leaves S,
-and rests until it is overstressed again. In step 2 the node is left out of this
-step only, and the interface is not arrested as long as the node is overstressed.
-Every step lowers the energy. Therefore the steps end, at a state in which no stress
-exceeds its strength.
+On a specimen, K may have positive off-diagonal entries (`may_stop`), so
+that a step may unload a slipping node. Slip does not go back. In step 1
+such a node leaves S, and rests until it is overstressed again. In step
+2 the node is left out of this step only, and the interface is not
+arrested as long as the node is overstressed. Every step lowers the
+energy. Therefore the steps end, at a state in which no stress exceeds
+its strength.
 """
 
 from enum import IntEnum
@@ -149,7 +154,8 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
     slipping = workspace.slipping
     cholesky.apply_stiffness_to_resting_slip(state)
     while True:
-        # The drive is the stress that the slip of S must release to meet the strengths.
+        # The drive is the stress that the slip of S must release to
+        # meet the strengths.
         for t in range(n_slipping):
             i = slipping[t]
             drive[i] = load * sample.profile[i] - strength_at(sample, slip, i) - K_resting[i]
@@ -178,8 +184,9 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
     """Step 2: unmark the nodes whose solution is below zero. Return how many.
 
-    A solution counts as below zero if K_ii times the solution is below -`atol` (Pa),
-    and the solution is also below -`rtol` times the largest solution.
+    A solution counts as below zero if K_ii times the solution is below
+    -`atol` (Pa), and the solution is also below -`rtol` times the
+    largest solution.
     """
     solution = workspace.solution
     largest = 1.0  # a direction of singularity is 1 at the node that failed
@@ -200,11 +207,11 @@ def _write_direction(
 ) -> float:
     """Step 2: write the direction of the step. Return the longest step along the direction.
 
-    The longest step is 1 if the direction leads to the solution of the linear
-    problem, and otherwise infinite.
+    The longest step is 1 if the direction leads to the solution of the
+    linear problem, and otherwise infinite.
     """
-    # Leave out nodes that would move back, and solve again, until no such node is
-    # left. Each pass leaves out a node, so the loop ends.
+    # Leave out nodes that would move back, and solve again, until no
+    # such node is left. Each pass leaves out a node, so the loop ends.
     direction, solution = true_pieces.direction, true_pieces.solution
     while True:
         n_factored = cholesky.factor_slipping(true_pieces)
@@ -233,8 +240,8 @@ def _step_with_true_pieces(
     `true_pieces` is the workspace with the factor of A = K - diag(W).
     """
     sample, slip, Kd, workspace, _, _ = state
-    # Nodes that the step leaves out lose their mark among the true pieces only. In elastic
-    # steps they still slip.
+    # Nodes that the step leaves out lose their mark among the true
+    # pieces only. In elastic steps they still slip.
     overload = workspace.rhs
     for i in range(slip.shape[0]):
         piece = piece_at(sample.pieces, sample.critical[i], slip[i])
@@ -243,7 +250,8 @@ def _step_with_true_pieces(
         true_pieces.diagonal[i] = entry(workspace.stiffness, i, i) - W
         overload[i] = load * sample.profile[i] - strength_at(sample, slip, i) - Kd[i]
     longest = _write_direction(state, true_pieces, n_slipping, overload, tolerance)
-    # Without a corner on the way, slip along an unstable direction never stops.
+    # Without a corner on the way, slip along an unstable direction
+    # never stops.
     step = step_to_corner(sample, slip, true_pieces.direction, longest)
     if step == np.inf:
         return StepEnd(Course.SLIDES, n_slipping)
@@ -251,8 +259,8 @@ def _step_with_true_pieces(
         workspace.solution[t] = slip[workspace.slipping[t]]
     cholesky.multiply_slipping(workspace, n_slipping, workspace.solution, Kd)
     cholesky.apply_stiffness_to_resting_slip(state)
-    # At rest, if the step was not cut short by a corner, and all nodes left out stay below
-    # their strength.
+    # At rest, if the step was not cut short by a corner, and all nodes
+    # left out stay below their strength.
     at_rest = step == 1.0 and longest == 1.0
     for i in range(slip.shape[0]):
         Kd[i] += workspace.K_resting[i]
@@ -269,10 +277,11 @@ def _step_with_true_pieces(
 def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspace) -> Outcome:
     """Follow an instability at a fixed load to the least equilibrium, or to sliding.
 
-    Slip and K d in the state belong to the instability, perhaps moved along its
-    direction to a corner. On return they belong to the equilibrium, or are a lower
-    bound of the equilibrium. If `unstoppable` nodes in a row are at their residual
-    strength, the interface slides. `true_pieces` is a second workspace.
+    Slip and K d in the state belong to the instability, perhaps moved
+    along its direction to a corner. On return they belong to the
+    equilibrium, or are a lower bound of the equilibrium. If
+    `unstoppable` nodes in a row are at their residual strength, the
+    interface slides. `true_pieces` is a second workspace.
     """
     sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]
@@ -294,7 +303,8 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
         # 1. and 3.
         n_before = n_slipping
         course, n_slipping = _elastic_step(state, load, n_slipping, tolerance)
-        # 5. Behind a machine slip lowers the load, so the mean strength does not decide.
+        # 5. Behind a machine slip lowers the load, so the mean strength
+        # does not decide.
         dead_load = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
         run, n_corners = _residual_runs(sample, slip)
         slides = run >= unstoppable or (dead_load and unsupported(sample, load, slip))

@@ -9,11 +9,12 @@ and load profile p > 0,
     max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
       = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
 
-Every feasible d bounds the load from below, and every feasible y, a multiplier,
-bounds the load from above. If K has no positive off-diagonal entry, the equilibrium
-at a load is the least feasible slip (R. Cottle, J.-S. Pang and R. Stone, The Linear
-Complementarity Problem, 1992, section 3.11), and nodes only have to be added to the
-set S of the slipping nodes.
+Every feasible d bounds the load from below, and every feasible y, a
+multiplier, bounds the load from above. If K has no positive
+off-diagonal entry, the equilibrium at a load is the least feasible slip
+(R. Cottle, J.-S. Pang and R. Stone, The Linear Complementarity Problem,
+1992, section 3.11), and nodes only have to be added to the set S of the
+slipping nodes.
 
 Algorithm
 ---------
@@ -21,23 +22,26 @@ The algorithm is our own. It solves (1) with an active set that grows, and (2) w
 cuts that lower the load. It starts from an upper bound of (2), for example from the
 weakest window, and from a load below this bound.
 
-1. At the load, find resting nodes that are overstressed. If there are any, add them
-   to S, the most overstressed first. Each node adds a row to the factor L of A_SS
-   (`cholesky`).
-2. If all pivots are positive, solve A_SS d_S = load p_S - excess_S. Go to step 1.
-3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1 A_Sj, 1) is
-   feasible in (2): a cut. Lower the bound and the load to <excess, y>/<p, y>.
-   Solve for the slip at this load, remove the nodes that would slip backwards, and
-   go to step 1. If the cut lowers the load only by round-off, the load is the
-   solution. Then `_back_off` makes the slip feasible, and the algorithm ends.
-4. If no node is overstressed, the load has an equilibrium. If the load is the upper
-   bound, it is the solution. Otherwise raise the load towards the bound by
-   `SHARE_TOWARDS_BOUND` of the way, or to the bound if it is within `CLOSE_RTOL`.
-   Solve for the slip, and go to step 1.
+1. At the load, find resting nodes that are overstressed. If there are
+   any, add them to S, the most overstressed first. Each node adds a row
+   to the factor L of A_SS (`cholesky`).
+2. If all pivots are positive, solve A_SS
+   d_S = load p_S - excess_S. Go to step 1.
+3. If the pivot of node j fails, the load is too high. y = (-A_SS^-1
+   A_Sj, 1) is feasible in (2): a cut. Lower the bound and the load to
+   <excess, y>/<p, y>. Solve for the slip at this load, remove the nodes
+   that would slip backwards, and go to step 1. If the cut lowers the
+   load only by round-off, the load is the solution. Then `_back_off`
+   makes the slip feasible, and the algorithm ends.
+4. If no node is overstressed, the load has an equilibrium.
+   If the load is the upper bound, it is the solution.
+   Otherwise raise the load towards the bound by
+   `SHARE_TOWARDS_BOUND` of the way, or to the bound if it is
+   within `CLOSE_RTOL`. Solve for the slip, and go to step 1.
 
-The order of the nodes in step 1 and the share in step 4 are for speed. In a
-different order the search stalls near the solution. If the load is too high, far
-too many nodes join before a pivot fails.
+The order of the nodes in step 1 and the share in step 4 are for speed.
+In a different order the search stalls near the solution. If the load is
+too high, far too many nodes join before a pivot fails.
 """
 
 import numpy as np
@@ -80,14 +84,15 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
 def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
     """Write the resting nodes above their strength to `workspace.queue`. Return their number.
 
-    The most overstressed node comes first. Overstress within the tolerance (Pa) does
-    not count.
+    The most overstressed node comes first. Overstress within the
+    tolerance (Pa) does not count.
     """
     sample, slip, Kd, workspace, _, _ = state
     count = ZERO
     for i in range(Kd.shape[0]):
         if not workspace.is_slipping[i]:
-            # On a specimen, a node that slipped before may rest at any piece of its law.
+            # On a specimen, a node that slipped before may rest at any
+            # piece of its law.
             never_slipped = slip[i] == 0.0  # then its strength is known without a search
             strength = sample.excess[i] if never_slipped else strength_at(sample, slip, i)
             margin = strength - load * sample.profile[i] + Kd[i]
@@ -122,10 +127,11 @@ def _solve(state: SlipState, load: float, n_slipping: int) -> None:
 def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
     """Step 3: lower the load of the slip slightly, until no resting node is overstressed.
 
-    Close to the solution, slip grows so fast with the load that round-off in the load
-    may leave a node overstressed. One step along the tangent v = d d/d load corrects
-    this. The returned load does not change. The certificate shows the difference
-    between the returned load and the load of the slip.
+    Close to the solution, slip grows so fast with the load that
+    round-off in the load may leave a node overstressed. One step along
+    the tangent v = d d/d load corrects this. The returned load does not
+    change. The certificate shows the difference between the returned
+    load and the load of the slip.
     """
     sample, _, Kd, workspace, _, _ = state
     v, Kv = workspace.solution, workspace.Kv
@@ -144,12 +150,14 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
 def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
     """Step 3: remove the nodes that would slip backwards from S. Return how many remain.
 
-    L remains valid up to the first of these nodes, so all nodes after it are also
-    removed. Removed nodes that belong to S are then overstressed, and come back.
+    L remains valid up to the first of these nodes, so all nodes after
+    it are also removed. Removed nodes that belong to S are then
+    overstressed, and come back.
     """
     slip = workspace.solution
     while n_slipping > 0:
-        # L^-1 p and L^-1 q hold for the leading rows, so only the back substitution is repeated.
+        # L^-1 p and L^-1 q hold for the leading rows, so only the back
+        # substitution is repeated.
         n_forward = 0
         while n_forward < n_slipping and slip[n_forward] >= 0.0:
             n_forward += 1
@@ -191,17 +199,19 @@ def solve_program(
 ) -> tuple[float, bool]:
     """Return the load that solves (1), with slip d, K d and multiplier, and whether (1) is solved.
 
-    The bound is an upper bound with its multiplier, and the first load is `start`.
-    Nodes that already slip (`state.slip`) join first. If `cap` is below the solution,
-    the result is the least equilibrium at the load `cap`. The problem is not solved
-    if there are too many passes, or more slipping nodes than the workspace can hold.
+    The bound is an upper bound with its multiplier, and the first load
+    is `start`. Nodes that already slip (`state.slip`) join first. If
+    `cap` is below the solution, the result is the least equilibrium at
+    the load `cap`. The problem is not solved if there are too many
+    passes, or more slipping nodes than the workspace can hold.
     """
     sample, slip, Kd, workspace, _, _ = state
     top = min(bound, cap)
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
     slipping, is_slipping = workspace.slipping, workspace.is_slipping
-    # Begin without slip. The nodes of a known state join at once, in any order.
+    # Begin without slip. The nodes of a
+    # known state join at once, in any order.
     n_slipping = ZERO
     n_known = ZERO  # nodes that slip already, until they have joined
     for i in range(slip.shape[0]):
@@ -222,7 +232,8 @@ def solve_program(
             if load >= top:
                 solved = True
                 break
-            # At the bound itself far too many nodes may join, unless the load is close.
+            # At the bound itself far too many nodes may join, unless
+            # the load is close.
             if top - load <= CLOSE_RTOL * abs(top):
                 load = top
             else:
@@ -245,7 +256,8 @@ def solve_program(
         # 3. A pivot failed.
         # The row of the failed node follows the last row of L, and gives the cut.
         cut, bound = _cut(state, n_slipping, bound, multiplier)
-        # The load had an equilibrium up to round-off if the cut hardly lowers it.
+        # The load had an equilibrium up to
+        # round-off if the cut hardly lowers it.
         by_round_off_only = cut >= load - tolerance
         load = min(load, bound)
         cholesky.solve_slip(workspace, n_slipping, load, workspace.solution)
@@ -291,7 +303,7 @@ def certificate(
     infeasible = 0.0
     for i in range(n):
         p_y += multiplier[i] * sample.profile[i]
-        # Round-off may leave A y slightly positive. Its effect on the bound, <A
-        # y, d>, is added.
+        # Round-off may leave A y slightly positive. Its effect on the
+        # bound, <A y, d>, is added.
         infeasible += max(Ky[i] - sample.weakening_rate[i] * multiplier[i], 0.0) * slip[i]
     return max((excess_y + infeasible) / p_y - lower, 0.0)

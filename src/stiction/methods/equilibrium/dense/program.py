@@ -1,22 +1,24 @@
 """Choose the algorithm for equilibria of a line or a specimen, with dense factors.
 
-1. If no node reaches a corner of its law before the next instability, the
-   instability follows from a linear programme for the present pieces of the
-   friction law (`linear_program`). If very many nodes of a line slip, transforms
-   are used (`plane_onset`), because they are faster.
-2. Otherwise the path is followed event by event (`stable_path`). On this path the
-   programme is not tried again, except from rest. A state says in `search` how the
-   path goes on.
-3. With a machine, the path is always followed: slip lowers the force, and the force
-   may be largest before the instability. If all nodes slip without an instability,
-   the interface slides stably.
-4. If only part of a line or specimen can break, the other nodes have an infinite
-   strength. They hold the part that can break. K is positive definite on this part,
-   so each instability ends at an equilibrium. The interface slides if all nodes
-   that can break slip in this equilibrium.
-5. After an instability of a line, a quick test for sliding comes first (`runaway`).
-   If the test is undecided, and always on specimens, the jump is followed to its
-   end (`jump`).
+1. If no node reaches a corner of its law before the next
+   instability, the instability follows from a linear programme
+   for the present pieces of the friction law
+   (`linear_program`). If very many nodes of a line slip,
+   transforms are used (`plane_onset`), because they are faster.
+2. Otherwise the path is followed event by event (`stable_path`). On
+   this path the programme is not tried again, except from rest. A state
+   says in `search` how the path goes on.
+3. With a machine, the path is always followed: slip lowers the force,
+   and the force may be largest before the instability. If all nodes
+   slip without an instability, the interface slides stably.
+4. If only part of a line or specimen can break, the other nodes have an
+   infinite strength. They hold the part that can break. K is positive
+   definite on this part, so each instability ends at an equilibrium.
+   The interface slides if all nodes that can break slip in this
+   equilibrium.
+5. After an instability of a line, a quick test for sliding comes first
+   (`runaway`). If the test is undecided, and always on specimens, the
+   jump is followed to its end (`jump`).
 """
 
 import threading
@@ -86,7 +88,8 @@ class DenseProgram:
             self.elastic = problem.blocks
         else:
             self.elastic = line_of(problem.half_spaces, self.nodes)
-            # If several parts can break, a run of nodes may stop at the end of its part.
+            # If several parts can break, a run of nodes may stop at the
+            # end of its part.
             if count_patches(1.0 * problem.interface.breakable) == 1:
                 self.runs = runs_of(problem.half_spaces, self.nodes)
         self.driven = self.elastic.relief > 0.0
@@ -121,21 +124,23 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         """Return the critical load (at most `cap`) with its proofs, or `None` if the search stalls.
 
-        Only the first piece of the friction law is used: `excess` and `weakening_rate`. `state`
+        Only the first piece of the friction law is
+        used: `excess` and `weakening_rate`. `state`
         is a known equilibrium at a lower load.
         """
         bound, multiplier = self.bound(sample)
         if bound == cap == np.inf:  # no window fits within the extent
             return None
-        # Dense factors cost the cube of the slipping nodes, transforms little
-        # more than all nodes.
+        # Dense factors cost the cube of the slipping nodes, transforms
+        # little more than all nodes.
         if cap == np.inf and self.nodes > MAX_WEAK_NODES:
             weak_nodes = np.count_nonzero(sample.excess < bound * sample.profile)
             if weak_nodes > MAX_WEAK_NODES:
                 solution = self._by_transforms(sample, state)
                 if solution is not None:
                     return solution
-        # Start from a known equilibrium, or from a load at which not too many nodes join.
+        # Start from a known equilibrium, or from a load at which not
+        # too many nodes join.
         slip, Kd = np.zeros((2, self.nodes))
         start = top = min(bound, cap)
         low, high = _range_of_weakening_rates(sample)
@@ -166,8 +171,8 @@ class DenseProgram:
             return None
         if not onset.closed(TRANSFORMS_GAP_RTOL):
             return None
-        # The multiplier was lifted everywhere to be feasible. At nodes at rest it
-        # must be zero.
+        # The multiplier was lifted everywhere to be feasible. At nodes
+        # at rest it must be zero.
         multiplier = onset.multiplier - onset.multiplier.min()
         multiplier[multiplier < RESTING_MULTIPLIER_RTOL * multiplier.max()] = 0.0
         multiplier /= multiplier @ sample.profile
@@ -208,8 +213,8 @@ class DenseProgram:
             end.load, slip, direction, Kd, PathStatus(end.status), search,
             stopped=end.stopped or state.stopped, peak=end.peak,
         )  # fmt: skip
-        # No multiplier bounds the load from above if a law steepens or a node
-        # stopped.
+        # No multiplier bounds the load from above if a law steepens or
+        # a node stopped.
         is_unstable = reached.status == PathStatus.UNSTABLE
         reached.certified = is_unstable and not (self.pieces.steepens or reached.stopped)
         if reached.certified and from_rest:
@@ -225,7 +230,8 @@ class DenseProgram:
         solution = self.solve(present, state=None if from_rest else state)
         if solution is None or not (from_rest or solution.load >= state.load):
             return None
-        # The programme holds only if no node passes the corner at the end of its piece.
+        # The programme holds only if no node passes the corner at the
+        # end of its piece.
         piece = None if from_rest else present_pieces(sample, state.slip).piece
         if exceeds(sample, solution.slip, piece):
             return None
@@ -247,7 +253,8 @@ class DenseProgram:
     ) -> EquilibriumState | None:
         if load <= state.load:
             return state
-        # From rest, a programme that ends at the load is faster than the events.
+        # From rest, a programme that ends at
+        # the load is faster than the events.
         if state.search == Search.PROGRAMME_FROM_REST and not self.driven:
             solution = self.solve(sample, load)
             if solution is not None and not exceeds(sample, solution.slip):
@@ -282,8 +289,8 @@ class DenseProgram:
     ) -> tuple[int, float]:
         """Test for sliding (step 5). Return the outcome and an unstoppable length.
 
-        The length is a number of residual nodes. Slip moves to a lower bound of the
-        next equilibrium.
+        The length is a number of residual nodes. Slip moves to a lower
+        bound of the next equilibrium.
         """
         direction = instability.direction
         if self.runs is None or to_rest:
@@ -305,17 +312,18 @@ class DenseProgram:
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
         """Return the multiplier y. If slip lowers the mean stress, return its derivative.
 
-        With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a drive D,
-        and y is the derivative of the largest D by the strengths s. Up to the
-        instability, (K - W) d = D p - s on the slipping nodes, and no node has
-        stopped. Therefore d grows with D at the rate d' = (K - W)^-1 p, the
-        derivative of <p, d> by s is -d', and the mean stress has the derivative
+        With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a
+        drive D, and y is the derivative of the largest D by the
+        strengths s. Up to the instability, (K - W) d = D p - s on the
+        slipping nodes, and no node has stopped. Therefore d grows with
+        D at the rate d' = (K - W)^-1 p, the derivative of <p, d> by s
+        is -d', and the mean stress has the derivative
 
             y - (r/n) (<p, d'> y - d').
 
-        If the interface ends, the mean stress of the n nodes that can break, divided
-        by the mean of p there, is D - <c, d>, with c = K 1/(n <p>) and 1 on these
-        nodes. The derivative is then
+        If the interface ends, the mean stress of the n nodes that can
+        break, divided by the mean of p there, is D - <c, d>, with c = K
+        1/(n <p>) and 1 on these nodes. The derivative is then
 
             y - <c, d'> y + (K - W)^-1 c.
         """
@@ -341,8 +349,8 @@ class DenseProgram:
 def present_sample(sample: StaticSample, slip: Array) -> StaticSample:
     """Return, for `solve`, the linear sample with the pieces on which nodes are after a slip.
 
-    `excess` and `weakening_rate` belong to these pieces, continued to zero slip. The law has no
-    further effect.
+    `excess` and `weakening_rate` belong to these pieces, continued to
+    zero slip. The law has no further effect.
     """
     present = present_pieces(sample, slip)
     return sample._replace(excess=present.strength, weakening_rate=present.weakening_rate)

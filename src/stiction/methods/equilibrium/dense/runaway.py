@@ -15,20 +15,22 @@ Algorithm
 The algorithm is our own. It uses two known results: the factor of a Toeplitz matrix
 (`block_factor`) and Griffith's length (`unstoppable_length`).
 
-1. Move along the direction of the instability until a node reaches a corner of its
-   law. If no node reaches a corner, the interface slides.
-2. Overloaded nodes beside the run join the run, as far as their stress is known.
-3. Take an elastic step. With the present strengths, solve K_RR x = (load p - K d -
-   s(d))_R on the run R, with the right side cut off at zero, and add x to the slip.
-   Blocks of K on runs with the same length are equal, so a single Cholesky factor
-   serves all runs and samples.
-4. The interface slides if nodes at their residual strength form a run of the
-   unstoppable length, or if the mean strength of the interface cannot carry the
-   load.
-5. The test gives up (UNDECIDED) if slip hardly grows, after `MAX_RUN_STEPS` steps,
-   or if the run or the unstoppable length is longer than the factor.
-6. Compute the stress due to all slip added so far, on the run and for half its
-   length on both sides. Go to step 2.
+1. Move along the direction of the instability until a node reaches a
+   corner of its law. If no node reaches a corner, the interface slides.
+2. Overloaded nodes beside the run join the
+   run, as far as their stress is known.
+3. Take an elastic step. With the present strengths, solve K_RR x =
+   (load p - K d - s(d))_R on the run R, with the right side cut off at
+   zero, and add x to the slip. Blocks of K on runs with the same length
+   are equal, so a single Cholesky factor serves all runs and samples.
+4. The interface slides if nodes at their residual strength form a run
+   of the unstoppable length, or if the mean strength of the interface
+   cannot carry the load.
+5. The test gives up (UNDECIDED) if slip hardly grows, after
+   `MAX_RUN_STEPS` steps, or if the run or the unstoppable length is
+   longer than the factor.
+6. Compute the stress due to all slip added so far, on the run and for
+   half its length on both sides. Go to step 2.
 """
 
 from functools import lru_cache
@@ -68,9 +70,10 @@ UNSTOPPABLE_MARGIN = 1.5
 def block_factor(column: Array, width: int) -> Array:
     """Return the Cholesky factor of the leading block of K, for runs with up to `width` nodes.
 
-    The block is a Toeplitz matrix. Its factor follows, column by column, from two
-    vectors in `width`^2 operations (the algorithm of Schur; T. Kailath and A. Sayed,
-    Fast Reliable Algorithms for Matrices with Structure, 1999, chapter 1).
+    The block is a Toeplitz matrix. Its factor follows, column by
+    column, from two vectors in `width`^2 operations (the algorithm of
+    Schur; T. Kailath and A. Sayed, Fast Reliable Algorithms for
+    Matrices with Structure, 1999, chapter 1).
     """
     factor = np.empty(row_start(width + 4))
     starts = np.array([row_start(r) for r in range(width)])
@@ -78,8 +81,8 @@ def block_factor(column: Array, width: int) -> Array:
     lower = upper.copy()
     for k in range(width):
         if k > 0:
-            # One step down, and the hyperbolic rotation that clears entry k of
-            # the second vector.
+            # One step down, and the hyperbolic rotation that clears
+            # entry k of the second vector.
             shifted, remaining = upper[k - 1 : -1], lower[k:]
             reflection = lower[k] / upper[k - 1]
             scale = np.sqrt((1.0 - reflection) * (1.0 + reflection))
@@ -113,10 +116,11 @@ def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     """Return the length, in nodes, of a run of residual nodes that no strength around can stop.
 
-    This is Griffith's (1921) length with the smallest stress drop D and the largest
-    fracture energy. The fracture energy is (tau_p - tau_r) d_c times the area under
-    the law. A crack of half-length a releases pi a D^2/(2 G*) at each tip. The length
-    is infinite if a node has no stress drop.
+    This is Griffith's (1921) length with the smallest stress drop D and
+    the largest fracture energy. The fracture energy is (tau_p - tau_r)
+    d_c times the area under the law. A crack of half-length a releases
+    pi a D^2/(2 G*) at each tip. The length is infinite if a node has no
+    stress drop.
     """
     stress_drop = np.inf
     energy = 0.0
@@ -143,9 +147,10 @@ def runs_away(
 ) -> tuple[Outcome, float]:
     """Return SLIDING if the patch of an instability certainly slides, otherwise UNDECIDED.
 
-    The second value is the number of residual nodes in a row that proves sliding in
-    `jump`. Slip d, K d, the direction and K times the direction belong to the
-    instability. After the call, slip is a lower bound of the least equilibrium.
+    The second value is the number of residual nodes in a row that
+    proves sliding in `jump`. Slip d, K d, the direction and K times the
+    direction belong to the instability. After the call, slip is a lower
+    bound of the least equilibrium.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)
@@ -157,8 +162,9 @@ def runs_away(
     first, length, _ = main_patch(direction)
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
         return Outcome.UNDECIDED, unstoppable
-    # Places q on the circle are counted from `origin`, so that the patch lies in
-    # the middle: the run is begin..end-1, and the stress is known in low..high-1.
+    # Places q on the circle are counted from `origin`, so that the
+    # patch lies in the middle: the run is begin..end-1, and the stress
+    # is known in low..high-1.
     begin = (n - length) // 2
     end = begin + length
     low = begin

@@ -9,19 +9,21 @@ strength, and if both are equal at slipping nodes:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
-With A = K - diag(W), the slip and its growth rate v with the load (m/Pa) follow
-from
+With A = K - diag(W), the slip and its growth rate v with the load
+(m/Pa) follow from
 
     A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,                                (2)
 
-where d_rest is the slip of nodes that slipped before and now rest. (2) holds until
-a node enters or leaves S, or reaches a corner of its friction law. The equilibrium
+where d_rest is the slip of nodes that slipped before
+and now rest. (2) holds until a node enters or leaves S,
+or reaches a corner of its friction law. The equilibrium
 is stable as long as A_SS is positive definite.
 
-On a line, K has no positive off-diagonal entry, and a slipping node never stops. On
-a specimen, K may have positive off-diagonal entries (`may_stop`), so that slip at
-one node can unload other nodes. Slip never goes back: an unloaded node rests. The
-rates at the nodes that reach their strength then minimise v'Av/2 - p'v over v >= 0:
+On a line, K has no positive off-diagonal entry, and a slipping node
+never stops. On a specimen, K may have positive off-diagonal entries
+(`may_stop`), so that slip at one node can unload other nodes. Slip
+never goes back: an unloaded node rests. The rates at the nodes that
+reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
     v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
 
@@ -34,16 +36,17 @@ method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
 16.5).
 
 1. Find S and factor A_SS = L L'. If a pivot fails, go to step 5.
-2. Solve (2) for the rates v of slip, and multiply them by K. For (3), move v from
-   its former value towards the solution. The first node whose rate reaches zero on
-   the way stops. Remove it from S and solve again.
-3. Find the smallest rise of the load at which a resting node reaches its strength
-   (a start), or a slipping node reaches a corner of its law. Raise the load. If any
-   rise would overstress a node at its strength, the node starts at once. This
-   ensures A v >= p.
-4. After a start, append a row to L. After a corner, one diagonal entry of A_SS
-   changes. Rotate the rows of L from this entry on, or compute them again if the
-   node now weakens more steeply.
+2. Solve (2) for the rates v of slip, and multiply them
+   by K. For (3), move v from its former value towards
+   the solution. The first node whose rate reaches zero
+   on the way stops. Remove it from S and solve again.
+3. Find the smallest rise of the load at which a resting node reaches
+   its strength (a start), or a slipping node reaches a corner of its
+   law. Raise the load. If any rise would overstress a node at its
+   strength, the node starts at once. This ensures A v >= p.
+4. After a start, append a row to L. After a corner, one diagonal entry
+   of A_SS changes. Rotate the rows of L from this entry on, or compute
+   them again if the node now weakens more steeply.
 5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the
    direction z = (-A_SS^-1 A_Sj, 1) at the failed node j. If z >= 0, slip along z is
    unbounded: it jumps at constant load, and the path ends, unstable. Otherwise, for
@@ -51,11 +54,11 @@ method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
    stops, and the start is tried again. If a corner or the first factor failed, the
    nodes without a row in L leave S, and may start again. Nodes that do not start
    again before the load rises have stopped.
-6. The path ends at the target, or when every node has slipped. The path is
-   abandoned if S outgrows L, or if nodes stop and start without end.
+6. The path ends at the target, or when every node has slipped. The path
+   is abandoned if S outgrows L, or if nodes stop and start without end.
 
-Node numbers are called `i` or `node`, positions in S (the rows of L) `t` or
-`position`.
+Node numbers are called `i` or `node`, positions in S (the rows of L)
+`t` or `position`.
 """
 
 from typing import Any, NamedTuple
@@ -116,8 +119,8 @@ def _find_slipping(
 ) -> tuple[int, bool]:
     """Step 1: mark the slipping nodes. Write q and the diagonal of A.
 
-    Returns the number of slipping nodes, and whether a node that slipped before
-    rests.
+    Returns the number of slipping nodes, and whether a node that
+    slipped before rests.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     # A node of a specimen that slipped before may rest below its strength.
@@ -158,13 +161,15 @@ def _first_to_stop(
 ) -> tuple[int, float]:
     """Return the first node whose rate reaches zero (position in S), and the share of the move.
 
-    Rates move from `v_nodes` to `new` (in S), or, if `endless`, along `new` without end.
+    Rates move from `v_nodes` to `new` (in S), or, if `endless`, along
+    `new` without end.
     """
     slipping = state.workspace.slipping
     largest = 0.0
     for t in range(n_slipping):
         largest = max(largest, abs(new[t]))
-    # If rates of several nodes are zero already, the node that reverses fastest stops first.
+    # If rates of several nodes are zero already, the node that reverses
+    # fastest stops first.
     first = NOBODY
     share = np.inf
     for t in range(n_slipping):
@@ -204,8 +209,9 @@ def _stop_unloaded(
 ) -> tuple[int, bool]:
     """Step 2, for (3): move the rates from `v_nodes` towards v. Stop nodes on the way.
 
-    Return the number of slipping nodes, and whether a node stopped. `workspace.v` and `v_nodes`
-    then hold the solution of (2) for the slipping nodes.
+    Return the number of slipping nodes, and whether a node stopped.
+    `workspace.v` and `v_nodes` then hold the solution of (2) for the
+    slipping nodes.
     """
     workspace, v = state.workspace, state.workspace.v
     some_stopped = False
@@ -268,15 +274,16 @@ def _next_event(
 def _move_along_z(state: SlipState, n_factored: int, v_nodes: Array, direction: Array) -> int:
     """Step 5: write the direction z after a pivot failed, and move the rates along z.
 
-    Returns the position in S of the node whose rate reaches zero, or NOBODY if z is unbounded.
+    Returns the position in S of the node whose rate reaches zero, or
+    NOBODY if z is unbounded.
     """
     workspace = state.workspace
     cholesky.singular_direction(workspace, n_factored, direction)
     if not state.may_stop:
         return NOBODY
     # `direction` is z clipped at zero, by node. z itself is left in `solution`,
-    # in S, without its last entry: the failed node, which `append` left in
-    # `slipping[n_factored]`.
+    # in S, without its last entry: the failed node, which `append` left
+    # in `slipping[n_factored]`.
     z = workspace.solution
     z[n_factored] = 1.0
     first, share = _first_to_stop(state, n_factored + 1, v_nodes, z, endless=True)
@@ -330,8 +337,8 @@ def _pass_corner(
         )
         workspace.factored_diagonal[corner] = workspace.diagonal[i]
         return n_slipping
-    # The node weakens more steeply: compute L again from its row on. `append`
-    # reads the queue.
+    # The node weakens more steeply: compute L again from its row on.
+    # `append` reads the queue.
     for t in range(corner, n_slipping):
         workspace.queue[t - corner] = workspace.slipping[t]
     return cholesky.append(workspace, corner, n_slipping - corner)
@@ -379,8 +386,8 @@ def follow_stable_path(
 ) -> PathEnd:
     """Follow the stable equilibria from a load to a target (Pa, not below it), as far as they go.
 
-    Slip and K d of the state are updated. If the path ends unstable, the direction
-    (n,) in which slip jumps is written to `direction`.
+    Slip and K d of the state are updated. If the path ends unstable,
+    the direction (n,) in which slip jumps is written to `direction`.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     n, n_corners = slip.shape[0], sample.pieces.ends.shape[0]
@@ -409,7 +416,8 @@ def follow_stable_path(
     for event_number in range(max_events):
         _substitute(state, q, first_changed, n_slipping)
 
-        # 2. The rates of slip and of K d. In S the latter follow from (2): K v = p + W v.
+        # 2. The rates of slip and of K d. In S the latter follow from
+        # (2): K v = p + W v.
         cholesky.solve_v(workspace, n_slipping, v)
         if may_stop:
             n_slipping, some_stopped = _stop_unloaded(state, q, n_slipping, v_nodes)
@@ -425,8 +433,8 @@ def follow_stable_path(
         # 3. On to the next event.
         event = _next_event(state, load, target, piece, n_slipping)
         if some_left and event.step > MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load):
-            # Nodes that left S and belong to it have started again: the others
-            # have stopped.
+            # Nodes that left S and belong to it have started again: the
+            # others have stopped.
             stopped = stopped or _some_rest(state)
             some_left = False
         at_target = event.starting_node == NOBODY and event.corner_position == NOBODY

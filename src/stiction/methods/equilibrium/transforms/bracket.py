@@ -7,9 +7,10 @@ and load profile p > 0, the onset without corners is
 
     max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
-Any d >= 0 gives the lower bound min (A d + s)/p. Any y >= 0 gives an upper bound,
-after a multiple of a field z > 0 with A z < 0 has been added to make A y <= 0. The
-bounds hold for any accuracy of d and y, and for any signs of the entries of K.
+Any d >= 0 gives the lower bound min (A d + s)/p. Any y >= 0 gives an
+upper bound, after a multiple of a field z > 0 with A z < 0 has been
+added to make A y <= 0. The bounds hold for any accuracy of d and y, and
+for any signs of the entries of K.
 
 Algorithm
 ---------
@@ -17,13 +18,13 @@ Algorithm
 the same number of steps. Therefore `bisect` only prepares for `turning_point`,
 which closes the bracket, and takes over if `turning_point` fails.
 
-1. Solve for the equilibrium at the middle of the interval, starting from the slip
-   of the last stable load (`held_equilibrium`).
+1. Solve for the equilibrium at the middle of the interval, starting
+   from the slip of the last stable load (`held_equilibrium`).
 2. If there is an equilibrium, it gives a lower bound.
-3. If a direction of negative curvature was met, the load is too high. The
-   direction is the guess for the lowest eigenvector of A on the slipping nodes.
-   If the eigenvalue is not positive, the eigenvector gives an upper bound, which
-   becomes the upper end of the interval.
+3. If a direction of negative curvature was met, the load is too high.
+   The direction is the guess for the lowest eigenvector of A on the
+   slipping nodes. If the eigenvalue is not positive, the eigenvector
+   gives an upper bound, which becomes the upper end of the interval.
 """
 
 import numpy as np
@@ -64,7 +65,8 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
     """Do the same as `_lifting_field` for a part that can break: lowest eigenvector of A."""
     lifting = np.where(can_break, guess, 0.0)
     tolerance = LIFTING_RTOL * float(operator.weakening_rate.max())
-    # The eigenvector z > 0 has A z = lambda z on the part, so A z < 0 if lambda < 0.
+    # The eigenvector z > 0 has A z = lambda z on the part, so A z < 0
+    # if lambda < 0.
     value, _ = lowest_eigenvector(
         operator, can_break, lifting, tolerance, MAX_EIGENVECTOR_ITERATIONS
     )
@@ -78,10 +80,11 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
 def _lifting_field(operator: Operator) -> tuple[Array, Array]:
     """Return a field z > 0 with A z < 0 at every node, and -A z (Pa/m), to lift multipliers.
 
-    If W > 0 everywhere, z is uniform: K 1 = 0, so -A 1 = W. Otherwise z = 1 - 0.4 g.
-    Here (K + w) g is w at nodes with W = 0 and zero at other nodes, and w is the
-    smallest positive W. For a Z-matrix, 0 <= g < 1. Then -A z is 0.4 w (1 - g) at
-    nodes with W = 0, and at least W - 0.4 (w + W) g > 0 at other nodes.
+    If W > 0 everywhere, z is uniform: K 1 = 0, so -A 1 = W. Otherwise z
+    = 1 - 0.4 g. Here (K + w) g is w at nodes with W = 0 and zero at
+    other nodes, and w is the smallest positive W. For a Z-matrix, 0 <=
+    g < 1. Then -A z is 0.4 w (1 - g) at nodes with W = 0, and at least
+    W - 0.4 (w + W) g > 0 at other nodes.
     """
     lifting = np.ones(operator.weakening_rate.shape)
     free = operator.weakening_rate <= 0.0
@@ -89,7 +92,8 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
         w = float(operator.weakening_rate[~free].min())
         g = np.empty_like(lifting)
         filtered(operator, w / (operator.symbol + w), free.astype(np.float64), g)
-        # A step down at the nodes that do not weaken, smoothed so that A z < 0 also there.
+        # A step down at the nodes that do not weaken, smoothed so that
+        # A z < 0 also there.
         lifting -= LIFTING_SHARE * g
     image = np.empty_like(lifting)
     product(operator, lifting, image)
@@ -99,12 +103,14 @@ def _lifting_field(operator: Operator) -> tuple[Array, Array]:
 class Bracket:
     """The programme for a sample on a grid, with the best bounds so far.
 
-    `lower` and `upper` are rigorous bounds of the onset load (Pa). The slip (m)
-    proves the lower bound, and the multiplier, with <p, y> = 1, proves the upper
-    bound. The initial bounds are that no node slips, and that all nodes slide at
-    once. K(k), W (Pa/m), strength minus initial stress (Pa) and load profile are
-    fields (*shape). At nodes with infinite strength, slip and multiplier are zero.
-    `lifting` is then a guess of the lowest eigenvector on all other nodes.
+    `lower` and `upper` are rigorous bounds of the onset load
+    (Pa). The slip (m) proves the lower bound, and the
+    multiplier, with <p, y> = 1, proves the upper bound. The
+    initial bounds are that no node slips, and that all nodes
+    slide at once. K(k), W (Pa/m), strength minus initial stress
+    (Pa) and load profile are fields (*shape). At nodes with
+    infinite strength, slip and multiplier are zero. `lifting` is
+    then a guess of the lowest eigenvector on all other nodes.
     """
 
     def __init__(
@@ -157,7 +163,8 @@ class Bracket:
 
     def raise_slip(self, slip: Array) -> None:
         """Accept a slip, cut off at zero, if it proves a higher lower bound."""
-        # A d + s - load p >= 0 at every node gives the largest load that this slip proves.
+        # A d + s - load p >= 0 at every node gives the largest load
+        # that this slip proves.
         trial = np.maximum(slip, 0.0)
         product(self.operator, trial, self.residual)
         load = float(((self.residual + self.excess) / self.profile).min())
@@ -167,8 +174,8 @@ class Bracket:
     def raise_multiplier(self, y: Array) -> float:
         """Accept a multiplier if it proves a lower upper bound. Return its bound.
 
-        The least multiple of z that makes A y <= 0 is added. If there is no such
-        multiple, the bound is infinite.
+        The least multiple of z that makes A y <= 0 is added. If there
+        is no such multiple, the bound is infinite.
         """
         trial = np.maximum(y, 0.0)
         product(self.operator, trial, self.residual)
@@ -191,12 +198,14 @@ class Bracket:
 def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
     """Narrow a bracket to a relative gap. Return the last unstable direction, with unit norm.
 
-    The accuracy is the largest residual stress as a share of the mean strength.
+    The accuracy is the largest residual
+    stress as a share of the mean strength.
     """
     operator, excess, profile = bracket.operator, bracket.excess, bracket.profile
     direction = bracket.multiplier / np.sqrt((bracket.multiplier**2).sum())
-    # The ends of the interval differ from the bounds: `low` was found to be stable only
-    # to the accuracy, and `high` to be unstable without a multiplier.
+    # The ends of the interval differ from the bounds: `low` was found
+    # to be stable only to the accuracy, and `high` to be unstable
+    # without a multiplier.
     low, high = bracket.lower, bracket.upper
     stable = bracket.slip.copy()
     for _ in range(MAX_HALVINGS):
@@ -206,7 +215,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
         load = 0.5 * (low + high)
         slip = stable.copy()
         inside = bracket.inside
-        # Nodes whose strength is below the load alone would be overloaded without slip.
+        # Nodes whose strength is below the load alone would be
+        # overloaded without slip.
         inside[:] = (slip > 0.0) | (excess < load * profile)
         status, _ = equilibrate(
             operator, load * profile - excess, inside, slip, bracket.residual,
@@ -216,7 +226,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             low, stable = load, slip
             bracket.raise_slip(slip)
             continue
-        # 3. Without a direction the iterations were exhausted, as they are close to the onset.
+        # 3. Without a direction the iterations were exhausted, as they
+        # are close to the onset.
         high = load
         if status != NEGATIVE_CURVATURE:
             continue

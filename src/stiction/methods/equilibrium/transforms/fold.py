@@ -14,19 +14,20 @@ Algorithm
 The algorithm is the same as in `dense.stable_path`, but conjugate gradients
 (`solve_inside`) replace the factor.
 
-1. Solve for the slip at the first load, revising the pieces of the nodes, and for
-   the rates v.
-2. Find the smallest rise of the load to an event, and raise the load. If the target
-   comes first, end.
-3. At a corner of node j, solve A_SS y = e_j, the unit vector of j. On its next
-   piece, W_j falls by c (W before minus W after), which adds c to one diagonal
-   entry. A_SS remains positive definite if 1 + c y_j > 0. Then v becomes v - c
+1. Solve for the slip at the first load, revising the pieces of the
+   nodes, and for the rates v.
+2. Find the smallest rise of the load to an event, and raise the load.
+   If the target comes first, end.
+3. At a corner of node j, solve A_SS y = e_j, the unit vector
+   of j. On its next piece, W_j falls by c (W before minus W
+   after), which adds c to one diagonal entry. A_SS remains
+   positive definite if 1 + c y_j > 0. Then v becomes v - c
    v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
 4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other
    slipping nodes. A remains positive definite if y'Ay = (A y)_j > 0. With c_j = p_j
    - (K v)_j, v becomes v + c_j/(y'Ay) y.
-5. If A does not remain positive definite, the path turns in the direction y.
-   Otherwise go to step 2.
+5. If A does not remain positive definite, the path turns in the
+   direction y. Otherwise go to step 2.
 """
 
 from typing import NamedTuple
@@ -85,7 +86,8 @@ def follow_to_turn(
 ) -> Turn | None:
     """Follow a stable path, from a rough slip at a load, to its turn or to the target load.
 
-    Returns `None` if the path is not stable at the first load, or after too many events.
+    Returns `None` if the path is not stable at the first load, or after
+    too many events.
     """
     # 1.
     start = _equilibrium_near(operator, sample, load, slip)
@@ -98,7 +100,8 @@ def follow_to_turn(
     for _ in range(MAX_EVENTS):
         if v is None:
             break
-        # 2. At nodes at rest d = v = 0, so products with A stand for products with K.
+        # 2. At nodes at rest d = v = 0, so products with A stand for
+        # products with K.
         product(operator, slip, image)
         margin = np.maximum(strength + image - load * sample.profile, 0.0)
         product(operator, v, image)

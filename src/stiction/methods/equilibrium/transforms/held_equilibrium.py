@@ -9,10 +9,11 @@ strength minus initial stress at zero slip (Pa), p is the load profile, and phi
     d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
     mu = spring (alpha - <phi, d>),
 
-The stress mu of the spring is zero if there is no spring. Without a spring, and if
-K has no positive off-diagonal entry, the solution is the least equilibrium at this
-load. With a spring there are solutions on both sides of the turning point. A
-solution with mu = 0 is an equilibrium of the interface without the spring.
+The stress mu of the spring is zero if there is no spring. Without a
+spring, and if K has no positive off-diagonal entry, the solution is the
+least equilibrium at this load. With a spring there are solutions on
+both sides of the turning point. A solution with mu = 0 is an
+equilibrium of the interface without the spring.
 
 Algorithm
 ---------
@@ -20,16 +21,17 @@ The algorithm combines an active set with conjugate gradients, as in a projected
 method (J. Nocedal and S. Wright, Numerical Optimization, 2006, section 16.7), but
 it changes whole sets instead of using a line search.
 
-1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join, and nodes
-   with d < 0 leave.
-2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the tolerance
-   (`solve_inside`). If the curvature along a direction is negative, there is no
-   stable solution. Then stop.
-3. Compute r at all nodes and go to step 1, until no node joins or leaves, and r is
-   small on the set.
+1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join,
+   and nodes with d < 0 leave.
+2. Reduce the residual on the set by `LOOSE_RESIDUAL`, or to the
+   tolerance (`solve_inside`). If the curvature along a direction is
+   negative, there is no stable solution. Then stop.
+3. Compute r at all nodes and go to step 1, until no node joins or
+   leaves, and r is small on the set.
 
-Without a spring and without positive off-diagonal entries, nodes only join, so the
-algorithm ends. Otherwise only the limit on iterations ends it.
+Without a spring and without positive off-diagonal
+entries, nodes only join, so the algorithm ends.
+Otherwise only the limit on iterations ends it.
 """
 
 from stiction.base.arrays import Array
@@ -78,9 +80,10 @@ def equilibrate(
 ) -> tuple[int, int]:
     """Solve (1) for right = load p - s + spring alpha phi. Return the status and iterations.
 
-    On entry, the nodes `inside` and their slip are a guess. On return, they are the
-    solution. If (1) is solved, the residual r does not exceed the tolerance (Pa) at
-    any node, and on the set it is within twice the tolerance.
+    On entry, the nodes `inside` and their slip are a guess. On return,
+    they are the solution. If (1) is solved, the residual r does not
+    exceed the tolerance (Pa) at any node, and on the set it is within
+    twice the tolerance.
     """
     # 1. Begin with the nodes that the guess overloads.
     restrict(slip, inside)
@@ -97,7 +100,8 @@ def equilibrate(
         # 3. and 1.
         residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)
-        # Round-off may let the true residual exceed the residual of conjugate gradients.
+        # Round-off may let the true residual exceed the residual of
+        # conjugate gradients.
         if joined == 0 and left == 0 and largest_inside(residual, inside) <= 2.0 * tolerance:
             return SOLVED, iterations
         if left > 0:  # the slip of these nodes was set to zero

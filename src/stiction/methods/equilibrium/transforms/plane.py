@@ -11,25 +11,27 @@ Algorithm
 ---------
 The algorithm is our own. `plane_onset` finds the onset without corners, also for long lines:
 
-1. Make coarser grids, each with half the nodes, as long as they resolve the
-   nucleation length.
-2. On the coarsest grid, bisect the trivial bounds until Newton's method on the
-   turning point succeeds (`_narrow`).
-3. On each finer grid, start Newton's method (`turning_point.close`) from the slip
-   and the multiplier on the previous grid. If it fails, continue as in step 2.
+1. Make coarser grids, each with half the nodes, as long as they resolve
+   the nucleation length.
+2. On the coarsest grid, bisect the trivial bounds until Newton's method
+   on the turning point succeeds (`_narrow`).
+3. On each finer grid, start Newton's method (`turning_point.close`)
+   from the slip and the multiplier on the previous grid. If it fails,
+   continue as in step 2.
 
 `PlaneProgram` follows a sample from instability to instability:
 
-4. From rest, the next instability is the onset without corners, if no node
-   reaches a corner of its law before. A coarse grid usually shows whether a node
-   reaches a corner.
-5. Otherwise, and after a jump, the path is followed in steps of the load. Each step
-   is proved to be stable (`relaxation.stable_equilibrium`). If the proof fails, the
-   step is shortened, down to the requested gap.
-6. The end of the path is then followed event by event (`fold`), to see whether it
-   turns, and how.
-7. A jump goes to the least equilibrium a little above the load of the turn
-   (`relaxation.least_equilibrium`).
+4. From rest, the next instability is the onset without corners, if no
+   node reaches a corner of its law before. A coarse grid usually shows
+   whether a node reaches a corner.
+5. Otherwise, and after a jump, the path is followed in steps of the
+   load. Each step is proved to be stable
+   (`relaxation.stable_equilibrium`). If the proof fails, the step is
+   shortened, down to the requested gap.
+6. The end of the path is then followed event by event (`fold`), to see
+   whether it turns, and how.
+7. A jump goes to the least equilibrium a little above the load of the
+   turn (`relaxation.least_equilibrium`).
 """
 
 from dataclasses import replace
@@ -130,14 +132,15 @@ def _refined(coarse: Array, shape: tuple[int, ...]) -> Array:
 def _narrow(bracket: Bracket, gap: float) -> float:
     """Step 2: close a bracket from its trivial bounds.
 
-    Returns the curvature. If the stiffness is not a Z-matrix, the bounds may not
-    meet.
+    Returns the curvature. If the stiffness is not a Z-matrix, the
+    bounds may not meet.
     """
     share, finest = BISECTED_GAP, 0.1 * gap
     bend = 0.0
     while not bracket.closed(gap):
-        # Newton's method starts from the lower bound of bisection and its last unstable
-        # direction, which is close to the patch that turns.
+        # Newton's method starts from the lower bound
+        # of bisection and its last unstable direction,
+        # which is close to the patch that turns.
         residual = BISECTED_RESIDUAL * min(share, COARSE_GAP)
         direction = bisect(bracket, share, residual)
         _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
@@ -158,13 +161,15 @@ def plane_onset(
 ) -> Bracket:
     """Bracket the largest load with an equilibrium before a node reaches a corner of its law.
 
-    All fields have shape (nx, ny), or (nodes,) on a line. `excess` is the peak strength
-    minus the initial stress (Pa). `profile` is the load profile p > 0. `W` is the
-    weakening rate (Pa/m, zero at residual nodes). `slip` (m) belongs to an equilibrium at a
-    lower load, from which the search starts instead of coarse grids. `corner` is the slip
-    at the next corner (m, 0 without a corner). The search stops when the bounds agree to a
-    relative `gap`. If a node of a coarse grid slips beyond its corner, the bracket of this
-    grid is returned.
+    All fields have shape (nx, ny), or (nodes,) on a line.
+    `excess` is the peak strength minus the initial stress (Pa).
+    `profile` is the load profile p > 0. `W` is the weakening rate
+    (Pa/m, zero at residual nodes). `slip` (m) belongs to an
+    equilibrium at a lower load, from which the search starts
+    instead of coarse grids. `corner` is the slip at the next
+    corner (m, 0 without a corner). The search stops when the
+    bounds agree to a relative `gap`. If a node of a coarse grid
+    slips beyond its corner, the bracket of this grid is returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
@@ -173,8 +178,8 @@ def plane_onset(
     while slip is None:
         shape = grids[-1][0].shape
         stiffest, steepest = float(half_spaces.symbol(shape).max()), float(grids[-1][2].max())
-        # A coarse grid takes every other node, so that an odd number of nodes
-        # cannot be halved.
+        # A coarse grid takes every other node, so that an odd number of
+        # nodes cannot be halved.
         odd = any(nodes % 2 for nodes in shape)
         resolved = 0.5 * stiffest >= MIN_STIFFNESS_RATIO * steepest
         if odd or min(shape) < 2 * MIN_COARSE_NODES or not resolved:
@@ -244,8 +249,9 @@ class PlaneProgram:
     ) -> EquilibriumState:
         """Return the next instability on the path from a stable state or from rest (steps 4 to 6).
 
-        If the path was followed because of a coarse grid, and turns before any node reaches a
-        corner, the onset is computed after all, with its certificate.
+        If the path was followed because of a coarse grid, and turns
+        before any node reaches a corner, the onset is computed after
+        all, with its certificate.
         """
         if state is not None:  # 5. after a jump
             return self._follow_in_steps(sample, state, FIRST_LOAD_STEP * state.load)
@@ -277,8 +283,8 @@ class PlaneProgram:
     ) -> EquilibriumState:
         """Steps 5 and 6: follow the stable path in steps of the load to its end.
 
-        A long step may look unstable only because some nodes begin to slip during the
-        step before other nodes reach their corners.
+        A long step may look unstable only because some nodes begin to
+        slip during the step before other nodes reach their corners.
         """
         load, slip, gap = state.load, state.slip, self.requested
         operator = self._operator(sample)
@@ -301,7 +307,8 @@ class PlaneProgram:
             if end is None:  # 6.
                 turn = self._turn(operator, sample, passed, load_beyond)
                 if turn is None:
-                    # The path may turn here or not: `jump` decides, along the last growth.
+                    # The path may turn here or not: `jump` decides,
+                    # along the last growth.
                     direction = slip - passed[0][1]
                     return EquilibriumState(load, slip, direction, gap=step, certified=False)
                 if turn.direction is not None:
@@ -314,8 +321,8 @@ class PlaneProgram:
             work = step * inner(sample.profile, growth)
             if work > 0.0:  # A times the growth is about the step of the load
                 operator = operator._replace(soft_mode=growth / np.sqrt(work))
-            # The last few states are enough to restart before a turn that was
-            # passed unseen.
+            # The last few states are enough to restart before a turn
+            # that was passed unseen.
             load, slip, step = load_beyond, end, STEP_FACTOR * step
             passed = [*passed[-3:], (load, slip)]
         still = np.zeros_like(slip)
@@ -330,8 +337,8 @@ class PlaneProgram:
     ) -> Turn | None:
         """Step 6: follow the end of the path event by event. `None` if the end is not found.
 
-        A rough slip may lie beyond the turn. Then start from the previous step, and
-        so on.
+        A rough slip may lie beyond the turn. Then start from the
+        previous step, and so on.
         """
         for load, slip in reversed(passed):
             turn = follow_to_turn(operator, sample, load, load_beyond, slip)
@@ -345,7 +352,8 @@ class PlaneProgram:
             return multiplier_of(sample, state)
         assert state.gap is not None  # instabilities of planes have a gap
         operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
-        # Without a certificate, the path was followed already, and no turn was found.
+        # Without a certificate, the path was followed already, and no
+        # turn was found.
         slip = state.slip
         for retreat in START_RETREATS if state.certified else ():
             load = state.load - retreat * abs(state.load)
@@ -360,7 +368,8 @@ class PlaneProgram:
     ) -> Jump:
         assert instability.gap is not None  # instabilities of planes have a gap
         load_beyond = instability.load + instability.gap
-        # Above the turn by the requested gap, where there is no equilibrium close by.
+        # Above the turn by the requested gap, where there is no
+        # equilibrium close by.
         load_beyond += self.requested * abs(load_beyond)
         end = least_equilibrium(
             self._operator(sample), sample, load_beyond, instability.slip,

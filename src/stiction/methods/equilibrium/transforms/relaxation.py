@@ -9,46 +9,49 @@ node is overloaded if load p - K d exceeds its strength. An equilibrium at a loa
 
     load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
 
-For given pieces this problem is linear, and `held_equilibrium` solves it by
-conjugate gradients with A = K - diag(W). If A is not positive definite, conjugate
-gradients find a direction of negative curvature. The pieces depend on the slip. Two
-questions are answered:
+For given pieces this problem is linear, and `held_equilibrium` solves
+it by conjugate gradients with A = K - diag(W). If A is not positive
+definite, conjugate gradients find a direction of negative curvature.
+The pieces depend on the slip. Two questions are answered:
 
-(a) Does a stable path lead from an equilibrium at a lower load to an equilibrium
+(a) Does a stable path lead from an
+equilibrium at a lower load to an equilibrium
     at this load (`stable_equilibrium`)?
 (b) At which least equilibrium, not below a given slip, does an overdamped
-    interface come to rest, or does it slide (`least_equilibrium`)? `dense.jump`
-    answers this for lines.
+    interface come to rest, or does it slide (`least_equilibrium`)?
+    `dense.jump` answers this for lines.
 
 Algorithm for (a): Newton's method
 ----------------------------------
 1. Solve (1) for the pieces at the present slip. Repeat with the pieces at the
-   solution until they do not change. Until then, solve only to a rough residual.
-2. On the nodes that slip at the end, look for negative curvature of K minus the
-   steepest weakening of each node on the way. If there is no negative curvature, A
-   is positive definite in every state on the way. Therefore the path is stable, and
-   there is no other equilibrium.
+   solution until they do not change. Until
+   then, solve only to a rough residual.
+2. On the nodes that slip at the end, look for negative curvature of K
+   minus the steepest weakening of each node on the way. If there is no
+   negative curvature, A is positive definite in every state on the way.
+   Therefore the path is stable, and there is no other equilibrium.
 
 Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
 1. If the load exceeds the mean strength, the interface slides, because the mean of
    K d is zero.
-2. Step with bounds (`_bound`). Let nodes weaken at only a share of their present
-   rate, and no further than to their next corner. This strength is not below the
-   true strength at any node. Therefore the solution of (1) with this strength lies
-   below the least equilibrium. The share is 1 - `omitted`. The larger it is, the
-   longer is the step.
-3. If the share is 1 and all nodes are on the assumed pieces, the solution is the
-   least equilibrium, and the interface is arrested.
-4. If the step has a solution, slip moves to it. If hardly any node moves, the next
-   step has the share 1, because only this share can end at the equilibrium.
-5. If a step has negative curvature with the share 1, or if the slip is at an
-   instability, move with the true pieces to the first corner (`_step_to_corner`).
-   Otherwise omit twice as much of the weakening. A step that omits all of it has
-   a solution unless the interface slides.
+2. Step with bounds (`_bound`). Let nodes weaken at only a share of
+   their present rate, and no further than to their next corner. This
+   strength is not below the true strength at any node. Therefore the
+   solution of (1) with this strength lies below the least equilibrium.
+   The share is 1 - `omitted`. The larger it is, the longer is the step.
+3. If the share is 1 and all nodes are on the assumed pieces, the
+   solution is the least equilibrium, and the interface is arrested.
+4. If the step has a solution, slip moves to it. If hardly any node
+   moves, the next step has the share 1, because only this share can end
+   at the equilibrium.
+5. If a step has negative curvature with the share 1, or if the slip is
+   at an instability, move with the true pieces to the first corner
+   (`_step_to_corner`). Otherwise omit twice as much of the weakening. A
+   step that omits all of it has a solution unless the interface slides.
 
-On a plane, K has small positive off-diagonal entries. Without such entries the
-bounds in (b) would be strict.
+On a plane, K has small positive off-diagonal entries. Without such
+entries the bounds in (b) would be strict.
 """
 
 from typing import NamedTuple
@@ -79,9 +82,9 @@ from stiction.methods.equilibrium.sample import (
 )
 from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
-# Half or twice any of these changes a result by less than the gap, and the time
-# by hardly more than a tenth (planes of 64 and 96 squared, with and without
-# arrests).
+# Half or twice any of these changes a result by less than the gap, and
+# the time by hardly more than a tenth (planes of 64 and 96 squared,
+# with and without arrests).
 MAX_REVISIONS = 100
 """Revisions of the pieces in Newton's method, which ends by itself."""
 MAX_JUMP_STEPS = 2000
@@ -117,7 +120,8 @@ def solve_pieces(
     operator: Operator, drive: Array, weakening_rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
     """Solve (1) for given pieces, with drive = load p - q. Return the status and the slip."""
-    # Nodes that the load alone would overload begin inside; the others join if they must.
+    # Nodes that the load alone would overload begin inside; the others
+    # join if they must.
     slip = guess.copy()
     inside = (guess > 0.0) | (drive > 0.0)
     operator = operator._replace(weakening_rate=weakening_rate)
@@ -128,8 +132,9 @@ def solve_pieces(
 def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bool:
     """(a) 2: return whether K - diag(W) on the nodes that slip shows no negative curvature.
 
-    The search begins with the growth of slip, which is close to the direction in
-    which stability is lost. It continues in the directions of conjugate gradients.
+    The search begins with the growth of slip, which is close to the
+    direction in which stability is lost. It continues in the directions
+    of conjugate gradients.
     """
     operator, inside = operator._replace(weakening_rate=W), slip > 0.0
     solution, image = np.zeros_like(slip), np.empty_like(slip)
@@ -137,8 +142,9 @@ def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bo
     curvature = inner(growth, image)
     if not curvature > 0.0:
         return False
-    # From nearly any right side, conjugate gradients meet a negative curvature. With the
-    # growth as the soft mode, they take few iterations.
+    # From nearly any right side, conjugate gradients
+    # meet a negative curvature. With the growth as
+    # the soft mode, they take few iterations.
     operator, residual = operator._replace(soft_mode=growth / np.sqrt(curvature)), 1.0 * inside
     status, _ = solve_inside(operator, inside, solution, residual, CURVATURE_RESIDUAL)
     return status == SOLVED
@@ -154,9 +160,9 @@ def stable_equilibrium(
 ) -> Array | None:
     """Return the slip at a load if a stable path certainly leads there, and otherwise `None`.
 
-    The path begins at an equilibrium with less slip at a lower load. The guess is a
-    slip at the end of the path. The accuracy is the largest residual stress as a
-    share of the mean strength or load.
+    The path begins at an equilibrium with less slip at a lower load.
+    The guess is a slip at the end of the path. The accuracy is the
+    largest residual stress as a share of the mean strength or load.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     pieces, start = sample.pieces, present_pieces(sample, slip)
@@ -210,8 +216,9 @@ def _bound(
 ) -> Bound:
     """(b) 2: return the slip if nodes omit a share of their weakening and stop at their corner.
 
-    The assumed strength is the larger of two straight lines, and Newton's method
-    finds which line applies at each node. The drive is reduced by the allowed
+    The assumed strength is the larger of two straight
+    lines, and Newton's method finds which line applies
+    at each node. The drive is reduced by the allowed
     residual, so that a rough slip is also a bound.
     """
     drag = DRAG * float(sample.weakening_rate.max())
@@ -235,7 +242,8 @@ def _bound(
         is_beyond = start - W * end < level
         if np.array_equal(is_beyond, is_level):
             passed = present_pieces(sample, end).piece > present.piece
-            # Beyond its last corner the true strength of a node is level, too.
+            # Beyond its last corner the true
+            # strength of a node is level, too.
             falls_on = passed & (present.piece < sample.pieces.ends.size - 1)
             is_equilibrium = omitted == 0.0 and not falls_on.any()
             return Bound(SOLVED, np.maximum(end, slip), is_equilibrium)
@@ -248,10 +256,10 @@ def _step_to_corner(
 ) -> Array:
     """(b) 5: move slip with the true pieces until the first node reaches a corner.
 
-    Only the nodes that slip or are overloaded move: towards their equilibrium or,
-    without an equilibrium, along y >= 0 with A y = lambda y, lambda < 0. In both
-    cases every moving node remains overloaded or balanced, so that the next
-    equilibrium is not passed.
+    Only the nodes that slip or are overloaded move: towards their
+    equilibrium or, without an equilibrium, along y >= 0 with A y =
+    lambda y, lambda < 0. In both cases every moving node remains
+    overloaded or balanced, so that the next equilibrium is not passed.
     """
     present = present_pieces(sample, slip)
     operator = operator._replace(weakening_rate=present.weakening_rate)
@@ -267,7 +275,8 @@ def _step_to_corner(
         largest_W = float(sample.weakening_rate.max())
         lowest_eigenvector(operator, inside, direction, 1e-6 * largest_W, MAX_ITERATIONS)
         direction = np.where(direction > DIRECTION_RTOL * direction.max(), direction, 0.0)
-        # Strength falls by more than stress along it, until a node reaches a corner.
+        # Strength falls by more than stress along it, until a node
+        # reaches a corner.
         longest = np.inf
     moved = slip.copy()
     step_to_corner(sample, moved, direction, longest)
@@ -292,11 +301,12 @@ def least_equilibrium(
 ) -> Relaxed:
     """Return the least equilibrium at a load that is not below a given slip (see (b)).
 
-    The given slip is zero, or belongs to an equilibrium at a lower load, or lies beyond
-    this equilibrium along an unstable direction, or (`is_unstable`) belongs to an
-    instability. The accuracy is the largest residual stress as a share of the mean strength
-    or load. If an interface ends, it slides when all nodes that can break slip, unless it
-    is followed `to_rest`.
+    The given slip is zero, or belongs to an equilibrium at a lower
+    load, or lies beyond this equilibrium along an unstable direction,
+    or (`is_unstable`) belongs to an instability. The accuracy is the
+    largest residual stress as a share of the mean strength or load. If
+    an interface ends, it slides when all nodes that can break slip,
+    unless it is followed `to_rest`.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
@@ -304,7 +314,8 @@ def least_equilibrium(
     omitted_before = 0.0  # the same, before a step with the share 1 was tried
     fall = 0.0  # largest fall of strength in the step before, Pa
     for _ in range(MAX_JUMP_STEPS):
-        # 1. The load less the present strength, summed over the nodes. The sum of K d is zero.
+        # 1. The load less the present strength, summed over the nodes.
+        # The sum of K d is zero.
         present = present_pieces(sample, slip)
         drive = load * sample.profile - present.strength
         if float((drive + present.weakening_rate * slip).sum()) > tolerance * slip.size:

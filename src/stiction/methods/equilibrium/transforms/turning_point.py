@@ -9,37 +9,40 @@ the slipping nodes
 
     A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
 
-where a dash is the derivative with respect to a at a fixed load. The interface
-without the spring is in equilibrium if mu = 0. Its load turns if also mu' = 0. Find
-(load, a) with mu = mu' = 0.
+where a dash is the derivative with respect to a at a fixed load. The
+interface without the spring is in equilibrium if mu = 0. Its load turns
+if also mu' = 0. Find (load, a) with mu = mu' = 0.
 
-Lower bound: if mu >= 0 at a load, d is feasible, and the load bounds the onset from
-below. Upper bound: let y combine the slopes d' of two states, with mu' > 0 and mu'
-< 0, so that A y = 0 at nodes that slip in both. Then y is a multiplier, which
-bounds the onset from above. A node that slips in only one state has A y <= 0, and
-hardly slips at the turning point, so the error of this bound is of second order.
+Lower bound: if mu >= 0 at a load, d is feasible, and the load bounds
+the onset from below. Upper bound: let y combine the slopes d' of two
+states, with mu' > 0 and mu' < 0, so that A y = 0 at nodes that slip in
+both. Then y is a multiplier, which bounds the onset from above. A node
+that slips in only one state has A y <= 0, and hardly slips at the
+turning point, so the error of this bound is of second order.
 
 Algorithm
 ---------
 The algorithm is our own: Newton's method for two equations. As nodes join, mu'
 falls in steps.
 
-1. Hold the patch at the guess (load, a), solve (1) for d and d' (`_hold`), and
-   compute both bounds.
-2. If conjugate gradients meet negative curvature although the patch is held, a
-   different patch became unstable. Hold this patch instead, at a lower load.
-3. As long as mu' had only one sign, change a by Newton's method, with a secant for
-   the slope of mu'. Step slightly beyond the zero, so that the sign changes
-   (`_step_across`).
-4. With states of both signs, guess an a between these states, alternately as if mu'
-   were linear in a and as if mu' had a single step (`_amplitude_between`).
-5. The next load is the load at which the spring would have no force at the next a
-   (`_load_at`), kept below the upper bound.
-6. End if the bounds are close enough, or if successive states hardly narrow the
-   bounds.
+1. Hold the patch at the guess (load, a), solve (1) for d and d'
+   (`_hold`), and compute both bounds.
+2. If conjugate gradients meet negative curvature although the patch is
+   held, a different patch became unstable. Hold this patch instead, at
+   a lower load.
+3. As long as mu' had only one sign, change a by Newton's method, with a
+   secant for the slope of mu'. Step slightly beyond the zero, so that
+   the sign changes (`_step_across`).
+4. With states of both signs, guess an a between these states,
+   alternately as if mu' were linear in a and as if mu' had a single
+   step (`_amplitude_between`).
+5. The next load is the load at which the spring would have no force at
+   the next a (`_load_at`), kept below the upper bound.
+6. End if the bounds are close enough, or if successive states hardly
+   narrow the bounds.
 
-If the algorithm fails, `bracket.bisect` takes over, so no result depends on the
-constants below.
+If the algorithm fails, `bracket.bisect` takes over, so no result
+depends on the constants below.
 """
 
 from typing import NamedTuple
@@ -95,8 +98,9 @@ class Held(NamedTuple):
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
     """Step 1: return the equilibrium with a held patch phi. `None` if another patch is unstable.
 
-    The guess gives the amplitude at which the spring has no force. The accuracy is
-    the largest residual stress as a share of the mean strength.
+    The guess gives the amplitude at which the
+    spring has no force. The accuracy is the largest
+    residual stress as a share of the mean strength.
     """
     excess, profile = bracket.excess, bracket.profile
     load, amplitude = guess.load, guess.amplitude
@@ -172,9 +176,10 @@ def _amplitude_between(below: Held, above: Held, is_linear: bool) -> float:
 def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
     """Step 3: return a step of the amplitude that is likely to change the sign of mu'.
 
-    `step` is the previous step, and `last` is mu' before this step. Because mu' falls
-    in steps as nodes join, the new step is slightly longer than Newton's. It is twice
-    as long as the previous step if mu' hardly changed.
+    `step` is the previous step, and `last` is mu' before this step.
+    Because mu' falls in steps as nodes join, the new step is slightly
+    longer than Newton's. It is twice as long as the previous step if
+    mu' hardly changed.
     """
     longest = MAX_STEP * state.amplitude
     if curvature >= 0.0:
@@ -190,9 +195,11 @@ def close(
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.
 
-    If a different patch turns out to be unstable, the spring holds that patch. `load` and `slip`
-    are first guesses. `bend` is the curvature a d mu'/da (Pa/m, negative) if it is known. Return
-    whether the bounds are within `gap` of the load, and the curvature that was found.
+    If a different patch turns out to be unstable, the spring
+    holds that patch. `load` and `slip` are first guesses.
+    `bend` is the curvature a d mu'/da (Pa/m, negative) if it
+    is known. Return whether the bounds are within `gap` of
+    the load, and the curvature that was found.
     """
     if bracket.closed(gap):
         return True, bend
@@ -214,7 +221,8 @@ def close(
             other_patch = _other_patch(bracket)
             if patch_changes > MAX_PATCH_CHANGES or other_patch is None:
                 break
-            # The other patch may have turned at this load already, so begin below it.
+            # The other patch may have turned at this load already, so
+            # begin below it.
             phi = other_patch
             load = min(guess.load, bracket.upper)
             load -= PATCH_CHANGE_RETREAT * 2.0 ** (patch_changes - 1) * bracket.magnitude
@@ -232,7 +240,8 @@ def close(
             above = state
             bracket.raise_multiplier(state.slope)
         if below is not None and above is not None:
-            # With these shares the slopes mu' cancel, so A y = 0 where both states slip.
+            # With these shares the slopes mu' cancel, so A y = 0 where
+            # both states slip.
             fall = -above.slope_of_force
             bracket.raise_multiplier(below.slope * fall + above.slope * below.slope_of_force)
         if bracket.closed(gap):
