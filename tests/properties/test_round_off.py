@@ -1,7 +1,8 @@
 """Inputs that change by 1e-12 move no recorded result by more than its tolerance.
 
-The calls of tests/records, with a strength that is changed where it enters: as a user's profile, or
-as one of the package's own. Blocks whose pushers end where they end are changed themselves.
+The calls of tests/records, with profiles that are changed where they enter: as a user's, or as the
+package's own. Every solid is changed, too. Blocks with pushers that end where the block ends are
+changed themselves.
 """
 
 from importlib import import_module
@@ -14,6 +15,7 @@ from specimens import crooked
 
 import stiction as st
 from stiction.problem.problem import Problem
+from stiction.problem.solid import Solid
 
 NAMES = "lines", "planes", "specimens", "ruptures", "fields", "reliability", "inference"
 FILES = [import_module(f"records.test_{name}") for name in NAMES]
@@ -27,18 +29,25 @@ CALLS = [
 ]
 
 
-def moved(values):
+MOVED = "strength", "initial_stress", "load_profile", "normal_pressure"
+"""Profiles of a sample. Some residual strengths equal the strength, and must stay equal."""
+
+
+def moved(values, seed=8):
     """Values that change by up to 1e-12 of themselves."""
-    change = np.random.default_rng(8).uniform(-1e-12, 1e-12, np.shape(values))
+    change = np.random.default_rng(seed).uniform(-1e-12, 1e-12, np.shape(values))
     return values * (1.0 + change)
 
 
 @pytest.mark.parametrize(("file", "name"), CALLS, ids=[name for _, name in CALLS])
-def test_round_off_of_strengths_moves_no_result(file, name, monkeypatch):
+def test_round_off_of_profiles_and_solids_moves_no_result(file, name, monkeypatch):
     placed, own = Problem.placed_sample, Problem.own_sample
+    modulus = Solid.effective_modulus
 
     def changed(rows):
-        return rows._replace(strength=moved(rows.strength))
+        profiles = {name: moved(getattr(rows, name), seed) for seed, name in enumerate(MOVED)}
+        rate = rows.weakening_rate * moved(1.0)  # a uniform rate stays uniform
+        return rows._replace(weakening_rate=rate, **profiles)
 
     def placed_sample(*given, **more):
         rows, measured = placed(*given, **more)
@@ -46,6 +55,7 @@ def test_round_off_of_strengths_moves_no_result(file, name, monkeypatch):
 
     monkeypatch.setattr(Problem, "placed_sample", placed_sample)
     monkeypatch.setattr(Problem, "own_sample", lambda *given: changed(own(*given)))
+    monkeypatch.setattr(Solid, "effective_modulus", lambda *given: moved(modulus(*given)))
     call, recorded = file.calls[name], read(record_of(file.__file__))[name]
     assert differences(outputs_of(call), recorded, call.close) == []
 
