@@ -27,8 +27,7 @@ def main(arguments: list[str] | None = None) -> None:
     from reproduction import claims, page, runner
     from reproduction.studies import jobs
 
-    size = runner.QUICK if options.quick else runner.USUAL
-    out = Path(options.out)
+    size, out = runner.QUICK if options.quick else runner.USUAL, options.out
     run = runner.Runner(out, size, options.seed, options.workers)
     wanted = list(jobs(options.full or options.figure is not None))
     if options.figure:
@@ -53,9 +52,7 @@ def main(arguments: list[str] | None = None) -> None:
             }
     texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
     warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())
-    claims.write_csv(
-        [finding for rows in judged.values() for finding in rows], out / "claims.csv"
-    )
+    claims.write_csv(judged, out / "claims.csv")
     page.write(out / "report.html", data, judged, images, run, warned, done=True)
     run.say(f"done: {out / 'report.html'}")
 
@@ -63,14 +60,14 @@ def main(arguments: list[str] | None = None) -> None:
 def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python reproduction", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="500 samples, for a first look")
-    parser.add_argument("--full", action="store_true",
-                        help="also what goes beyond the paper")  # fmt: skip
+    parser.add_argument("--full", action="store_true", help="also what is not in the paper")
     parser.add_argument("--figure", type=int, metavar="N", help="draw this figure only")
-    parser.add_argument("--parameters", type=Path, metavar="FILE",
-                        help="tables of a study file, in place of the paper's")  # fmt: skip
-    parser.add_argument("--out", default="stiction-paper", metavar="FOLDER")
+    parser.add_argument("--parameters", type=Path, metavar="FILE", help="other parameters")
+    parser.add_argument("--out", type=Path, default="stiction-paper", metavar="FOLDER")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--workers", type=int, default=_cores(), help="threads")
+    scheduled = hasattr(os, "sched_getaffinity")
+    cores = len(os.sched_getaffinity(0)) if scheduled else os.cpu_count()
+    parser.add_argument("--workers", type=int, default=cores, help="threads")
     options = parser.parse_args(arguments)
     if options.figure is not None and str(options.figure) not in FIGURES:
         parser.error(f"--figure: must be 1 to {len(FIGURES)}, got {options.figure}")
@@ -78,10 +75,8 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
         _read_parameters(parser, options.parameters)
         what_ifs = {path.stem for path in Path(__file__).parent.glob("what_if/*.toml")}
         if options.figure and what_ifs & {*FIGURES[str(options.figure)]["needs"]}:
-            parser.error(
-                f"--figure: {options.figure} is about what-ifs, which state parameters of their"
-                " own; draw it without --parameters"
-            )
+            mistake = f"--figure: {options.figure} is about what-ifs"
+            parser.error(f"{mistake}; draw it without --parameters")
     return options
 
 
@@ -96,20 +91,13 @@ def _read_parameters(parser: argparse.ArgumentParser, path: Path) -> None:
         parser.error(f"--parameters: {path}: {' | '.join(str(error).splitlines())}")
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-
-
 def _drawn(data, chosen: int | None) -> list[int]:
     """Return the numbers of the figures whose studies are computed in this run."""
     if chosen:
         return [chosen]
     optional = {"printed", "readings"}  # left out with the reader's own parameters
-    return [
-        int(key)
-        for key, about in FIGURES.items()
-        if {*about["needs"]} - optional <= {*data.studies}
-    ]
+    known = optional | {*data.studies}
+    return [int(key) for key, about in FIGURES.items() if {*about["needs"]} <= known]
 
 
 def _draw(data, number: int, folder: Path) -> Path:
@@ -120,8 +108,8 @@ def _draw(data, number: int, folder: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     module = paper if number <= 7 else beyond
     with st.plot.paper_style():
-        figure, *panels = getattr(module, f"figure_{number}")(data)
-        common.letters(*panels)
+        figure = getattr(module, f"figure_{number}")(data)
+        common.label(figure, FIGURES[str(number)]["panels"])
         path = folder / f"figure_{number:02}.png"
         figure.savefig(path, dpi=200)
     return path

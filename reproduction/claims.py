@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import functools
+import itertools
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -76,8 +77,7 @@ def _read() -> dict[str, list[Claim]]:
     }
 
 
-GROUPS = _read()
-"""All claims by the title of their group."""
+GROUPS = _read()  # all claims by the title of their group
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,10 +150,10 @@ def decide(claim: Claim, cases: Mapping[str, Sequence[Series]], beside=()) -> Fi
     return Finding(claim, judged, beside, verdict, readings, otherwise)
 
 
-def write_csv(findings: Sequence[Finding], path: Path) -> None:
+def write_csv(groups: Mapping[str, Sequence[Finding]], path: Path) -> None:
     """Write every number of every claim, one a row."""
     rows = []
-    for finding in findings:
+    for finding in itertools.chain(*groups.values()):
         for row in (*finding.judged, *finding.beside):
             for key, number in row.rows:
                 ratio, case = (key, "") if isinstance(key, float) else ("", key)

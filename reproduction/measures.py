@@ -53,12 +53,6 @@ def variance(d: Data, ratio: float) -> Number:
     return Number(spread.value**2, 2.0 * spread.value * spread.error)
 
 
-def slope(d: Data) -> float:
-    """Return the logarithmic slope of the variance at the shortest correlation."""
-    rows = d["theory"]["infinite"]
-    return float(np.diff(np.log(rows))[0] / np.diff(np.log(rows.ratio))[0])
-
-
 def deviations(*ratios: float, remaining: bool = False) -> Rows:
     """Return the root of Var[tau_n]/Var[tau_p], or of the remaining share."""
     shares = [(ratio, infinite_variance_ratio(ratio)) for ratio in ratios]
@@ -69,10 +63,9 @@ def from_normal(d: Data, ratio: float) -> Number:
     """Return the distance of tau_n from a normal distribution over that of tau_p."""
     rows = d.at("moments", "below", ratio)
     gaps = [abs(mean(row) - ndtr(z)) for row, z in zip(rows.T, NORMAL, strict=True)]
-    strength_gaps = setting.MARGINAL.distribution.cdf(MEAN + NORMAL * setting.DEVIATION) - ndtr(
-        NORMAL
-    )
-    return max(gaps, key=lambda gap: gap.value) / float(np.abs(strength_gaps).max())
+    below = setting.MARGINAL.distribution.cdf(MEAN + NORMAL * setting.DEVIATION)
+    strength_gap = float(np.abs(below - ndtr(NORMAL)).max())
+    return max(gaps, key=lambda gap: gap.value) / strength_gap
 
 
 def if_skewed_low(number):
@@ -108,10 +101,9 @@ def short_stress(d: Data) -> Rows:
 
 def window(d: Data, function) -> Rows:
     """Return function(tau_cr, min tau_p) as h_n vanishes and L/xi_0 does not change."""
-    rows = zip(d["window"].ratio, d["window"].stress, d["window"].weakest, strict=True)
-    return [
-        (float(ratio), function(stress.values, least.values)) for ratio, stress, least in rows
-    ]
+    study = d["window"]
+    rows = zip(study.ratio.values, study.stress.values, study.weakest.values, strict=True)
+    return [(float(ratio), function(stress, least)) for ratio, stress, least in rows]
 
 
 def above_weakest(stress, weakest) -> Number:
@@ -121,17 +113,15 @@ def above_weakest(stress, weakest) -> Number:
 
 def distance_of_halves(stress, weakest) -> Number:
     """Return how far the distributions of tau_cr and min tau_p of different samples differ."""
-    return Number(float(_halves(stress, weakest).statistic), 0.5 / math.sqrt(stress.size))
+    half = stress.size // 2
+    distance = stats.ks_2samp(stress[:half], weakest[half:]).statistic
+    return Number(float(distance), 0.5 / math.sqrt(stress.size))
 
 
 def p_of_halves(stress, weakest) -> Number:
     """Return the p-value of this distance."""
-    return Number(float(_halves(stress, weakest).pvalue))
-
-
-def _halves(stress, weakest):
     half = stress.size // 2
-    return stats.ks_2samp(stress[:half], weakest[half:])
+    return Number(float(stats.ks_2samp(stress[:half], weakest[half:]).pvalue))
 
 
 def towards_bound(stress, weakest=None) -> Number:
@@ -154,10 +144,8 @@ def offsets(d: Data, ratio: float, study: str) -> np.ndarray:
 
 
 def dynamic_mean(d: Data, ratio: float) -> Number:
-    """Return the mean tau_cr of ruptures, Pa: exact equilibrium of all samples, and the mean
-    difference of the ruptures from it."""
-    stress = d.stress(ratio, "ruptures")
-    static = d.stress(ratio, "exact")
+    """Return the mean tau_cr by equilibrium plus the mean difference of the ruptures, Pa."""
+    stress, static = d.stress(ratio, "ruptures"), d.stress(ratio, "exact")
     return mean(static) + mean(stress - static[: stress.size])
 
 
@@ -188,20 +176,13 @@ def front_speed(d: Data) -> Number:
 # Patches
 
 
-def growth(d: Data) -> Rows:
-    """Return the number of slipping patches at shares of the onset."""
+def growth(d: Data, steps: bool = False) -> Rows:
+    """Return the number of slipping patches at shares of the onset, or its steps."""
     study = d["growth"]["patches"].sel(correlation_ratio=FIRST)
-    return [(f"{x:g} tau_cr", mean(study.sel(level=x).values)) for x in (0.92, 0.96, 0.999)]
-
-
-def growth_steps(d: Data) -> Rows:
-    """Return by how much this number grows from level to level, in the same samples."""
-    study = d["growth"]["patches"].sel(correlation_ratio=FIRST)
-    steps = pairwise((0.92, 0.96, 0.999))
-    return [
-        (f"{b:g} less {a:g}", mean((study.sel(level=b) - study.sel(level=a)).values))
-        for a, b in steps
-    ]
+    rows = {x: study.sel(level=x).values for x in (0.92, 0.96, 0.999)}
+    if steps:  # in the same samples
+        return [(f"{b:g} less {a:g}", mean(rows[b] - rows[a])) for a, b in pairwise(rows)]
+    return [(f"{x:g} tau_cr", mean(row)) for x, row in rows.items()]
 
 
 def lowering(d: Data) -> Rows:
@@ -243,15 +224,12 @@ def rarer(d: Data, study: str) -> Rows:
     return [(f"less the share at {r:g}", shares[LAST] - shares[r]) for r in RATIOS[:2]]
 
 
-def _over_griffith(d: Data, name: str) -> np.ndarray:
-    edge = d["driving"].sel(case="edge")
-    lengths = edge[name].values.reshape(edge.sizes["sample"], -1)
-    return lengths / edge["griffith"].values[:, : lengths.shape[1]]
-
-
 def griffith(d: Data, name: str) -> Number:
     """Return the median over samples of the median length of their events over Griffith's."""
-    rows = [row[np.isfinite(row)] for row in _over_griffith(d, name)]
+    edge = d["driving"].sel(case="edge")
+    lengths = edge[name].values.reshape(edge.sizes["sample"], -1)
+    ratios = lengths / edge["griffith"].values[:, : lengths.shape[1]]
+    rows = [row[np.isfinite(row)] for row in ratios]
     medians = [np.median(row) for row in rows if row.size]
     low, high = np.quantile(medians, (0.25, 0.75))
     # A normal distribution has 1.349 deviations between its quartiles.

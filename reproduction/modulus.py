@@ -17,8 +17,7 @@ from reproduction.runner import Data
 from reproduction.setting import SIMULATED
 from reproduction.studies import READINGS
 
-RESAMPLED = 400
-"""Bootstrap samples, of the same draws in every reading."""
+RESAMPLED = 400  # bootstrap samples, of the same draws in every reading
 
 
 def _count(number: int, of: int, *ratios: float) -> Callable:
@@ -62,8 +61,7 @@ def _coincide(resampled: Callable, visible: float) -> np.ndarray:
 EVIDENCE = (_count(6, 20, 0.25), _count(2, 40, 0.5, 2.0), _example, _above, _coincide)
 """Probabilities of the printed results that `page.toml` lists, given means of resampled samples.
 Two means are taken to differ if they are visibly apart, in standard errors of a mean of 20."""
-COUNTS = slice(3)
-"""The part of the evidence that consists of counts."""
+COUNTS = slice(3)  # the part of the evidence that consists of counts
 
 
 @dataclass(frozen=True)

@@ -25,16 +25,14 @@ _NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
 
 def physics(text: str) -> Markup:
     """Return text as HTML, with symbols such as xi_0 and <tau_p> as they are printed."""
-    plain = (
-        str(escape(text)).replace("&lt;", "⟨").replace("&gt;", "⟩").replace("G*", "<i>G</i>*")
-    )
+    plain = str(escape(text)).replace("&lt;", "⟨").replace("&gt;", "⟩")
 
     def symbol(match: re.Match) -> str:
         name, index = match.groups()
         letter = f"&{name};" if len(name) > 1 else name  # Greek letters have HTML's names
         return f"<i>{letter}</i><sub>{index}</sub>"
 
-    plain = _NAME.sub(symbol, plain)
+    plain = _NAME.sub(symbol, plain.replace("G*", "<i>G</i>*"))
     plain = re.sub(r"\b(nu|lambda)\b", r"<i>&\1;</i>", plain)
     return Markup(plain.replace(" +- ", " ± "))
 

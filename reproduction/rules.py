@@ -48,9 +48,8 @@ class Rule:
     series: int = 1
 
     def __call__(self, series: Sequence[Numbers]) -> Verdict:
-        return (
-            self.judge(series) if series and all(len(row) for row in series) else Verdict.OPEN
-        )
+        known = series and all(map(len, series))
+        return self.judge(series) if known else Verdict.OPEN
 
 
 def _range(number: Number) -> tuple[float, float]:

@@ -142,12 +142,9 @@ class Runner:
         """Run one study at each xi_0/h_n, with draws of its own, along 'correlation_ratio'."""
         parts = []
         for ratio in ratios:
-            study = st.Study(
-                problem=problem,
-                random=field_of(ratio),
-                method=method,
-                ensemble=st.Ensemble(samples=samples, seed=self.seed_of(ratio)),
-            )
+            ensemble = st.Ensemble(samples=samples, seed=self.seed_of(ratio))
+            random = field_of(ratio)
+            study = st.Study(problem=problem, random=random, method=method, ensemble=ensemble)
             parts.append(self.study(f"{name}-{ratio:g}", study))
         return along("correlation_ratio", ratios, parts)
 

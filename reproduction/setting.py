@@ -14,17 +14,12 @@ import numpy as np
 import stiction as st
 from reproduction import PARAMETERS
 
-PRINTED_RATIOS = (0.25, 0.5, 1.0, 2.0)
-"""xi_0/h_n of the paper's Monte Carlo study."""
-PRINTED_RATE = 2e7
-"""Loading rate of the ruptures, Pa/s. The paper does not give its own."""
+PRINTED_RATIOS = (0.25, 0.5, 1.0, 2.0)  # xi_0/h_n of the paper's Monte Carlo study
+PRINTED_RATE = 2e7  # loading rate of the ruptures, Pa/s. The paper does not give its own
 OWN_KEYS = ("correlation_ratios", "loading_rate")
-MAX_RATIOS = 6
-"""As many correlation lengths can be told apart in a figure."""
-MIN_NODES = 16
-"""Fewest nodes in the nucleation length."""
-TAIL = 1e-4
-"""Probability beyond the ends of the range that figures show of an unbounded strength."""
+MAX_RATIOS = 6  # as many correlation lengths can be told apart in a figure
+MIN_NODES = 16  # fewest nodes in the nucleation length
+TAIL = 1e-4  # probability beyond each end of the range shown of an unbounded strength
 
 
 def _study(plane: str | None = None) -> st.Study:
@@ -86,17 +81,15 @@ def _check(study: st.Study) -> None:
 
 def _ratios() -> tuple[float, ...]:
     values = PARAMETERS.get("correlation_ratios", PRINTED_RATIOS)
-    numbers = [value for value in values if isinstance(value, int | float)] if isinstance(
-        values, list | tuple) else []  # fmt: skip
-    rising = all(np.diff([0.0, *numbers]) > 0.0)
-    if not (2 <= len(numbers) <= MAX_RATIOS and len(numbers) == len(values) and rising):
+    known = isinstance(values, list | tuple) and all(isinstance(x, int | float) for x in values)
+    rising = known and all(np.diff([0.0, *values]) > 0.0)
+    if not (rising and 2 <= len(values) <= MAX_RATIOS):
         raise st.InputError(f"correlation_ratios: give 2 to {MAX_RATIOS} rising positive numbers,"
                             f" got {values!r}")  # fmt: skip
-    return tuple(map(float, numbers))
+    return tuple(map(float, values))
 
 
-RATIOS = _ratios()
-"""All xi_0/h_n."""
+RATIOS = _ratios()  # all xi_0/h_n
 SIMULATED = tuple(dict.fromkeys((RATIOS[0], RATIOS[1], RATIOS[-1])))
 """xi_0/h_n at which ruptures are run. The paper ran 20 at each of 0.25, 0.5 and 2."""
 FIRST, SECOND, LAST = RATIOS[0], RATIOS[1], RATIOS[-1]
@@ -107,12 +100,10 @@ with warnings.catch_warnings():
     _check(_own)
 PROBLEM = _own.problem
 FIELD = _own.random.properties["strength"]
-H = PROBLEM.nucleation_length
-"""Nucleation length h_n, m."""
+H = PROBLEM.nucleation_length  # nucleation length h_n, m
 L = PROBLEM.interface.measure
 G_STAR = PROBLEM.effective_modulus
-W = PROBLEM.uniform_weakening_rate
-"""Weakening rate, Pa/m."""
+W = PROBLEM.uniform_weakening_rate  # weakening rate, Pa/m
 STRAIN = PROBLEM if PARAMETERS else _study("strain").problem
 """The same with the printed modulus, G/(1 - nu), which belongs to plane strain."""
 PRINTED_H = STRAIN.nucleation_length
@@ -120,8 +111,7 @@ PRINTED_H = STRAIN.nucleation_length
 MARGINAL = FIELD.marginal
 _LAW = MARGINAL.distribution
 MEAN, DEVIATION = _LAW.mean(), _LAW.std()
-SUPPORT = _LAW.support()
-"""Bounds of the strength, Pa; the upper one may be infinite."""
+SUPPORT = _LAW.support()  # bounds of the strength, Pa; the upper one may be infinite
 DENSITY_BOUNDS = [bound if np.isfinite(bound) else None for bound in SUPPORT]
 """The same for densities of stresses, Pa; None where there is no bound."""
 LOW = SUPPORT[0] if SUPPORT[0] > 0.0 else float(_LAW.ppf(TAIL))
@@ -138,20 +128,16 @@ def residual(strength):
 
 
 def _loading_rate() -> float:
-    if "loading_rate" in PARAMETERS:
-        loading_rate = PARAMETERS["loading_rate"]
-        if not (isinstance(loading_rate, int | float) and 0.0 < loading_rate < np.inf):
-            raise st.InputError(
-                f"loading_rate: give a positive number, Pa/s, got {loading_rate!r}"
-            )
-        return float(loading_rate)
     if not PARAMETERS:
         return PRINTED_RATE
-    return float(f"{PRINTED_RATE * (MEAN / 1e6) / (CROSSING / 1.08e-4):.2g}")
+    scaled = float(f"{PRINTED_RATE * (MEAN / 1e6) / (CROSSING / 1.08e-4):.2g}")
+    given = PARAMETERS.get("loading_rate", scaled)
+    if not (isinstance(given, int | float) and 0.0 < given < np.inf):
+        raise st.InputError(f"loading_rate: give a positive number, Pa/s, got {given!r}")
+    return float(given)
 
 
-CROSSING = L / PROBLEM.solid.shear_wave_speed
-"""Time in which a shear wave runs along the interface, s."""
+CROSSING = L / PROBLEM.solid.shear_wave_speed  # time of a shear wave along the interface, s
 LOADING_RATE = _loading_rate()
 """Of the ruptures, Pa/s; by default the load rises by the same share of the mean strength while
 a shear wave runs along the interface as it does with the paper's parameters."""

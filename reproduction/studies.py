@@ -20,8 +20,7 @@ NORMAL = np.linspace(-2.0, 2.0, 17)
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LOAD_SHARES = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
-READINGS = TEXTS["reading"]
-"""The interpretations of the modulus, by their letters."""
+READINGS = TEXTS["reading"]  # the interpretations of the modulus, by their letters
 SWEEPS = {
     "local": ("Onsets by the local criterion", PROBLEM, LOCAL, "samples", RATIOS),
     "exact": ("Onsets by exact equilibrium, with interaction", PROBLEM, EXACT, "samples", RATIOS),
@@ -45,9 +44,7 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
     """Nucleation stress: weakest point, moments and histogram."""
     interface = PROBLEM.interface
     edges = np.linspace(setting.LOW, setting.HIGH, CELLS + 1)
-    spread = {
-        r: setting.DEVIATION * variance_ratio(PROBLEM, strength(r)) ** 0.5 for r in RATIOS
-    }
+    variances = {ratio: variance_ratio(PROBLEM, strength(ratio)) for ratio in RATIOS}
 
     def batch(ratio, first, count):
         seed = run.seed_of(ratio)
@@ -67,7 +64,8 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
         }
         extremes = xr.Dataset({name: ("sample", row) for name, row in variables.items()})
         counts = np.histogram(tau_n[:, ::16], edges)[0]
-        limits = [MEAN + level * spread[ratio] for level in NORMAL]
+        spread = setting.DEVIATION * variances[ratio] ** 0.5
+        limits = [MEAN + level * spread for level in NORMAL]
         return extremes.assign(
             below=(("sample", "level"), np.array([(tau_n < s).mean(axis=1) for s in limits]).T),
             powers=(("sample", "order"), np.array(powers).T),
@@ -232,10 +230,9 @@ def modes(run: Runner) -> xr.Dataset:
         averages = np.fft.irfft(np.fft.rfft(tau_p, axis=1) * average, interface.size, axis=1)
         more_modes = more.sample(interface, samples=200, seed=run.seed)
         untruncated = st.theory.nucleation_stress(PROBLEM, more_modes).min(axis=1)
-        changes = {"untruncated": untruncated, "rounded": averages.min(axis=1)}
-        parts.append(
-            xr.Dataset({k: ("sample", row / usual - 1.0) for k, row in changes.items()})
-        )
+        rows = {"untruncated": untruncated, "rounded": averages.min(axis=1)}
+        changes = {name: ("sample", row / usual - 1.0) for name, row in rows.items()}
+        parts.append(xr.Dataset(changes))
     return along("correlation_ratio", RATIOS, parts)
 
 
@@ -269,9 +266,8 @@ def growth(run: Runner, count: int) -> xr.Dataset:
             merged = any(np.unique(row[critical & (row >= 0)]).size > 1 for row in labels[:-1])
             holds_weakest = critical[tau_p.argmin()]
         number = [row.max() + 1 for row in labels]
-        return xr.Dataset(
-            {"patches": ("level", number), "merged": merged, "holds_weakest": holds_weakest}
-        )
+        row = {"patches": ("level", number), "merged": merged, "holds_weakest": holds_weakest}
+        return xr.Dataset(row)
 
     growing = run.grid(grow, correlation_ratio=RATIOS, sample=range(count))
     return growing.assign_coords(level=list(LOAD_SHARES))
@@ -331,8 +327,7 @@ def mechanism(run: Runner) -> xr.Dataset:
 @kept(samples=lambda size: size.samples, most=lambda size: 10)
 def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Arrested samples again, with inertia."""
-    events = sweep(run, "exact")["arrested_events"]
-    interface = PROBLEM.interface
+    events, interface = sweep(run, "exact")["arrested_events"], PROBLEM.interface
     chosen = [
         (ratio, int(number))
         for ratio in RATIOS
@@ -346,10 +341,9 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         length, count = static["event_length"].values[0, 0], moving["arrested_events"].values[0]
         return xr.Dataset({"length": length, "dynamic": count})
 
-    parts, names = run.map(again, chosen), ("length", "dynamic")
-    return xr.Dataset(
-        {name: ("event", [float(part[name]) for part in parts]) for name in names}
-    )
+    parts = run.map(again, chosen)
+    rows = {name: [float(part[name]) for part in parts] for name in ("length", "dynamic")}
+    return xr.Dataset({name: ("event", row) for name, row in rows.items()})
 
 
 DRIVING = {
@@ -403,9 +397,8 @@ def held(run: Runner, count: int) -> xr.Dataset:
             return xr.Dataset({"length": np.nan})
         rise = stress / setting.LOADING_RATE
         end = rise + 10.0 * setting.CROSSING
-        method = st.Rupture(
-            load=([0.0, rise, end], [0.0, stress, stress]), stop="rest", end_time=end
-        )
+        load = ([0.0, rise, end], [0.0, stress, stress])
+        method = st.Rupture(load=load, stop="rest", end_time=end)
         saved = st.Save(["slip"], every=1_000_000)
         rupture = st.simulate_rupture(problem, tau_p, method=method, save=saved, progress=False)
         slip = rupture["slip"].values[-1]
@@ -437,8 +430,7 @@ def what_if(run: Runner, name: str, suffix: str) -> xr.Dataset:
 
 PAPER = ("local", moments, "exact", "ruptures", theory, representative)
 """What the paper does, in the order in which it is computed."""
-MODULUS = ("printed", readings)
-"""Which modulus the paper used: asked with the paper's parameters only."""
+MODULUS = ("printed", readings)  # asked with the paper's parameters only
 BEYOND = (trend, "vanishing", window, modes, growth, mechanism, arrest, driving, "dynamic")
 """What `--full` adds."""
 

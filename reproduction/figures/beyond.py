@@ -7,34 +7,32 @@ import numpy as np
 
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import OVER_MEAN, XI
+from reproduction.figures.common import XI
 from reproduction.measures import arrest_shares, arrested, largest_energy, trend
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.runner import Data
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
-from reproduction.studies import DRIVING, LOAD_SHARES
+from reproduction.studies import ARRESTS, DRIVING, LOAD_SHARES
 
 
 def figure_8(d: Data):
     """Draw the local criterion against the exact onset."""
-    figure, axes = common.stacked(3.0, 1)
+    figure, axes = common.mosaic(3.0, [["whole"]])
     for ratio in RATIOS:
         ordered = 100 * np.sort(d.excess(ratio))
         left = 1.0 - np.arange(ordered.size) / ordered.size
         axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
     axes.axvline(0, color="grey", lw=0.8)
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
-    axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(-0.06, 10),
-             xlabel="local criterion above the exact onset (%)",
-             ylabel="share of samples above")  # fmt: skip
+    axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(-0.06, 10))
     common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
     axes.legend(title=XI, loc="upper right")
-    return (figure,)
+    return figure
 
 
 def figure_9(d: Data):
     """Draw mean and spread of tau_cr over the whole range of correlation lengths."""
-    figure, top, bottom = common.stacked(5.6, 2, sharex=True)
+    figure, top, bottom = common.mosaic(5.6, "a;b", sharex=True)
     tiny = d["vanishing"]["critical_stress"]
     for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
         finer = [(float(row.correlation_ratio), function(row.values) * factor) for row in tiny]
@@ -48,59 +46,51 @@ def figure_9(d: Data):
                 label="standard deviation")  # fmt: skip
     for axes in (top, bottom):
         axes.axvspan(RATIOS[0], RATIOS[-1], color="0.93", lw=0, zorder=0)
-    top.set(xscale="log", ylabel=rf"mean of $\tau_\mathrm{{cr}}{OVER_MEAN}")
+    top.set(xscale="log")
     top.text((RATIOS[0] * RATIOS[-1]) ** 0.5, 0.95, "Figures 5 and 6", ha="center", color="grey",
              transform=top.get_xaxis_transform())  # fmt: skip
-    bottom.set(yscale="log", xlabel=XI, ylabel="spread (kPa)")
+    bottom.set(yscale="log")
     common.log_ticks(bottom.yaxis)
     common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
                        ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
     bottom.legend(loc="upper left")
-    return figure, top, bottom
+    return figure
 
 
 def figure_10(d: Data):
     """Draw how patches grow in number and merge, and how they act on each other."""
-    figure, number, single, lowering = common.stacked(6.2, 3)
+    figure, number, single, lowering = common.mosaic(6.2, "a;b;c")
     for ratio in RATIOS:
         rows = d.at("growth", "patches", ratio)
         number.errorbar(LOAD_SHARES, rows.mean(axis=0), 2 * rows.std(axis=0) / np.sqrt(len(rows)),
                         **common.line(ratio), lw=1, label=f"{ratio:g}")  # fmt: skip
-    number.set(xlabel=r"$\tau_0/\tau_\mathrm{cr}$", ylabel="slipping patches", ylim=(0, None))
+    number.set(ylim=(0, None))
     number.legend(title=XI, loc="upper left", ncols=2)
     study = d["mechanism"]
     x = (PROBLEM.interface.x - 0.5 * L) / H
     load = float(study["one_load"])
     single.plot(x, study["one_stress"] / load, color="C0", label="stress over load")
     single.plot(x, study["one_strength"] / load, "--", color="grey", label="strength over load")
-    single.set(xlim=(-3, 3), xlabel=r"$x/h_\mathrm{n}$ from a single patch")
     single.legend(loc="lower right")
     lowering.loglog(study["distance"], study["lowering"] * 100, "-o", color="C0", ms=4)
-    lowering.set(xlabel=r"distance of two dips over $h_\mathrm{n}$", ylabel="onset lowered (%)")
     common.plain_ticks(lowering.xaxis, (1.25, 2, 3, 5, 8))
     common.log_ticks(lowering.yaxis)
-    return figure, number, single, lowering
+    return figure
 
 
 def figure_11(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
-    figure, top, bottom = common.stacked(6.0, 2, ratios=(1.2, 1.0))
-    drops = {
-        ratio: d.stress(ratio, "exact").mean() - setting.residual(MEAN) for ratio in RATIOS
-    }
+    figure, top, bottom = common.mosaic(6.0, "a;b", (1.2, 1.0))
+    residual = setting.residual(MEAN)
+    drops = {ratio: d.stress(ratio, "exact").mean() - residual for ratio in RATIOS}
     unit = math.pi * 0.5 * H / (2 * setting.G_STAR) / largest_energy()
     length = np.linspace(0, 1.5 / (unit * max(drops.values()) ** 2), 100)
     for ratio, drop in drops.items():
-        top.plot(
-            length, unit * length * drop**2, **common.line(ratio), label=f"{XI} = {ratio:g}"
-        )
+        look = common.line(ratio) | {"label": f"{XI} = {ratio:g}"}
+        top.plot(length, unit * length * drop**2, **look)
     top.axhline(1, color="firebrick", lw=1)
-    top.text(
-        0.02 * length[-1],
-        1.03,
-        r"largest fracture energy $\Gamma_\mathrm{max}$",
-        color="firebrick",
-    )
+    text = r"largest fracture energy $\Gamma_\mathrm{max}$"
+    top.text(0.02 * length[-1], 1.03, text, color="firebrick")
     top.axvspan(0, 1, color="0.93", lw=0, zorder=0)
     top.text(0.5, 0.6, "not yet\nunstable", ha="center", color="grey")
     events = d["arrest"]
@@ -111,8 +101,7 @@ def figure_11(d: Data):
     ):
         place = events["length"].values[chosen] / H
         top.plot(place, y + 0 * place, marker, color="black", ms=5, mfc="none", label=text)
-    top.set(xlabel=r"length of the rupture over $h_\mathrm{n}$", xlim=(0, length[-1]),
-            ylim=(0, 1.6), ylabel=r"$G/\Gamma_\mathrm{max}$")  # fmt: skip
+    top.set(xlim=(0, length[-1]), ylim=(0, 1.6))
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.09), ncols=3)
     for study, shift, colour, marker, text in (
         ("exact", 0.0, "C0", "o", "without inertia"),
@@ -122,23 +111,22 @@ def figure_11(d: Data):
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
         common.numbers(bottom, np.log2(RATIOS) + shift, rows, **style)
     common.ratio_axis(bottom)
-    bottom.set(ylabel="samples with an\narrested event (%)", ylim=(0, None))
+    bottom.set(ylim=(0, None))
     bottom.legend()
-    return figure, top, bottom
+    return figure
 
 
-ENDLESS = 45.0
-"""Where a length over h_n that is infinite is drawn."""
+ENDLESS = 45.0  # where a length over h_n that is infinite is drawn
 
 
 def figure_12(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
-    figure, top, bottom = common.stacked(5.2, 2, ratios=(0.8, 1.2))
+    figure, top, bottom = common.mosaic(5.2, "a;b", (0.8, 1.2))
     x = PROBLEM.interface.x / L
     for i, (case, load) in enumerate(DRIVING.items()):
         profile = dataclasses.replace(PROBLEM, load=load).load_profile
         top.plot(x, np.broadcast_to(profile, x.shape), color=f"C{i}", label=case)
-    top.set(xlabel="$x/L$", ylabel="load over its mean", xlim=(0, 1), ylim=(0, None))
+    top.set(xlim=(0, 1), ylim=(0, None))
     top.legend()
     study = d["driving"]
     for i, case in enumerate(("edge", "gradient", "uniform")):
@@ -153,12 +141,11 @@ def figure_12(d: Data):
                 label=f"edge, first event, with inertia ({np.isfinite(moving).sum()})")  # fmt: skip
     bottom.axline((1, 1), (10, 10), color="grey", lw=0.8)
     bottom.axvline(L / H, color="grey", lw=0.8, ls=":")
-    bottom.set(xscale="log", yscale="log", xlabel=r"Griffith's length over $h_\mathrm{n}$",
-               ylabel=r"arrested length over $h_\mathrm{n}$", ylim=(0.8, 200))  # fmt: skip
+    bottom.set(xscale="log", yscale="log", ylim=(0.8, 200))
     common.plain_ticks(bottom.yaxis, (1, 2, 5, 10, 20, 40))
     common.plain_ticks(bottom.xaxis, (5, 10, 20, ENDLESS), ["5", "10", "20", r"$\infty$"])
     bottom.legend(loc="upper left")
-    return figure, top, bottom
+    return figure
 
 
 def _points(axes, rows, shift: float = 0.0, **style) -> None:
@@ -172,14 +159,10 @@ def _points(axes, rows, shift: float = 0.0, **style) -> None:
 
 def figure_13(d: Data):
     """Draw the share of arrested samples where more is random, with and without inertia."""
-    figure, *panels = common.stacked(6.4, 3, ratios=(4, 6, 6), sharex=True)
-    titles = ("range of the strength", "random initial stress", "random residual strength")
-    names = ("wide_strength", "random_load", "random_residual")
-    for axes, name, title in zip(panels, names, titles, strict=True):
+    figure, *panels = common.mosaic(6.4, "a;b;c", (4, 6, 6), sharex=True)
+    for axes, name in zip(panels, ARRESTS, strict=True):
         _points(axes, arrest_shares(d, name), -0.12, color="C0", label="without inertia")
         _points(axes, arrest_shares(d, f"{name}-inertia"), 0.12, color="firebrick", fmt="D",
                 label="with inertia")  # fmt: skip
-        axes.set(xlim=(-3, 103), title=title)
     panels[1].legend(loc="upper right")
-    panels[-1].set_xlabel("samples with an arrested event (%)")
-    return figure, *panels
+    return figure

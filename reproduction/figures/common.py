@@ -1,4 +1,4 @@
-"""What all figures share: width, letters of panels, ticks and error bars."""
+"""What all figures share: panels and their texts, ticks and error bars."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -6,31 +6,28 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from reproduction.setting import HIGH, LOW, MEAN, RATIOS
 
-WIDTH = 4.5
-"""Inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels."""
+WIDTH = 4.5  # inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels
 DASHES = ("-", "--", "-.", ":", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (2.5, 2.5)))
-STRENGTHS = (LOW / MEAN, HIGH / MEAN)
-"""The range of the strength over its mean."""
+STRENGTHS = (LOW / MEAN, HIGH / MEAN)  # the range of the strength over its mean
 XI = r"$\xi_0/h_\mathrm{n}$"
-TAU_CR = r"$\tau_\mathrm{cr}$"
-MEAN_P = r"$\langle\tau_\mathrm{p}\rangle$"
-OVER_MEAN = r"/\langle\tau_\mathrm{p}\rangle$"
 
 
-def new(height: float) -> Figure:
-    return Figure(figsize=(WIDTH, height), layout="constrained")
+def mosaic(height: float, rows, ratios=None, **shape):
+    """Return a figure of one column and its panels, as `Figure.subplot_mosaic` places them.
+
+    A panel whose name is a letter is printed with it.
+    """
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    return figure, *figure.subplot_mosaic(rows, height_ratios=ratios, **shape).values()
 
 
-def stacked(height: float, count: int, ratios=None, **shape):
-    """Return a figure of one column, and its panels below each other."""
-    figure = new(height)
-    return figure, *np.ravel(figure.subplots(count, height_ratios=ratios, **shape))
-
-
-def mosaic(height: float, rows, height_ratios, **shape):
-    """Return a figure of one column and its panels, as `Figure.subplot_mosaic` places them."""
-    figure = new(height)
-    return figure, *figure.subplot_mosaic(rows, height_ratios=height_ratios, **shape).values()
+def label(figure: Figure, stated: dict[str, dict]) -> None:
+    """Letter the panels above their upper left corners, and add what `page.toml` states."""
+    for axes in figure.axes:
+        name = axes.get_label()
+        axes.set(**stated.get(name, {}))
+        if len(name) == 1:
+            axes.set_title(f"({name})", loc="left", fontweight="bold")
 
 
 def line(ratio: float) -> dict:
@@ -43,12 +40,6 @@ def dots(ratio: float) -> dict:
     """Return colour and marker of a correlation length."""
     i = RATIOS.index(ratio)
     return {"color": f"C{i}", "marker": "os^DvP"[i], "linestyle": "none"}
-
-
-def letters(*panels) -> None:
-    """Letter panels in their order, above their upper left corners."""
-    for text, axes in zip("abcd", panels, strict=False):
-        axes.set_title(f"({text})", loc="left", fontweight="bold")
 
 
 def span(*rows, margin: float = 0.06) -> tuple[float, float]:
@@ -79,6 +70,5 @@ def log_ticks(axis) -> None:
 
 
 def ratio_axis(axes) -> None:
-    """Label an axis of log2(xi_0/h_n)."""
+    """Put ticks on an axis of log2(xi_0/h_n)."""
     plain_ticks(axes.xaxis, np.log2(RATIOS), [f"{ratio:g}" for ratio in RATIOS])
-    axes.set_xlabel(XI)

@@ -7,43 +7,35 @@ from scipy.stats import norm
 import stiction as st
 from reproduction import setting
 from reproduction.figures import common
-from reproduction.figures.common import MEAN_P, OVER_MEAN, TAU_CR, XI
+from reproduction.figures.common import XI
 from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
 
-TAU_P = rf"$\tau_\mathrm{{p}}{OVER_MEAN}"
-TAU_N = rf"$\tau_\mathrm{{n}}{OVER_MEAN}"
 LAW = setting.MARGINAL.distribution
 X = PROBLEM.interface.x / L
 
 
 def figure_1(d: Data):
     """Draw the system, the load, the friction law, and one field with its statistics."""
-    rows = (8 * ["system"], 4 * ["load"] + 4 * ["law"], 6 * ["field"] + 2 * ["density"])
+    rows = (8 * ["a"], 4 * ["b"] + 4 * ["c"], 6 * ["d"] + 2 * ["density"])
     figure, system, load, law, field, density = common.mosaic(6.9, rows, (0.9, 1.0, 1.7))
     _system(system)
     load.plot([0, 1, 1.03, 1.35], [0, 1, 0.3, 0.3], color="C0")
     load.plot(1, 1, "o", color="black", ms=4)
-    load.set(xlabel="time", ylabel=r"$\tau_0$", xticks=(), ylim=(0, 1.15), xlim=(0, 1.4))
-    load.set_yticks((0.3, 1.0), (r"$\tau_\mathrm{kin}$", TAU_CR))
     for peak, style, colour in ((1.0, "-", "C0"), (0.8, "--", "grey"), (1.2, "--", "grey")):
         law.plot([0, peak - 0.2, 1.4], [peak, 0.2, 0.2], style, color=colour, lw=1.1)
     law.plot([0.8, 0.8], [0, 0.2], ":", color="black", lw=0.8)
     law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
-    law.set_xticks((0.8,), (r"$d_\mathrm{c}$",))
-    law.set_yticks((0.2, 1.0), (r"$\tau_\mathrm{r}$", r"$\tau_\mathrm{p}(x)$"))
-    law.set(xlabel=r"slip $\delta$", xlim=(0, 1.4), ylim=(0, 1.3))
     tau_p = d["representative"]["strength"].values / MEAN
     field.plot(X, tau_p, color="C0", lw=0.9)
     low, high = common.span(tau_p, common.STRENGTHS)
     # The upper half is for the inset.
-    field.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
+    field.set(xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
-    for name, style, label in (
-        ("correlation", "-", r"$\tau_\mathrm{p}$"), ("gaussian_correlation", ":", "$z$")
-    ):  # fmt: skip
+    curves = (("correlation", "-", r"$\tau_\mathrm{p}$"), ("gaussian_correlation", ":", "$z$"))
+    for name, style, label in curves:
         correlation = d.at("theory", name, FIRST)
         inset.plot(X * L / H, correlation, style, color="black", lw=0.9, label=label)
     inset.set(xlim=(0, 2.4 * FIRST), ylabel=r"$C$", yticks=(0, 1))
@@ -51,9 +43,9 @@ def figure_1(d: Data):
     inset.legend(loc="upper right", handlelength=1.2)
     s = np.linspace(LOW, HIGH, 300)
     density.plot(LAW.pdf(s) * MEAN, s / MEAN, color="C0")
-    density.set(ylim=field.get_ylim(), xlabel=rf"$f(\tau_\mathrm{{p}})\,${MEAN_P}")
+    density.set(ylim=field.get_ylim())
     density.tick_params(labelleft=False)
-    return figure, system, load, law, field
+    return figure
 
 
 def _system(axes) -> None:
@@ -68,13 +60,12 @@ def _system(axes) -> None:
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
     axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color="C1")
     axes.text(0.93, 0.72, r"$\tau_0(t)$", va="center")
-    axes.set(xlim=(0, 1), ylim=(-0.9, 0.9))
     axes.axis("off")
 
 
 def figure_2(d: Data):
     """Draw the mapping from z to the strength, and the spectrum."""
-    rows = (["z", "strength"], 2 * ["spectrum"])
+    rows = (["a", "strength"], ["b", "b"])
     figure, left, right, axes = common.mosaic(4.9, rows, (1.1, 1.0))
     z, s = np.linspace(-3.5, 3.5, 300), np.linspace(*common.span((LOW, HIGH)), 300)
     peak = max(LAW.pdf(s)) * MEAN
@@ -89,8 +80,7 @@ def figure_2(d: Data):
         left.plot([value, 3.5], [level, level], ":o", color=colour, lw=0.9, markevery=[0])
         right.plot([strength, s[0] / MEAN], [level, level], ":o", color=colour, lw=0.9,
                    markevery=[0])  # fmt: skip
-    left.set(xlabel="$z$", ylabel="cumulative probability", ylim=(0, 1.02), xlim=(-3.5, 3.5))
-    right.set(xlabel=TAU_P, ylim=(0, 1.02), xlim=(s[0] / MEAN, s[-1] / MEAN))
+    right.set(ylim=(0, 1.02), xlim=(s[0] / MEAN, s[-1] / MEAN))
     right.tick_params(labelleft=False)
     for panel in (left, right):
         panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
@@ -104,8 +94,8 @@ def figure_2(d: Data):
     for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
         axes.axvline(place, color="grey", lw=0.8, ls=":")
         axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
-    axes.set(xlabel=r"$k/\lambda$", ylabel=r"$g(k)/g(0)$", ylim=(floor, 3))
-    return figure, left, axes
+    axes.set(ylim=(floor, 3))
+    return figure
 
 
 PLACE = 0.75
@@ -121,7 +111,7 @@ def _shifted(study, name: str) -> np.ndarray:
 def figure_3(d: Data):
     """Draw one rupture: slip rate in space and time, load, strength."""
     study, solid = d["representative"], PROBLEM.solid
-    rows = (4 * ["zoom"], ["load"] + 3 * ["wide"], 4 * ["strength"])
+    rows = (4 * ["a"], ["b"] + 3 * ["wide"], 4 * ["c"])
     figure, zoom, load, wide, strength = common.mosaic(7.4, rows, (1.25, 1.25, 0.8))
     mean_stress = study["mean_stress"].values
     onset = float(study.time[mean_stress.argmax()])
@@ -133,24 +123,20 @@ def figure_3(d: Data):
     style = {"cmap": "inferno_r", "rasterized": True}
     picture = zoom.pcolormesh(X, (time - 1.0) * 1e4, slip_rate, norm=LogNorm(1e-5 * top, 3.0 * top),
                               **style)  # fmt: skip
-    zoom.set(ylim=(-0.2 * late, late), ylabel=r"$(t/T-1)\times10^{4}$", xlim=(0, 1))
-    for speed, text in (
-        (solid.shear_wave_speed, r"$c_\mathrm{s}$"),
-        (solid.dilatational_wave_speed, r"$c_\mathrm{d}$"),
-    ):
+    zoom.set(ylim=(-0.2 * late, late))
+    for name, speed in (("s", solid.shear_wave_speed), ("d", solid.dilatational_wave_speed)):
         way = 0.6 * late * 1e-4 * onset * speed / L
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
         zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color="black", lw=1.2, ls="--")
+        text = rf"$c_\mathrm{{{name}}}$"
         zoom.text(PLACE - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
     label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
     figure.colorbar(picture, ax=zoom, label=label)
     stress = mean_stress / mean_stress.max()
     load.plot(stress, time, color="C0")
     wide.pcolormesh(X, time, slip_rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
-    load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03), ylabel="$t/T$",
-             xlabel=r"$\tau_0/\tau_\mathrm{cr}$")  # fmt: skip
-    wide.set(xlim=(0, 1), xlabel="$x/L$")
+    load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03))
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, PLACE)):
         axes.plot(place, 1, "o", color="black", ms=4, clip_on=False)
@@ -160,20 +146,18 @@ def figure_3(d: Data):
     above = tau_p.max() + 0.08
     strength.errorbar(PLACE, above, xerr=0.5 * H / L, color="firebrick", capsize=3, lw=1.4)
     strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color="firebrick")
-    strength.set(xlabel="$x/L$", ylabel=TAU_P, xlim=(0, 1), ylim=(None, above + 0.08))
-    return figure, zoom, load, strength
+    strength.set(xlim=(0, 1), ylim=(None, above + 0.08))
+    return figure
 
 
 def figure_4(d: Data):
     """Draw the nucleation stress of one field, and theory against the ruptures."""
-    figure, top, middle, bottom = common.stacked(7.6, 3, ratios=(0.9, 1.0, 1.3))
-    tau_p, tau_n = (
-        _shifted(d["representative"], name) / MEAN for name in ("strength", "tau_n")
-    )
+    figure, top, middle, bottom = common.mosaic(7.6, "a;b;c", (0.9, 1.0, 1.3))
+    shown = d["representative"]
+    tau_p, tau_n = (_shifted(shown, name) / MEAN for name in ("strength", "tau_n"))
     top.plot(X, tau_p, "--", color="grey", lw=0.8, label=r"$\tau_\mathrm{p}$")
     top.plot(X, tau_n, color="C1", label=r"$\tau_\mathrm{n}$")
     top.plot(X[tau_n.argmin()], tau_n.min(), "o", color="black", ms=5)
-    top.set(xlabel="$x/L$", ylabel=rf"stress ${OVER_MEAN}", xlim=(0, 1))
     top.legend(loc="upper right", ncols=2)
     bottom.plot([0, 1], [0, 1], color="grey", lw=0.8)
     for ratio in SIMULATED:
@@ -188,26 +172,23 @@ def figure_4(d: Data):
             place, predicted, off = is_misplaced(d, ratio, "printed")
             bottom.plot(predicted[off] / L, place[off] / L, "x", color="firebrick", ms=6)
     middle.axhline(0, color="grey", lw=0.8)
-    middle.set(xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN} of the rupture",
-               ylabel="theory above rupture (%)")  # fmt: skip
     middle.legend(title=XI, ncols=3)
-    bottom.set(xlabel=r"predicted $x_\mathrm{cr}/L$", ylabel=r"simulated $x_\mathrm{cr}/L$",
-               xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")  # fmt: skip
-    return figure, top, middle, bottom
+    return figure
 
 
 def figure_5(d: Data):
     """Draw strength, nucleation stress and onset at all correlation lengths."""
-    rows = [[f"field {ratio}", "strengths", "minima"] for ratio in RATIOS]
-    rows += [["nucleation", "densities", "."], 3 * ["stress"], 3 * ["place"]]
+    names = ("a", *(f"field {ratio}" for ratio in RATIOS[1:]))
+    rows = [[name, "strengths", "minima"] for name in names]
+    rows += [["b", "densities", "."], 3 * ["c"], 3 * ["d"]]
     heights = (*len(RATIOS) * (1.5 / len(RATIOS),), 0.9, 0.9, 0.6)
-    figure, first, strengths, minima, *panels = common.mosaic(8.4, rows, heights,
-                                                              width_ratios=(4, 1, 1.2))  # fmt: skip
-    *fields, nucleation, densities, stress, place = first, *panels
+    figure, *panels = common.mosaic(8.4, rows, heights, width_ratios=(4, 1, 1.2))
+    first, strengths, minima, *fields, nucleation, densities, stress, place = panels
+    fields = [first, *fields]
     s = np.linspace(LOW, HIGH, 300)
     strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color="black")
     low, high = common.span(common.STRENGTHS)
-    strengths.set(ylim=(low, high), title=r"$f(\tau_\mathrm{p})$")
+    strengths.set(ylim=(low, high))
     shown = {minima: [], nucleation: [], stress: []}
     for ratio, strip in zip(RATIOS, fields, strict=True):
         look = common.line(ratio)
@@ -242,25 +223,19 @@ def figure_5(d: Data):
         axes.tick_params(labelleft=axes is strengths)
     for axes in (nucleation, densities):
         axes.set_ylim(common.span(*shown[nucleation]))
-    fields[1].set_ylabel(TAU_P, y=0.0)
+    fields[1].set_ylabel(r"$\tau_\mathrm{p}/\langle\tau_\mathrm{p}\rangle$", y=0.0)
     minima.yaxis.tick_right()
     minima.tick_params(labelright=True)
     minima.locator_params(axis="y", nbins=5)
-    limits = common.span(*shown[minima], margin=0.0)
-    minima.set(ylim=limits, title=r"$f(\min\tau_\mathrm{p})$")
-    nucleation.set(ylabel=TAU_N, xlabel="$x/L$", xlim=(0, 1))
-    densities.set_title(r"$f(\tau_\mathrm{n})$")
+    minima.set(ylim=common.span(*shown[minima], margin=0.0))
     error = 2 * np.sqrt(20.0 / d.size.samples)
     place.axhspan(1 - error, 1 + error, color="0.93", lw=0, zorder=0)
     if setting.SUPPORT[0] > 0.0:
         stress.axvline(LOW / MEAN, color="grey", lw=0.8, ls=":")
         shown[stress].append(LOW / MEAN)
-    stress.set(xlim=common.span(*shown[stress], margin=0.02), ylim=(0, None),
-               xlabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}",
-               ylabel=rf"$f(\tau_\mathrm{{cr}})\,${MEAN_P}")  # fmt: skip
-    place.set(xlim=(0, 1), ylim=(0, None), xlabel=r"$x_\mathrm{cr}/L$",
-              ylabel=r"$f(x_\mathrm{cr})\,L$")  # fmt: skip
-    return figure, fields[0], nucleation, stress, place
+    stress.set(xlim=common.span(*shown[stress], margin=0.02), ylim=(0, None))
+    place.set(xlim=(0, 1), ylim=(0, None))
+    return figure
 
 
 _PLACES = np.array([np.log2(FIRST) - 1.2, *np.log2(RATIOS), np.log2(LAST) + 1.2])
@@ -283,12 +258,12 @@ def _statistics(axes, table, end) -> None:
     for place in (_PLACES[0] + 0.6, _PLACES[-1] - 0.6):
         axes.text(place, 0, "//", transform=axes.get_xaxis_transform(), ha="center", va="center",
                   fontsize=9)  # fmt: skip
-    axes.set(xlabel=XI, xlim=common.span(_PLACES))  # also without a limit at infinity
+    axes.set(xlim=common.span(_PLACES))  # also without a limit at infinity
 
 
 def figure_6(d: Data):
     """Draw mean, median and lower quartile of tau_n and of tau_cr."""
-    figure, top, bottom = common.stacked(6.4, 2, ratios=(0.85, 1.3))
+    figure, top, bottom = common.mosaic(6.4, "a;b", (0.85, 1.3))
     edges = np.linspace(LOW, HIGH, d["moments"].sizes["cell"] + 1) / MEAN
     table = []
     for ratio in RATIOS:
@@ -297,60 +272,51 @@ def figure_6(d: Data):
         average = mean(1.0 + d.at("moments", "powers", ratio)[:, 0])
         table.append((average, *map(Number, quartiles)))
     _statistics(top, table, [1.0, *LAW.ppf([0.5, 0.25]) / MEAN])
-    top.set(ylabel=TAU_N)
     top.legend(loc="lower left")
     onsets = [d.stress(ratio) / MEAN for ratio in RATIOS]
     table = [(mean(row), quantile(row, 0.5), quantile(row, 0.25)) for row in onsets]
     low = LOW / MEAN if setting.SUPPORT[0] > 0.0 else np.nan  # no limit without a bound
     _statistics(bottom, table, [low, low, low])
-    bottom.set(ylabel=rf"$\tau_\mathrm{{cr}}{OVER_MEAN}")
     bottom.axhline(low, color="grey", lw=0.8, ls=":")
     places = np.log2(SIMULATED)
     raw = [d.stress(ratio, "ruptures").mean() / MEAN for ratio in SIMULATED]
     errors = [2 * d.stress(ratio, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
               for ratio in SIMULATED]  # fmt: skip
+    look = {"fmt": "D", "color": "firebrick", "mfc": "none", "ms": 6, "lw": 0.8}
     inset = bottom.inset_axes((0.42, 0.46, 0.56, 0.52))
     for axes in (bottom, inset):
-        drawn = axes.errorbar(
-            places, raw, errors, fmt="D", color="firebrick", mfc="none", ms=6, lw=0.8
-        )
+        drawn = axes.errorbar(places, raw, errors, **look)
     best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
     inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color="C0", ms=4)
     inset.plot(places, best, "x", color="firebrick", ms=7)
     common.ratio_axis(inset)
-    inset.set(xlabel="", ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
+    inset.set(ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
     bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc=(0.02, 0.12))
-    return figure, top, bottom
+    return figure
 
 
 def figure_7(d: Data):
     """Draw correlation, eigenfunction and the variance of tau_n."""
-    figure = common.new(5.4)
-    correlation, eigenfunction, *variances = figure.subplots(2, 2).flat
+    figure, correlation, eigenfunction, *variances = common.mosaic(5.4, "ab;cd")
     theory = d["theory"]
     for ratio in RATIOS:
         values = theory["correlation"].sel(correlation_ratio=ratio)
         correlation.plot(theory.x / L, values, **common.line(ratio), label=f"{ratio:g}")
-    correlation.set(xlim=(0, min(1.9 * LAST * H / L, 0.5)), xlabel=r"$\xi/L$",
-                    ylabel=r"$C(\xi)$")  # fmt: skip
+    correlation.set(xlim=(0, min(1.9 * LAST * H / L, 0.5)))
     correlation.legend(title=XI)
     s = np.linspace(-1, 1, 200)
     eigenfunction.plot(s, (0.925 - 0.308 * s**2) * np.sqrt(1 - s**2), color="C0")
-    eigenfunction.set(xlabel="$s$", ylabel="$v_0(s)$", ylim=(0, None))
+    eigenfunction.set(ylim=(0, None))
     slope = float(theory["infinite"][0] / theory["ratio"][0])
     powers = d["moments"]["powers"].mean("sample")
     sampled = (powers[:, 1] - powers[:, 0] ** 2) * (MEAN / setting.DEVIATION) ** 2
     for axes, high in zip(variances, (8, 1), strict=True):
-        axes.plot(theory["ratio"], theory["infinite"], color="C0",
-                  label="infinite interface")  # fmt: skip
-        axes.plot(theory["usable"], theory["periodic"], "--", color="C1",
-                  label="this interface")  # fmt: skip
-        axes.plot(
-            [0, 1.0 / slope], [0, 1.0], ":", color="firebrick", label=rf"{slope:.2f} {XI}"
-        )
+        axes.plot(theory.ratio, theory.infinite, color="C0", label="infinite interface")
+        axes.plot(theory.usable, theory.periodic, "--", color="C1", label="this interface")
+        short = rf"{slope:.2f} {XI}"
+        axes.plot([0, 1.0 / slope], [0, 1.0], ":", color="firebrick", label=short)
         axes.plot(RATIOS, sampled, "o", color="black", ms=4)
-        axes.set(xlim=(0, high), xlabel=XI, ylim=(0, 1.02))
+        axes.set(xlim=(0, high), ylim=(0, 1.02))
         axes.axhline(1.0, color="grey", lw=0.8, ls="--")
-    variances[0].set_ylabel(r"Var[$\tau_\mathrm{n}$]/Var[$\tau_\mathrm{p}$]")
     variances[0].legend(loc="lower right")
-    return figure, correlation, eigenfunction, *variances
+    return figure
