@@ -1,6 +1,9 @@
 """Progress of long work: what it shows and where, and when its time is over."""
 
+import contextlib
+import errno
 import io
+import os
 import re
 import sys
 import threading
@@ -53,6 +56,60 @@ def test_a_pipe_gets_few_lines_the_last_at_the_end(hasty, capsys):
     done = [int(line.removeprefix("long work: ").split()[0]) for line in lines]
     assert done == sorted(done)
     assert "of 60 samples" in lines[0]
+
+
+def a_pipe_without_reader():
+    reader, writer = os.pipe()
+    os.close(reader)
+    return os.fdopen(writer, "w")
+
+
+def a_closed_stream():
+    stream = io.StringIO()
+    stream.close()
+    return stream
+
+
+def a_terminal_that_hung_up():
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+        def write(self, text):
+            raise OSError(errno.EIO, "Input/output error")
+
+    return Terminal()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize(
+    "stream", [a_pipe_without_reader, a_closed_stream, a_terminal_that_hung_up, lambda: None]
+)
+def test_work_goes_on_when_nobody_can_read_its_progress(stream, hasty, monkeypatch, capsys):
+    """Somebody closes the terminal, or the pipe's reader ends, while hours of samples remain."""
+    monkeypatch.setenv("TERM", "xterm")
+    gone = stream()
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stderr", gone)
+        meter = Meter("unwatched", 20)
+        work(meter)
+    if gone is not None and not gone.closed:
+        with contextlib.suppress(OSError):
+            gone.close()
+    assert meter.done == 20
+    assert progress._running == []
+    assert capsys.readouterr().out == ""
+
+
+def test_an_interruption_at_the_end_leaves_no_meter_behind(hasty, monkeypatch):
+    def interrupt(meter, last=False):
+        if last:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Meter, "_write_line", interrupt)
+    with pytest.raises(KeyboardInterrupt), Meter("interrupted", 2) as meter:
+        meter._line_due = 1.0
+    assert progress._running == []
 
 
 def test_a_terminal_gets_a_bar_that_goes_away_with_warnings_above_it(hasty, monkeypatch):

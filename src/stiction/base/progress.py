@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
@@ -21,6 +22,8 @@ SILENCE = 1.0
 """Seconds without a bar, because short work needs none."""
 PIPE_INTERVAL, NOTEBOOK_INTERVAL = 10.0, 0.5
 """Seconds between lines in a pipe, at least, and between updates in a notebook."""
+GONE = AttributeError, OSError, ValueError
+"""Errors of a stderr that is None, hung up, a broken pipe or closed. The work goes on."""
 
 interrupted = threading.Event()
 """Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
@@ -94,21 +97,28 @@ class Meter:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._display is not None:
-            self._starter.cancel()
-            self._display.stop()
-            self._starter.join()
-            self._display.stop()  # if it had just started
-        elif _running[:1] == [self] and self._line_due > PIPE_INTERVAL:
-            self._write_line(last=True)
-        if self in _running:
-            _running.remove(self)
+        try:
+            if self._display is not None:
+                self._starter.cancel()
+                with suppress(*GONE):
+                    self._display.stop()
+                self._starter.join()
+                with suppress(*GONE):
+                    self._display.stop()  # if it had just started
+            elif _running[:1] == [self] and self._line_due > PIPE_INTERVAL:
+                self._write_line(last=True)
+        finally:  # also after Ctrl-C in these lines
+            if self in _running:
+                _running.remove(self)
 
     def _write_line(self, last: bool = False) -> None:
         """Write a line for a pipe if it is due: few lines, however long the work takes."""
         if last or self.elapsed >= self._line_due:
             self._line_due = max(self.elapsed + PIPE_INTERVAL, 1.1 * self.elapsed)
-            print(f"{_shown().what}: {_shown().text}", file=sys.stderr, flush=True)
+            text = f"{_shown().what}: {_shown().text}\n"
+            with suppress(*GONE):
+                sys.stderr.write(text)
+                sys.stderr.flush()
 
 
 SILENT = Meter("", show=False)
@@ -125,8 +135,9 @@ def _shown() -> Meter:
 
 def _display() -> Any:
     """Return what shows a running meter between `start` and `stop`, or None for a pipe."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        return _bar()
+    with suppress(*GONE):
+        if sys.stderr.isatty():
+            return _bar()
     return _Output() if "ipykernel" in sys.modules else None
 
 
