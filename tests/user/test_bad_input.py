@@ -105,3 +105,49 @@ def test_a_ready_made_sample_gives_what_its_profiles_give():
     for other in (problem, dataclasses.replace(problem, load=st.Load())):
         found = st.onset(other, other.sample(given), method=st.Equilibrium(slip=True))
         assert found.equals(st.onset(other, given, method=st.Equilibrium(slip=True)))
+
+
+def test_a_mistake_in_a_list_names_its_place_whatever_holds_the_list():
+    """Positions, also in an array; a misplaced argument is told every name that a class takes."""
+    for spacing in ((1.0, -1.0), np.array([1.0, -1.0])):
+        with pytest.raises(st.InputError, match=r"(?m)spacing\.1: must be greater than 0"):
+            st.read_profile([[1.0, 2.0]], spacing=spacing)
+    with pytest.raises(st.InputError, match=r"by name \(valid: .*youngs_modulus\)"):
+        st.Solid(7e10, 0.3, 2700.0, "strain", 1.0)
+
+
+def test_a_whole_number_of_any_kind_selects_a_drawn_sample():
+    problem = make_problem()
+    strength = beta_strength(2e-3).sample(problem.interface, samples=2)
+    result = st.onset(problem, strength, method=LOCAL)
+    drawn = {
+        float(st.plot.onset(result, strength, sample=sample).lines[0].get_ydata()[0])
+        for sample in (1, 1.0, np.int64(1))
+    }
+    assert len(drawn) == 1
+
+
+def test_a_model_of_others_may_hold_plain_dataclasses():
+    """A key that such a dataclass does not have stands beside the other mistakes."""
+
+    @dataclasses.dataclass
+    class Plain:
+        p: float
+
+    @st.extensions.model
+    class Owner:
+        plain: Plain
+        either: st.Solid | Plain | None = None
+
+    with pytest.raises(st.InputError) as refusal:
+        Owner({"p": "x", "q": 3}, {"r": 1.0})
+    problems = refusal.value.problems
+    assert "Owner.plain: unknown 'q'" in problems
+    assert "Owner.either: unknown 'r'" in problems
+    assert any(text.startswith("Owner.plain.p: must be a valid number") for text in problems)
+
+
+def test_an_absent_file_of_interfaces_is_not_called_wrong_json(tmp_path):
+    (tmp_path / "study.toml").write_text('random = "gone.json"\n')
+    with pytest.raises(st.InputError, match=r"gone\.json: does not exist"):
+        st.Study.from_toml(tmp_path / "study.toml")

@@ -305,6 +305,7 @@ def explain(
 def _steps_into(given: Any, steps: Sequence[int | str], missing: bool) -> Iterator[str]:
     """Yield the steps that lead into a value. Other steps of pydantic are members of unions."""
     for step in steps:
+        given = given.tolist() if isinstance(given, np.ndarray) else given
         keys = range(len(given)) if isinstance(given, list | tuple) else given
         if isinstance(keys, Mapping | range) and step in keys:
             given = given[step]
@@ -322,10 +323,12 @@ def named(error: pydantic.ValidationError, valid: Sequence[str]) -> pydantic.Val
     misspelt = set()
     for mistake in mistakes:
         if mistake["type"] == "unexpected_keyword_argument":
-            (name,) = mistake["loc"]
-            misspelt.add((nearest(name, valid),))
-            cause = {"error": InputError(unknown(name, valid))}
-            mistake |= {"type": "value_error", "loc": (), "ctx": cause}
+            *path, name = mistake["loc"]
+            text = f"unknown {name!r}" if path else unknown(name, valid)
+            if not path:  # otherwise it belongs to a dataclass that is no model
+                misspelt.add((nearest(name, valid),))
+            cause = {"error": InputError(text)}
+            mistake |= {"type": "value_error", "loc": tuple(path), "ctx": cause}
     kept = [
         mistake
         for mistake in mistakes
@@ -409,6 +412,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
     wrapped.__signature__ = plain_signature(wrapped, keys)
     door = Door(cls.__name__, wrapped.__signature__, cls.__name__)
+    door.names = valid_keys(wrapped)
     return wrapped
 
 

@@ -220,7 +220,7 @@ def onset(
     is_plane = problem.interface.is_plane
     size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
-        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[sample], row)
+        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[int(sample)], row)
         if ax is None:  # below new axes, but inside axes of the caller, whose layout stays
             axes.figure.legend(loc="outside lower center", ncols=2)
         else:

@@ -82,7 +82,7 @@ def specimen(
     top.set_ylabel(f"height ({unit})")
     x = interface.x * scale
     if rows is not None:
-        tau_p = rows[sample]
+        tau_p = rows[int(sample)]
         below.plot(x, tau_p / np.nanmean(tau_p), color=QUIET, linewidth=0.7, label="strength")
     below.plot(x, blocks.shear, label="shear of the drive $q$", **series(0))
     below.plot(x, blocks.pressure, label="pressure $p$", **series(1))

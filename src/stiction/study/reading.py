@@ -105,8 +105,9 @@ def validated(
 def _stored_interfaces(path: Path) -> list[Any]:
     """Return the interfaces in a file that `Study.to_toml` wrote."""
     with prefixed(str(path)):
+        content = content_of(path)
         try:
-            interfaces = json.loads(content_of(path))
+            interfaces = json.loads(content)
         except (RecursionError, ValueError) as error:
             raise InputError(f"is not valid JSON: {error}") from None
         return list(check("interfaces", interfaces, list))
