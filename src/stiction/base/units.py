@@ -228,10 +228,12 @@ def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
         number = np.ma.filled(number.astype(np.float64), np.nan)
     has_none = isinstance(number, list | tuple) and any(item is None for item in number)
     if has_none or (isinstance(number, np.ndarray) and number.dtype == object):
-        with suppress(
-            TypeError, ValueError, OverflowError
-        ):  # texts are refused where numbers are checked
+        try:
             number = np.array(number, dtype=np.float64)  # None becomes NaN
+        except OverflowError:
+            raise InputError("must be numbers below 1e308") from None
+        except (TypeError, ValueError):
+            pass  # texts are refused where numbers are checked
     return number, unit
 
 
