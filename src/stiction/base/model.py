@@ -357,8 +357,9 @@ class Door:
             raise InputError(
                 f"{self.owner}: give the arguments by name (valid: {', '.join(self.names)})"
             )
+        by_place = (given.pop("self"),) if "self" in given else ()  # pydantic 2.11 needs it so
         try:
-            return validated(**given)
+            return validated(*by_place, **given)
         except pydantic.ValidationError as error:
             error = named(error, self.names)
             raise InputError(explain(error, given, self.root, self.owner)) from None
