@@ -96,7 +96,7 @@ def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
     return readers[ending](content_of(path))
 
 
-def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008
+def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008  # a tuple
     """Read a table of numbers from a text file or a sheet of a workbook.
 
     Semicolons, tabs, commas or blanks separate columns. Lines that
