@@ -232,8 +232,8 @@ def test_a_page_of_a_design(tmp_path):
     assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
     source = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
     evidence = [st.Lognormal(mean=1.0, cv=0.1)]
-    path = st.write_design_page(
-        design, tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
+    path = design.write_page(
+        tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
         title="Lap joint 7",
     )  # fmt: skip
     text = path.read_text(encoding="utf-8")
@@ -246,14 +246,12 @@ def test_a_page_of_a_design(tmp_path):
     assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
     refuses(
         "sources: ... load.weight ... is not an input",
-        lambda: st.write_design_page(
-            design, path, problem=PROBLEM, sources={"load.weight": "scales"}
-        ),
+        lambda: design.write_page(path, problem=PROBLEM, sources={"load.weight": "scales"}),
     )
     demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
     refuses(
         "design: must come from st.design_stress",
-        lambda: st.write_design_page(demand, path, problem=PROBLEM),
+        lambda: demand.write_page(path, problem=PROBLEM),
     )
     # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
     means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))

@@ -699,9 +699,7 @@ def _answer(
         if page is not None:
             path = page.with_stem(page.stem + (f"_{point.number}" if point.values else ""))
             title = study.title or "Design of a joint"
-            st.write_design_page(
-                answer, path, problem=experiment.problem, evidence=evidence, title=title
-            )
+            answer.write_page(path, problem=experiment.problem, evidence=evidence, title=title)
             echo(f"page: {path}")
 
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from stiction import plot
 from stiction.base.errors import InputError
 from stiction.base.files import write_whole
-from stiction.base.model import FilePath, checked, to_plain
+from stiction.base.model import to_plain
 from stiction.base.units import in_words
 from stiction.base.variables import UNITS
 from stiction.cli.report import Page
@@ -27,65 +27,18 @@ MAX_SHOWN_VALUES = 8
 """Values of an input that are listed."""
 
 
-@checked
-def write_design_page(
+def write_page(
     design: Answer,
-    path: FilePath,
-    *,
+    place: Path,
     problem: Problem,
-    evidence: Sequence[Any] = (),
-    sources: Mapping[str, str] | None = None,
-    title: str = "Design of a joint",
+    evidence: Sequence[Any],
+    sources: Mapping[str, str],
+    title: str,
 ) -> Path:
-    """Write a design as an HTML page: force, inputs with units, evidence, doubts, sensitivities.
-
-    Parameters
-    ----------
-    design : Answer
-        From `stiction.design_stress`.
-    path : path
-        HTML file.
-    problem : Problem
-        The problem for which the design was computed. Its constants are the inputs.
-    evidence : sequence
-        Results on which the design rests, such as a fit, a posterior or an agreement.
-        They are printed on the page. Their doubts and notes are listed as doubts.
-    sources : mapping, optional
-        The sources of inputs by dotted key, such as ``{"load.pressing_force":
-        "drawing 12"}``. An input without a source is called 'assumed'.
-    title : str
-
-    Returns
-    -------
-    path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If the answer is not a design.
-    StoreError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=256)
-    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> design = st.design_stress(
-    ...     problem, strength, probability=1e-2, method=st.LocalCriterion(), target_cv=0.3
-    ... )
-    >>> page = st.write_design_page(
-    ...     design, Path(tempfile.mkdtemp()) / "design.html", problem=problem
-    ... )
-    >>> "reliability index" in page.read_text()
-    True
-    """
+    """Write a design as an HTML page. See `Answer.write_page`."""
     if not design.of_stress:
         raise InputError("design: must come from st.design_stress, got a failure probability")
-    place, page = Path(path), Page(title)
+    page = Page(title)
     page.text(f"{date.today().isoformat()}; stiction, {versions()}.")
     page.table("Design", ["quantity", "value"], _numbers(design))
     page.text(
@@ -100,7 +53,7 @@ def write_design_page(
             plot.sensitivities(design, ax=figure.subplots())
             page.figure(figure, "What moves the design. The band is its interval.")
         page.table("What moves the design", *_moves(design))
-    page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources or {}))
+    page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources))
     doubts = [*design.warnings, *design.doubts, *unseen_batch(design.specimens)]
     for item in evidence:
         page.listing(f"Evidence: {type(item).__name__}", str(item))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any, Self, TypeAlias, TypeVar
 
 import numpy as np
@@ -22,7 +24,7 @@ from stiction.base.errors import (
     texts_of,
     warn_accuracy,
 )
-from stiction.base.model import Count, Real
+from stiction.base.model import Count, FilePath, Real, Text, checked
 from stiction.base.progress import Meter, Show
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import in_words
@@ -32,6 +34,7 @@ from stiction.ensemble.limit_state import LimitState, StressName
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
+from stiction.problem.problem import Problem
 from stiction.random.equally_likely import MAX_MEMBERS, origin
 from stiction.reliability.counting import CONFIDENCE
 from stiction.reliability.tail import TailPoint, guide_of
@@ -233,6 +236,66 @@ class Answer(Result):
     def stress_above_bound(self) -> float:
         """`stress` minus `lower_bound`, Pa."""
         return self.stress - self.lower_bound
+
+    @checked
+    def write_page(
+        self,
+        path: FilePath,
+        *,
+        problem: Problem,
+        evidence: Sequence[Any] = (),
+        sources: Mapping[str, str] | None = None,
+        title: Text = "Design of a joint",
+    ) -> Path:
+        """Write a design as an HTML page: force, inputs, evidence, doubts and sensitivities.
+
+        Parameters
+        ----------
+        path : path
+            HTML file.
+        problem : Problem
+            The problem for which the design was computed. Its constants are the inputs.
+        evidence : sequence
+            Results on which the design rests, such as a fit, a posterior or an agreement.
+            They are printed on the page. Their doubts and notes are listed as doubts.
+        sources : mapping, optional
+            The sources of inputs by dotted key, such as ``{"load.pressing_force":
+            "drawing 12"}``. An input without a source is called 'assumed'.
+        title : str
+
+        Returns
+        -------
+        path
+            The file.
+
+        Raises
+        ------
+        InputError
+            If the answer is not a design.
+        StoreError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
+        >>> design = st.design_stress(
+        ...     problem, strength, probability=1e-2, method=st.LocalCriterion(), target_cv=0.3
+        ... )
+        >>> page = design.write_page(
+        ...     Path(tempfile.mkdtemp()) / "design.html", problem=problem
+        ... )
+        >>> "reliability index" in page.read_text()
+        True
+        """
+        # The page is drawn by an upper layer, which is imported when it is needed.
+        pages = import_module("stiction.cli.design_page")
+        place = Path(path)
+        pages.write_page(self, place, problem, evidence, sources or {}, title)
+        return place
 
     def _summary(self) -> Summary:
         ends = self.interval if self.of_stress else ()
