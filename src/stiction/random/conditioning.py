@@ -23,7 +23,7 @@ The caller only replaces the draws.
 Algorithm (`conditioned`)
 -------------------------
 The method is expectation propagation (T. P. Minka, Uncertainty in Artificial
-Intelligence 17, 2001), followed by a map for the skewness that Gaussians miss:
+Intelligence 17, 2001), followed by an estimate of the skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place,
    as if no other value had been measured.
@@ -40,9 +40,9 @@ Intelligence 17, 2001), followed by a map for the skewness that Gaussians miss:
    values (`_from_others`).
 5. Repeat from step 2 until these means no longer change, at most
    `MAX_UPDATES` times.
-6. Map draws before the regression, so that they have the density (1)
-   instead of its Gaussian approximation (`stiction.random.transport`,
-   which also estimates the remaining error).
+6. Estimate the error of the Gaussian approximation, for a warning
+   (`_estimate_error`): weight samples of (2) by the density (1), and
+   compare weighted and plain moments of z.
 7. Compare the misfit of values and draws at the mean with chi-square,
    for a warning.
 
@@ -52,7 +52,7 @@ definite), b and p are reduced by a common factor. In step 4 each place
 keeps at least half of the precision that it has without measurements.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
@@ -73,13 +73,6 @@ from stiction.problem.profiles.labels import in_si, unit_of
 from stiction.problem.profiles.placing import MEASURED
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition, layout
-from stiction.random.transport import (
-    ErrorEstimate,
-    LogRatio,
-    Transport,
-    make_transport,
-    transport,
-)
 
 # Limits of errors and warnings
 MAX_CHI_SQUARE = 5.0  # of suitable values, in standard deviations above its mean
@@ -105,7 +98,10 @@ MIN_EIGENVALUE = -0.9  # smallest s^2; the eigenvalues of P^-1 are 1 + s^2
 MIN_VARIANCE = 1e-12
 MIN_DEVIATION = 1e-4  # of a measured z; the map is linear across less, and needs no updates
 
-QUANTILE_SAMPLES = 1024  # for quantiles beyond the Gaussian
+N_CHECK_SAMPLES = 1024  # of step 6
+
+LogRatio = Callable[[Array], Array]
+"""Logarithm of l_k divided by its Gaussian, at every place k and values z (places, ...)."""
 
 
 class ReadPoints(np.ndarray):
@@ -214,9 +210,9 @@ class Measured(NamedTuple):
     marginal: Any
     phi: Array
 
-    def log_likelihood(self, places: NDArray[np.int64], z: Array) -> Array:
-        """Return log l_k at places (indices) and z (places, ...), or -inf without a quantile."""
-        value = self.conditions.values[places].reshape(-1, *(1 for _ in z.shape[1:]))
+    def log_likelihood(self, z: Array) -> Array:
+        """Return log l_k at every place and z (places, ...), or -inf without a quantile."""
+        value = self.conditions.values.reshape(-1, *(1 for _ in z.shape[1:]))
         misfit = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
         # Far out in the tail scipy may have no quantile.
         return np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
@@ -238,7 +234,7 @@ class Measured(NamedTuple):
             half_range = np.maximum(0.5 * (high - low), MIN_HALF_RANGE)[:, None]
             z = 0.5 * (low + high)[:, None] + half_range * np.linspace(-1.0, 1.0, RANGE_NODES)
             square = (z - mean[:, None]) ** 2 / variance[:, None]
-            log_density = self.log_likelihood(np.arange(len(z)), z) - 0.5 * square
+            log_density = self.log_likelihood(z) - 0.5 * square
             return half_range, z, log_density
 
         half_range, z, log_density = evaluate()
@@ -301,37 +297,29 @@ class Regression(NamedTuple):
         return out
 
 
+class ErrorEstimate(NamedTuple):
+    """Largest errors of conditioned draws, over all places."""
+
+    mean: float  # of z, in standard deviations of z
+    deviation: float  # of the standard deviation of z, as a share of it
+
+
 class Conditioning(NamedTuple):
     """Map from standard normal draws to draws given measured values. See `conditioned`."""
 
     regression: Regression
-    mapped: Transport  # of the draws, before the regression
-    remaining_error: ErrorEstimate
+    error: ErrorEstimate
     misfit: float  # squared, of values and of draws at the mean of the posterior
     points: int
 
     def draws(self, draws: Array) -> Array:
         """Return conditioned draws with shape (samples, dimension)."""
-        out = np.array(draws)
-        if len(self.mapped.basis):
-            transport(*self.mapped, out, np.zeros(len(out)))
-        return self.regression.apply(out)
+        return self.regression.apply(np.array(draws))
 
     def quantile_at(self, phi: Array, probability: float) -> Array:
-        """Return the quantile of z = phi @ draws at each point.
-
-        The quantile is exact for the regression. Samples estimate the
-        effect of the map.
-        """
+        """Return the quantile of z = phi @ draws at each point."""
         mean, deviation = self.regression.moments(phi)
-        quantile = mean + float(ndtri(probability)) * deviation
-        if len(self.mapped.basis):
-            draws = np.random.default_rng(0).standard_normal((QUANTILE_SAMPLES, phi.shape[1]))
-            mapped, unmapped = self.draws(draws), self.regression.apply(draws.copy())
-            for i, row in enumerate(phi):  # the difference scatters less than a quantile
-                with_map = np.quantile(mapped @ row, probability)
-                quantile[i] += with_map - np.quantile(unmapped @ row, probability)
-        return quantile
+        return mean + float(ndtri(probability)) * deviation
 
     def warn(self) -> None:
         """Warn about measured values that do not suit the field."""
@@ -340,8 +328,8 @@ class Conditioning(NamedTuple):
                 "given: the measured values are unlikely for this field (chi-square"
                 f" {self.misfit:.4g} for {self.points}). Check marginal, length and noise"
             )
-        if max(self.remaining_error) > MAX_POSTERIOR_ERROR:
-            mean, deviation = self.remaining_error
+        if max(self.error) > MAX_POSTERIOR_ERROR:
+            mean, deviation = self.error
             warn_accuracy(
                 "given: the field is approximate where it was measured: its mean is off by up to"
                 f" about {mean:.2g} of its standard deviation, which is off by"
@@ -365,19 +353,17 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
         if np.abs(cavity[0] - previous_mean).max() < SETTLED_MEAN or update == MAX_UPDATES:
             break
         shift, precision = _gaussians(measured, cavity)
-    # 6. The regression gives z = mean + (along / gain) w with standard
-    # normal w. Map w to (1).
+    # 6. The regression gives z = mean + (along / gain) w with standard normal w.
     along, gain = phi @ regression.right, np.sqrt(1.0 + regression.power)
     mean = along @ (regression.data[0] / gain**2)
     log_ratio = _log_ratio(measured, shift, precision, mean)
-    mapped, remaining_error = make_transport(log_ratio, mean, along / gain)
-    mapped = mapped._replace(basis=np.ascontiguousarray(mapped.basis @ regression.right.T))
+    error = _estimate_error(log_ratio, mean, along / gain)
     # 7. Squared misfits of the values and of the draws.
     flat = np.zeros_like(mean)  # with a flat Gaussian, the ratio is the likelihood
-    log_likelihood = _log_ratio(measured, flat, flat, mean)(np.arange(mean.size), mean)
+    log_likelihood = _log_ratio(measured, flat, flat, mean)(mean)
     draws = regression.data[0] / (1.0 + regression.power)
     misfit = -2.0 * float(log_likelihood.sum()) + float(draws @ draws)
-    return Conditioning(regression, mapped, remaining_error, misfit, len(phi))
+    return Conditioning(regression, error, misfit, len(phi))
 
 
 def _gaussians(
@@ -397,24 +383,41 @@ def _gaussians(
 def _log_ratio(
     measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
 ) -> LogRatio:
-    """Return a function of place and z: the log ratio of l_k to its Gaussian.
+    """Return a function of z: the log ratio of l_k to its Gaussian at every place k.
 
     The Gaussian is scaled to 1 at the `mean`, because a constant factor
     at a place does not matter.
     """
 
-    def log_ratio(places: NDArray[np.int64], z: Array) -> Array:
-        log_likelihood, shape, begin = np.empty(z.shape), (-1, *(1 for _ in z.shape[1:])), 0
-        for values in measured:
-            inside = (places >= begin) & (places < begin + len(values.phi))
-            log_likelihood[inside] = values.log_likelihood(places[inside] - begin, z[inside])
-            begin += len(values.phi)
-        off = z - mean[places].reshape(shape)
-        slope = (shift - precision * mean)[places].reshape(shape)
-        gaussian: Array = off * (slope - 0.5 * precision[places].reshape(shape) * off)
+    def log_ratio(z: Array) -> Array:
+        shape = (-1, *(1 for _ in z.shape[1:]))
+        ends = np.cumsum([len(values.phi) for values in measured])[:-1]
+        parts = zip(measured, np.split(z, ends), strict=True)
+        log_likelihood = np.concatenate([values.log_likelihood(part) for values, part in parts])
+        off = z - mean.reshape(shape)
+        slope = (shift - precision * mean).reshape(shape)
+        gaussian: Array = off * (slope - 0.5 * precision.reshape(shape) * off)
         return np.maximum(log_likelihood, LOG_OF_IMPOSSIBLE) - gaussian
 
     return log_ratio
+
+
+def _estimate_error(log_ratio: LogRatio, mean: Array, slopes: Array) -> ErrorEstimate:
+    """Step 6: compare samples of z = mean + slopes w with the same samples, weighted by (1)."""
+    draws = np.random.default_rng(0).standard_normal((N_CHECK_SAMPLES, slopes.shape[1]))
+    z = draws @ slopes.T  # less its mean
+    log_weight = log_ratio(mean[:, None] + z.T).sum(axis=0)
+    weight = np.exp(log_weight - log_weight.max())
+    # Truncated weights, so that a few samples do not dominate.
+    weight = np.minimum(weight / weight.mean(), np.sqrt(N_CHECK_SAMPLES))
+    weight /= weight.sum()
+    plain_mean, plain_deviation = z.mean(axis=0), z.std(axis=0)
+    weighted_mean = weight @ z
+    weighted_deviation = np.sqrt(weight @ (z - weighted_mean) ** 2)
+    return ErrorEstimate(
+        float(np.abs((weighted_mean - plain_mean) / plain_deviation).max()),
+        float(np.abs(weighted_deviation / plain_deviation - 1.0).max()),
+    )
 
 
 def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
