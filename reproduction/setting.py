@@ -103,7 +103,7 @@ FIELD = _own.random.properties["strength"]
 H = PROBLEM.nucleation_length  # nucleation length h_n, m
 L = PROBLEM.interface.measure
 G_STAR = PROBLEM.effective_modulus
-W = PROBLEM.uniform_weakening_rate  # weakening rate, Pa/m
+W = PROBLEM.friction.uniform_weakening_rate  # weakening rate, Pa/m
 STRAIN = PROBLEM if PARAMETERS else _study("strain").problem
 """The same with the printed modulus, G/(1 - nu), which belongs to plane strain."""
 PRINTED_H = STRAIN.nucleation_length

@@ -107,7 +107,7 @@ def test_load_that_varies_along_the_interface():
     )
     problem = make_problem(128, load=load)
     tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
-    one, two = windows_of(problem, problem.uniform_weakening_rate)[0].spectrum[[3, 2]]
+    one, two = windows_of(problem, problem.friction.uniform_weakening_rate)[0].spectrum[[3, 2]]
 
     def tau_n(at):
         strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))

@@ -86,7 +86,7 @@ def test_nucleation_stress_is_the_least_weighted_mean_over_a_patch():
 def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
     """The smallest of each shape on whose nodes K has an eigenvalue up to W, by whole matrices."""
     shape, spacings = PLANE.interface.shape, PLANE.interface.spacings
-    W = PLANE.uniform_weakening_rate
+    W = PLANE.friction.uniform_weakening_rate
     matrix = dense(symbol_of(PLANE), shape)
     x, y = (np.fft.fftfreq(n, 1.0 / (n * h)) for n, h in zip(shape, spacings, strict=True))
     least = np.inf

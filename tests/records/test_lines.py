@@ -8,6 +8,7 @@ from recording import Calls, compared
 from setups import EXACT, LOCAL, make_problem, without
 
 import stiction as st
+from stiction.problem.resolution import nodes_in_nucleation_length
 
 calls = Calls()
 INTERFACE = LINE.interface
@@ -130,7 +131,7 @@ def loads_with_an_edge_and_a_gradient():
 def nodes_in_the_nucleation_length_of_a_law_that_falls_late():
     late = st.PiecewiseWeakening(weakening_rate=5e9, slip=(0.5, 1.0), strength=(0.99, 0.0))
     problem = make_problem(512, 0.05, friction=late)
-    return [problem.nucleation_length, *problem.nodes_in_nucleation_length(5e9)]
+    return [problem.nucleation_length, *nodes_in_nucleation_length(problem, 5e9)]
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

@@ -28,6 +28,7 @@ from stiction.ensemble import monte_carlo
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
 from stiction.inference.peaks import make_peaks
+from stiction.problem.unit_doubts import doubt_strengths
 
 LINE, PROBLEM = st.Interface(0.1, 256), make_problem()
 SCALELESS = make_problem(weakening_rate=None)
@@ -116,7 +117,7 @@ def scaled(modulus=1e9, density=1170.0, length=0.1, pressure=None, **weakening):
 
 
 def judged(mean=1e6, **given):
-    scaled(**given).warn_of_units(mean)
+    doubt_strengths(scaled(**given), mean)
 
 
 KNOWN = xr.DataArray(FIELD.sample(LINE, seed=9)[0][:90], {"x": LINE.x[:90]}, "x")

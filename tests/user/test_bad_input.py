@@ -10,6 +10,7 @@ from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.methods.equilibrium.solver import follow_to_sliding
+from stiction.problem.unit_doubts import doubt_sample, doubt_strengths
 
 LINE, PLANE = st.Interface(0.1, 256), st.Interface((0.5, 0.5), (4096, 4096))
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)
@@ -63,8 +64,9 @@ def test_objects_are_frozen_compare_and_hash_by_value():
 
 DOUBTFUL = {
     "density in g/cm3": lambda: st.Solid(1e9, 0.33, 1.17),
-    "initial stress in MPa": lambda: make_problem(load=st.Load(initial_stress=0.1)).doubt(
-        make_problem(load=st.Load(initial_stress=0.1)).sample(ONE)
+    "initial stress in MPa": lambda: doubt_sample(
+        make_problem(load=st.Load(initial_stress=0.1)),
+        make_problem(load=st.Load(initial_stress=0.1)).sample(ONE),
     ),
     "a station in km": lambda: st.Save(stations={"a": 1.5e-4}).nodes(LINE),
 }
@@ -92,7 +94,7 @@ def test_what_people_study_raises_no_doubt():
         with warnings.catch_warnings(action="error", category=st.UnitWarning):
             law, load = st.LinearWeakening(friction), st.Load(initial_stress=1e-4 * strength)
             system = st.Problem(st.Solid(*solid), interface, law, load)
-            system.warn_of_units(strength)
+            doubt_strengths(system, strength)
 
 
 def test_a_ready_made_sample_gives_what_its_profiles_give():

@@ -26,6 +26,7 @@ from typer.models import OptionInfo
 import stiction as st
 from stiction.base.errors import InputError, RunError, collect_warnings, printable, unknown_name
 from stiction.base.progress import Meter, duration, interrupted
+from stiction.problem.resolution import nodes_in_nucleation_length
 
 MAX_SHOWN_LINES = 12
 """Points, failures or damaged chunks in a list."""
@@ -360,11 +361,11 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
         ("standard deviation", unit): field.standard_deviation,
         ("correlation length", "m (to 1/e)"): field.efolding_length(),
     }
-    W = problem.uniform_weakening_rate
+    W = problem.friction.uniform_weakening_rate
     if W is None:  # the nucleation length varies along the interface
         return numbers
     numbers["nucleation length", "m"] = problem.nucleation_length
-    numbers["nodes in h_n", ""] = min(problem.nodes_in_nucleation_length(W))
+    numbers["nodes in h_n", ""] = min(nodes_in_nucleation_length(problem, W))
     return numbers
 
 

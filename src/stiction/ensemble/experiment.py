@@ -31,6 +31,7 @@ from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
 from stiction.problem.sample import Sample
+from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
@@ -167,7 +168,8 @@ class Experiment:
             friction = self.problem.friction
             residual = float(friction.residual(np.array(means["strength"])).mean())
             scales = {name: means[name] for name in SCALES if name in means}
-            self.problem.warn_of_units(
+            doubt_strengths(
+                self.problem,
                 means["strength"], means.get("residual_strength", residual), scales,
                 initial=abs(means["initial_stress"]) if "initial_stress" in means else None,
             )  # fmt: skip

@@ -71,6 +71,7 @@ from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
+from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import AnyRandom, Source, as_random
 from stiction.random.stresses import mean_in_stress
 
@@ -289,8 +290,8 @@ def _of_parameters(
     """Return the posterior of the parameters in a prior (steps 2 to 5)."""
     variable = variable_of(*prior.at(prior.middle), measured.unit)
     (experiment,) = experiments_at(prior, prior.middle, simulation.method)
-    experiment.problem.warn_of_units(
-        mean_in_stress(experiment.problem, experiment.random, "strength")
+    doubt_strengths(
+        experiment.problem, mean_in_stress(experiment.problem, experiment.random, "strength")
     )
     # 2.
     _check_reach(prior, simulation.method, measured, error)

@@ -32,6 +32,7 @@ from stiction.problem.problem import Problem, refusals
 from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import study_attributes
 from stiction.problem.sample import Sample
+from stiction.problem.unit_doubts import doubt_sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -163,7 +164,7 @@ def onset(
     attributes = study_attributes(problem=problem, method=method)
     # Profiles pass the checks for users' data here, and nowhere else.
     sample, measured = problem.placed_sample(profiles, optional_member(method, "accepts"), gaps)
-    problem.doubt(sample)
+    doubt_sample(problem, sample)
     # Batches keep arrays small, and let the progress move.
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
     meter = Meter(f"onset by {method.label}", sample.samples, progress)

@@ -15,10 +15,8 @@ from pydantic import model_validator
 from stiction.base.arrays import Array
 from stiction.base.errors import (
     InputError,
-    UnitWarning,
     prefixed,
     warn_accuracy,
-    warn_user,
 )
 from stiction.base.model import Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
@@ -29,12 +27,12 @@ from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.placing import Gaps, turned
 from stiction.problem.profiles.reading import (
-    FRICTION,
     at_nodes,
     check_values,
     named_profiles,
     placed_profiles,
 )
+from stiction.problem.resolution import check_resolution, warn_if_short
 from stiction.problem.sample import Sample, contradictions_of
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks
@@ -42,25 +40,10 @@ from stiction.problem.specimen import Blocks
 if TYPE_CHECKING:
     from stiction.elasticity.driven import Driven
 
-MIN_NODES_IN_NUCLEATION = 4
-"""Nodes in a nucleation length."""
-HARDLY_RESOLVED = 0.04
-"""Nodes in a nucleation length below which a unit is doubted. Hundred times more are needed."""
-RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
-"""Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
-coefficient of 0.1 has 1e-8."""
-INITIAL = (1e-5, math.inf), (0.0, math.inf)
-"""Usual and possible sizes of an initial stress, if there is any, over the strength."""
-SLIP = (1e-8, math.inf), (1e-10, math.inf)
-"""Usual and possible slips over which strength falls, m. An atom measures 1e-10 m."""
-MIN_LENGTHS_IN_LINE = 4.0
-"""Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
 MIN_MACHINE_RATIO = 1e-4
 """Stiffness of a machine over that of its blocks below which it is probably in another unit."""
 MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
 """Height of blocks over their length between which their response takes seconds and below 1 GB."""
-AT_END = {"II": 0.445 / 1.158, "III": 0.5}
-"""Nucleation length at a free end as a share of the length in the middle."""
 NO_AREA = (
     "a force needs the area of the interface: give the thickness of the specimen, or"
     " interface.width of a line (m)"
@@ -145,8 +128,8 @@ class Problem:
             self._check_drive()
         weakening_rate = self.friction.weakening_rate
         if weakening_rate is not None:
-            self._check_resolution(float(np.max(weakening_rate)))
-            self._warn_if_short(float(np.median(weakening_rate)))
+            check_resolution(self, float(np.max(weakening_rate)))
+            warn_if_short(self, float(np.median(weakening_rate)))
         return self
 
     def _of_specimen(self) -> list[str]:
@@ -224,94 +207,6 @@ class Problem:
                 object.__setattr__(self, part, dataclasses.replace(owner, **placed))
         return problems
 
-    def _warn_if_short(self, weakening_rate: float) -> None:
-        patch = self.nucleation_lengths(weakening_rate * self.friction.steepening)[0]
-        length = min(self.interface.lengths)
-        if self.specimen is None and patch >= length:
-            warn_user(
-                f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
-                f" ({length:.3g} m). Check the units of length, shear modulus and weakening rate",
-                UnitWarning,
-            )
-        elif (
-            length < MIN_LENGTHS_IN_LINE * patch
-            and not self.interface.is_plane
-            and self.specimen is None
-        ):
-            warn_accuracy(
-                f"the interface is {length / patch:.2g} nucleation lengths long and continues"
-                " periodically. Under an antiplane load, free ends would lower its onset by about"
-                f" {min(3.0, 5.0 * patch / length):.1g} % on average and up to 17 % in single cases"
-            )
-
-    def doubt(self, sample: Sample) -> None:
-        """Warn about the units of given profiles, as `warn_of_units` does."""
-        pressure = float(sample.mean(sample.normal_pressure).mean())
-        self.warn_of_units(
-            sample.mean_strength,
-            float(sample.residual_strength.mean()),
-            pressure=None if math.isnan(pressure) else pressure,
-            initial=float(np.abs(sample.initial_stress).max()),
-        )
-
-    def warn_of_units(
-        self,
-        strength: float,
-        residual: float = 0.0,
-        scales: Mapping[str, Any] | None = None,
-        pressure: float | None = None,
-        initial: float | None = None,
-    ) -> None:
-        """Warn about mean peak and residual strengths (Pa) that do not fit the rest of the problem.
-
-        Raise an `InputError` for strengths that cannot fit, and for
-        scales of slip, given by name, that the grid does not resolve at
-        these strengths. By default, `pressure` and `initial`, the size
-        of the initial stress, come from the problem.
-        """
-        friction, modulus = self.friction, self.solid.shear_modulus
-        pressure = self.given_pressure if pressure is None else pressure
-        compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
-        if pressure is not None:
-            mean = float(np.mean(pressure))
-            compared.append(("strength", strength, "normal pressure", mean, FRICTION))
-        if residual:
-            compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
-        doubts = [
-            Doubt(
-                f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check the"
-                " units of both (Pa). Friction coefficients need of='friction_coefficient'",
-                mean / of,
-                *limits,
-            )
-            for name, mean, what, of, limits in compared
-        ]
-        drop = strength - float(np.mean(friction.residual(np.array(strength))))
-        if friction.weakening_rate is not None and drop > 0.0:
-            slip = drop / float(np.median(friction.weakening_rate))
-            text = (
-                f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, the"
-                " size of a few atoms. Check the units of strength, pressure and weakening_rate"
-            )
-            doubts.append(Doubt(text, slip, *SLIP))
-        if initial is None:
-            initial = float(np.max(np.abs(self.load.initial_stress)))
-        if initial:
-            text = (
-                f"initial_stress: its largest size, {initial:.4g} Pa, is"
-                f" {initial / strength:.2g} of the strength. Check its unit (Pa)"
-            )
-            doubts.append(Doubt(text, initial / strength, *INITIAL))
-        if doubt_units(doubts):
-            return
-        given = friction.scale if friction.weakening_rate is None else None
-        fixed = {} if given is None else dict([given])
-        for scale, value in (scales or fixed).items():
-            fall = np.array(strength - residual)
-            W = max(float(friction.weakening_rate_of(fall, scale, np.median(value))), 1e-300)
-            self._warn_if_short(W)
-            self._check_resolution(W)
-
     @property
     def blocks(self) -> Driven:
         """Stiffness and profiles of the specimen, which must be given."""
@@ -373,26 +268,13 @@ class Problem:
             return interface.breakable_measure
         return None if depth is None else interface.breakable_measure * depth
 
-    def stress_of(self, name: str, force: float) -> float:
-        """Return force (N) over area of the interface, Pa. An error message begins with `name`."""
-        if self.area is None:
-            raise InputError(f"{name}: {NO_AREA}")
-        return force / self.area
-
     @property
     def given_pressure(self) -> Any:
         """Given normal pressure, or force over area, Pa: a number or an array, if any."""
         force = self.load.pressing_force
         if force is None:
             return self.load.normal_pressure
-        return self.stress_of("load.pressing_force", force)
-
-    def refuse_specimen(self, what: str, instead: str) -> None:
-        """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
-        if self.specimen is not None:
-            raise InputError(
-                f"problem.specimen: {what} applies to half-spaces, not to finite blocks. {instead}"
-            )
+        return stress_of(self, "load.pressing_force", force)
 
     @property
     def normal_pressure(self) -> Any:
@@ -420,12 +302,6 @@ class Problem:
         return self.solid.effective_modulus(self.mode)
 
     @property
-    def uniform_weakening_rate(self) -> float | None:
-        """The problem's weakening rate, Pa/m, if it is the same at all nodes."""
-        W = self.friction.weakening_rate
-        return None if W is None or np.ptp(W) > 0.0 else float(np.max(W))
-
-    @property
     def nucleation_length(self) -> float:
         """h_n = 2 lambda_0 G*/W, m (Uenishi and Rice, 2003), for a uniform weakening rate.
 
@@ -433,12 +309,12 @@ class Problem:
         says that the rate varies along the interface or follows from
         other parameters.
         """
-        if self.uniform_weakening_rate is None:
+        if self.friction.uniform_weakening_rate is None:
             raise InputError(
                 "friction.weakening_rate: must be uniform for a nucleation length, about"
                 " (strength - residual_strength)/critical_slip. st.Equilibrium() works without it"
             )
-        steepest = self.uniform_weakening_rate * self.friction.steepening
+        steepest = self.friction.uniform_weakening_rate * self.friction.steepening
         return self.nucleation_lengths(steepest)[0]
 
     def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
@@ -451,70 +327,6 @@ class Problem:
             given = describe(weakening_rate)
             raise InputError(f"weakening_rate: must be a positive number, got {given}")
         return self.half_spaces.nucleation_lengths(weakening_rate)
-
-    def nodes_in_nucleation_length(self, weakening_rate: float) -> tuple[float, ...]:
-        """Return how many nodes span the nucleation length at a weakening rate (Pa/m).
-
-        There is a number for each direction. If the law steepens, its
-        steepest rate is used.
-        """
-        lengths = self.nucleation_lengths(weakening_rate * self.friction.steepening)
-        return tuple(np.divide(lengths, self.interface.spacings).tolist())
-
-    def _check_resolution(self, highest_weakening_rate: float) -> None:
-        resolution = self.nodes_in_nucleation_length(highest_weakening_rate)
-        if min(resolution) >= MIN_NODES_IN_NUCLEATION:
-            return self._check_extent(resolution)
-        steepest = highest_weakening_rate * self.friction.steepening
-        length = self.nucleation_lengths(steepest)[int(np.argmin(resolution))]
-        if min(resolution) < HARDLY_RESOLVED:
-            raise InputError(
-                "solid.shear_modulus, interface.length, friction: the nucleation length is"
-                f" {length:.3g} m, and the nodes are {self.interface.spacing:.3g} m apart. Check"
-                f" the units of the modulus, {self.solid.shear_modulus:g} Pa, of lengths, strengths"
-                f" and the weakening rate, {steepest:.3g} Pa/m"
-            )
-        least = MIN_NODES_IN_NUCLEATION
-        raise InputError(
-            f"interface.nodes: must be {self._finer(resolution, least)} or more. The nucleation"
-            f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} of {least} nodes"
-        )
-
-    def _check_extent(self, resolution: tuple[float, ...]) -> None:
-        """Refuse an extent narrower than the nucleation length, which is given in nodes."""
-        interface, breakable = self.interface, self.interface.breakable
-        if not interface.is_held or self.specimen is not None:  # blocks have no single length
-            return
-        for axis, dim in enumerate(interface.dims):
-            across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
-            width = np.count_nonzero(breakable.any(axis=across))
-            if width < int(resolution[axis]):
-                spacing = interface.spacings[axis]
-                raise InputError(
-                    f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
-                    f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen it"
-                )
-
-    def _finer(self, resolution: tuple[float, ...], wanted: int) -> str:
-        """Return the number of nodes for which the nucleation length spans `wanted` nodes."""
-        growth = wanted / np.maximum(resolution, 1e-300)
-        halves = np.ceil(0.5 * np.array(self.interface.shape) * growth)
-        return " x ".join(f"{2 * n:.10g}" for n in halves)
-
-    def warn_if_coarse(self, sample: Sample, enough: float, cost: str) -> None:
-        """Warn with the error `cost` if h_n spans fewer than `enough` nodes."""
-        resolution = self.nodes_in_nucleation_length(sample.steepest_weakening_rate)
-        if min(resolution) < enough:
-            spanned = f"{resolution[0]:.1f} nodes"
-            if self.interface.is_plane:
-                spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
-            if self.specimen is not None:
-                spanned += f", {AT_END[self.mode] * resolution[0]:.1f} at a free end"
-            wanted = 16 if enough <= 12.0 else 32
-            warn_accuracy(
-                f"the nucleation length spans {spanned}, and {wanted} are recommended"
-                f" (interface.nodes = {self._finer(resolution, wanted)}): {cost}"
-            )
 
     def sample(self, profiles: Any, *, accept: Collection[str] = ()) -> Sample:
         """Return validated profiles of samples. Profiles that are not given come from the problem.
@@ -576,7 +388,7 @@ class Problem:
                     f"strength is not above residual_strength at {percent} of the nodes. These do"
                     " not weaken: their strength is constant"
                 )
-        self._check_resolution(sample.steepest_weakening_rate)
+        check_resolution(self, sample.steepest_weakening_rate)
         return sample, measured
 
     def constants(self, strength: Any) -> dict[str, Any]:
@@ -693,6 +505,21 @@ class Problem:
         if np.isnan(sample.normal_pressure).all():
             del given["normal_pressure"]
         return given
+
+
+def stress_of(problem: Problem, name: str, force: float) -> float:
+    """Return force (N) over area of the interface, Pa. An error message begins with `name`."""
+    if problem.area is None:
+        raise InputError(f"{name}: {NO_AREA}")
+    return force / problem.area
+
+
+def refuse_specimen(problem: Problem, what: str, instead: str) -> None:
+    """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
+    if problem.specimen is not None:
+        raise InputError(
+            f"problem.specimen: {what} applies to half-spaces, not to finite blocks. {instead}"
+        )
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

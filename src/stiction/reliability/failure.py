@@ -36,7 +36,7 @@ from stiction.base.variables import ONSET_VARIABLES, PROFILES
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
 from stiction.methods.protocol import MethodObject, label
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, stress_of
 from stiction.problem.results import along, study_attributes
 from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.reliability.answer import (
@@ -186,7 +186,7 @@ def failure_probability(
         )
     [name] = asked
     if force is not None:
-        stress = problem.stress_of("force", force)
+        stress = stress_of(problem, "force", force)
 
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(

@@ -11,7 +11,7 @@ from stiction.base.model import checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.methods.criterion.local import check_law
 from stiction.methods.criterion.windows import windows_of
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, refuse_specimen
 from stiction.random.fields import RandomField
 
 
@@ -88,7 +88,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     True
     """
     scale, load, initial = stationary(problem, strength)
-    weakening_rate = problem.uniform_weakening_rate
+    weakening_rate = problem.friction.uniform_weakening_rate
     assert weakening_rate is not None  # checked by `stationary`
     (window,) = windows_of(problem, weakening_rate, stretches=(1.0,))
     power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
@@ -118,7 +118,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     `InputError` if any of them varies along the interface.
     """
     check_law(problem)
-    problem.refuse_specimen("this", "sample the nucleation stress with st.monte_carlo")
+    refuse_specimen(problem, "this", "sample the nucleation stress with st.monte_carlo")
     load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.of is None else problem.given_pressure
     varying = {
@@ -129,7 +129,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
         ),
         "strength: is conditioned on measured values": strength.conditions is not None,
         "friction.weakening_rate: varies or follows from the strength": (
-            problem.uniform_weakening_rate is None
+            problem.friction.uniform_weakening_rate is None
         ),
     }
     why = "so the nucleation stress is not stationary. Sample it with st.monte_carlo instead"

@@ -38,7 +38,7 @@ from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, stress_of
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import (
     FIRST_MEMBERS,
@@ -266,7 +266,7 @@ class Study(_Parts):
         """Refuse a demand or a station that does not fit a point of the sweep."""
         question = self.reliability
         if question is not None and question.force is not None:
-            point.problem.stress_of("reliability.force", question.force)
+            stress_of(point.problem, "reliability.force", question.force)
         if question is not None and question.friction_coefficient and not point.pressure > 0.0:
             raise InputError(
                 "reliability.friction_coefficient: needs a normal pressure (Pa,"

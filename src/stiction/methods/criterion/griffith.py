@@ -30,7 +30,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Flag, Positive, Real, RealArray, checked, describe
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, refuse_specimen
 
 MIN_POINTS = 512  # Gauss-Chebyshev points along a crack, exact to round-off for smooth drops
 SHORT_LENGTHS = np.geomspace(1e-6, 1.0, 40, endpoint=False)  # below one node spacing
@@ -165,7 +165,7 @@ def _stress_drops(problem: Problem) -> Array:
     """Return stress drops (2, nodes) at the nodes, Pa: without a load, and by a unit load."""
     if problem.interface.is_plane:
         raise InputError("problem: must have a line interface")
-    problem.refuse_specimen("the theory of cracks between half-spaces", "use st.Equilibrium()")
+    refuse_specimen(problem, "the theory of cracks between half-spaces", "use st.Equilibrium()")
     if problem.friction.residual_ratio is not None:
         raise InputError(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa."

@@ -36,8 +36,9 @@ from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.onset_bracket import rms_difference
 from stiction.methods.criterion.windows import windows_of
 from stiction.problem.friction import SCALES
-from stiction.problem.problem import Problem, refusals
+from stiction.problem.problem import Problem, refusals, refuse_specimen
 from stiction.problem.profiles.reading import named_profiles
+from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.results import onset_variables, position
 from stiction.problem.sample import Sample
 
@@ -135,7 +136,7 @@ class LocalCriterion:
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"
                 f" as at zero slip, but the local criterion uses the rate at zero slip{INSTEAD}"
             )
-        if friction.weakening_rate is not None and problem.uniform_weakening_rate is None:
+        if friction.weakening_rate is not None and friction.uniform_weakening_rate is None:
             reasons.append(
                 "friction.weakening_rate: varies along the interface, so the nucleation length is"
                 f" not defined{INSTEAD}"
@@ -158,7 +159,7 @@ class LocalCriterion:
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
         """Return why no length of patches is the same in all samples, or `None`."""
-        W = problem.uniform_weakening_rate
+        W = problem.friction.uniform_weakening_rate
         if not problem.friction.linear:
             return "strength does not fall linearly with slip"
         if W is None or varying & set(SCALES):
@@ -342,7 +343,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     True
     """
     check_law(problem)
-    problem.refuse_specimen("nucleation_stress", "st.LocalCriterion() gives its minimum")
+    refuse_specimen(problem, "nucleation_stress", "st.LocalCriterion() gives its minimum")
     sample, interface = problem.sample(tau_p), problem.interface
     _warn_if_coarse(problem, sample)
     # A profile has one nucleation length.
@@ -379,13 +380,13 @@ def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
     """Warn if the moving average covers too few nodes."""
     if problem.interface.is_plane:
         cost = "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4"
-        problem.warn_if_coarse(sample, 8.0, cost)
+        warn_if_coarse(problem, sample.steepest_weakening_rate, 8.0, cost)
     else:
         cost = (
             "if the strength varies within a quarter of it, the local criterion is off by about"
             " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength"
         )
-        problem.warn_if_coarse(sample, 12.0, cost)
+        warn_if_coarse(problem, sample.steepest_weakening_rate, 12.0, cost)
 
 
 def excess_of(sample: Sample) -> Array:

@@ -8,7 +8,12 @@ import numpy as np
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Reason, RuptureState, value_at
-from stiction.problem.problem import MIN_NODES_IN_NUCLEATION, Problem
+from stiction.problem.problem import Problem
+from stiction.problem.resolution import (
+    MIN_NODES_IN_NUCLEATION,
+    nodes_in_nucleation_length,
+    warn_if_coarse,
+)
 from stiction.problem.sample import Sample
 
 FAST_RISE = 1e-3
@@ -19,16 +24,17 @@ _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: war
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
 
 
-def warn_if_coarse(problem: Problem, rows: Sample) -> None:
+def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
     """Warn if the grid does not resolve the nucleation length, with the expected error."""
     # A power law through the largest errors of rough fields, relative
     # to 126 nodes: 16 %, 3 % and 0.6 % at 8, 16 and 32 nodes
     # (docs/validation.md).
-    nodes = min(problem.nodes_in_nucleation_length(rows.steepest_weakening_rate))
+    nodes = min(nodes_in_nucleation_length(problem, rows.steepest_weakening_rate))
     percent = 3.0 * (16.0 / nodes) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"
-    problem.warn_if_coarse(
-        rows,
+    warn_if_coarse(
+        problem,
+        rows.steepest_weakening_rate,
         15.0,
         f"expect {expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32). The"
         " critical load is far less sensitive",

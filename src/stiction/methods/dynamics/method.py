@@ -310,7 +310,7 @@ class Rupture:
         static = None if from_rest or loading_rate is None else static_program(problem)
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
-            checks.warn_if_coarse(problem, rows)
+            checks.warn_of_coarse_grid(problem, rows)
             summaries, rises = [], []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)

@@ -22,6 +22,7 @@ from stiction.problem.problem import Problem, refusals
 from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
+from stiction.problem.unit_doubts import doubt_sample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,14 +124,14 @@ def simulate_rupture(
     rows, measured = problem.placed_sample(profiles, method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")
-    problem.doubt(rows)
+    doubt_sample(problem, rows)
     if problem.specimen is not None:
         result = simulate_event(problem, rows, method, save, event, progress)
         return with_gaps(problem, result, measured)
     if event is not None:
         raise InputError("event: only specimens have numbered events. Leave it out")
     stations = save.nodes(problem.interface)
-    checks.warn_if_coarse(problem, rows)
+    checks.warn_of_coarse_grid(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)
     state = checks.at_first_slip(run)
     if state is None:

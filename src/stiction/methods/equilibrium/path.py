@@ -48,6 +48,7 @@ from stiction.methods.equilibrium.solver import (
 )
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
+from stiction.problem.unit_doubts import doubt_sample
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {
@@ -203,7 +204,7 @@ def equilibrium_path(
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")
-    problem.doubt(rows)
+    doubt_sample(problem, rows)
     # Slip and stress, each of 8 bytes, at every load and node.
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)

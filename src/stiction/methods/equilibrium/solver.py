@@ -53,6 +53,7 @@ from stiction.methods.equilibrium.sample import (
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneProgram
 from stiction.problem.problem import Problem
+from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.sample import Sample
 
 MIN_NODES_IN_NUCLEATION_LENGTH = 8.0
@@ -169,8 +170,9 @@ class OnsetSolver:
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
         warn_of_signs(self.problem)
-        self.problem.warn_if_coarse(
-            rows,
+        warn_if_coarse(
+            self.problem,
+            rows.steepest_weakening_rate,
             MIN_NODES_IN_NUCLEATION_LENGTH,
             ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)],
         )

@@ -161,6 +161,12 @@ class FrictionLaw(ABC):
                 return self.initial_slope * self.integral * drop**2 / value
         return np.broadcast_to(value, np.broadcast_shapes(value.shape, drop.shape))
 
+    @property
+    def uniform_weakening_rate(self) -> float | None:
+        """The weakening rate, Pa/m, if it is given and the same at all nodes."""
+        W = self.weakening_rate
+        return None if W is None or np.ptp(W) > 0.0 else float(np.max(W))
+
     def critical_slip_of(self, drop: Array, weakening_rate: Array) -> Array:
         """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
         return self.initial_slope * drop / weakening_rate

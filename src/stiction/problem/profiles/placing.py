@@ -287,7 +287,10 @@ def with_gaps(problem: Any, result: xr.Dataset, measured: Any) -> xr.Dataset:
     interface, position = problem.interface, result["critical_position"]
     if np.all(measured):
         return result
-    W, places = problem.uniform_weakening_rate, position.values.reshape(-1, len(interface.dims))
+    W, places = (
+        problem.friction.uniform_weakening_rate,
+        position.values.reshape(-1, len(interface.dims)),
+    )
     lengths = interface.spacings if W is None else problem.nucleation_lengths(W)
     near: Any = True
     for axis, (dim, length) in enumerate(zip(interface.dims, interface.lengths, strict=True)):
