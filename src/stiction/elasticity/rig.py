@@ -1,0 +1,155 @@
+"""Shear and pressure between a slider and a base, and the forces of their loads.
+
+Problem
+-------
+A slider S lies on a base B. Slip is d = u_S - u_B at the middles of n cells, and opening is
+w = v_S - v_B at their n + 1 edges. Let j = (d, w), F be the push and N the normal force per unit
+depth (N/m). Forces on cells and edges, also per unit depth, are
+
+    f = T F + T_p N - K j,    K = S_B A^-1 S_S,    T = S_B A^-1 g,    A = S_S + S_B        (1)
+    U = F/C + T'j,            1/C = g' A^-1 g - S_gg                                       (2)
+    elastic energy = F^2/(2 C) + j' K j/2                                                  (3)
+
+with shear forces f[:n], pressing forces -f[n:], and the travel U of the push without a constant
+part from N (Betti's theorem). S_S and S_B are the stiffness matrices of the bodies on their
+interface displacements. With a unit load, the held interface of the slider carries g, and the
+load travels by -S_gg.
+
+Algorithm
+---------
+1. Compute the bodies by columns (`columns.block`). The depth of both counts from the interface,
+   so that v changes its sign in the base.
+2. Reduce the top of the slider to coordinates: all its points if it is free, or a single v if
+   a rigid, frictionless plate lies on it.
+3. Eliminate the top: S_S, and g and S_gg for the push and for the normal force.
+4. Evaluate (1) and (2) with a Cholesky factor of A, and S_B = A - S_S. Rigid motions of the
+   slider, for which S_S is zero, then cause no force up to round-off.
+5. If the push acts along -x, mirror the rig. Slip and shear are positive along the push.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+
+from stiction.base.arrays import Array, one_blas_thread
+from stiction.elasticity.columns import Far, Interval, Material, block
+
+
+class Body(NamedTuple):
+    """A rectangular body: its height (m) and its material."""
+
+    height: float
+    material: Material
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """Stiffness and loads of a slider on a base with n cells, per unit depth.
+
+    The unknowns are slip at n cells and opening at n + 1 edges. Forces are
+    f = T F + T_p N - K j. Shear forces along the push are f[:n], and pressing forces are -f[n:].
+    """
+
+    K: Array  # (2n+1, 2n+1), Pa, symmetric
+    T: Array  # (2n+1,), forces of a unit push (1)
+    T_p: Array  # (2n+1,), forces of a unit normal force (1)
+    C: float  # stiffness of the bodies at the push, without slip and opening, Pa
+
+
+@lru_cache(maxsize=8)
+def contact_rig(
+    length: float,
+    nodes: int,
+    slider: Body,
+    base: Body,
+    *,
+    push: Interval | None,
+    pressing: Literal["soft", "plate"] = "soft",
+    tilt: float = 0.0,
+    behind: float = 0.0,
+    ahead: float = 0.0,
+    bottom: Far = "fixed",
+    towards: Literal[-1, 1] = 1,
+) -> Rig:
+    """Return the stiffness and the loads of a slider on a base.
+
+    Lengths are in m. `push` holds the lowest and the highest point of the pusher. Without a push,
+    a uniform shear acts on the top. A soft pressing is
+    N/L (1 + tilt (2 x/L - 1)), with x from the trailing end, and a plate does not rotate. The
+    base is longer than the slider by `behind` at the trailing end and by `ahead` at the leading
+    end. If its bottom lies on rollers, a frictionless stop holds its leading end. The
+    push acts along +x or -x (`towards`).
+    """
+    with one_blas_thread():
+        cell, n = length / nodes, nodes
+        # 1.
+        top = block(slider.height, cell, n, slider.material, push=push)
+        base_stiffness = block(
+            base.height, cell, n, base.material,
+            far=bottom, behind=behind, ahead=ahead, stop=bottom == "rollers",
+        )  # fmt: skip
+        size, signs = 2 * n + 1, np.repeat([1.0, -1.0], [n, n + 1])
+        base_stiffness *= np.outer(signs, signs)
+        # 2. and 3.
+        slider_stiffness, forces, travels = _loaded(top, n, push is None, pressing, tilt)
+        # 4.
+        factor = cholesky(slider_stiffness + base_stiffness, lower=True)
+        half, loads = (
+            solve_triangular(factor, part, lower=True) for part in (slider_stiffness, forces)
+        )
+        K = slider_stiffness - half.T @ half
+        T = forces - half.T @ loads
+        C = 1.0 / (loads[:, 0] @ loads[:, 0] - travels)
+    # 5.
+    order = np.arange(size)
+    if towards < 0:
+        order = np.concatenate([order[:n][::-1], order[n:][::-1]])
+    K, T = K[np.ix_(order, order)], T[order]
+    for array in (K, T):
+        array.flags.writeable = False
+    return Rig(K, T[:, 0], T[:, 1], float(C))
+
+
+def _loaded(
+    block: Array, n: int, sheared: bool, pressing: str, tilt: float
+) -> tuple[Array, Array, float]:
+    """Steps 2 and 3: return S_S, g for the push and for the normal force, and S_gg of the push."""
+    size = 2 * n + 1
+    surface, far, push = block[:size], block[size : 2 * size], block[2 * size :]
+    # Pressure is linear, so that its forces on linear functions are exact.
+    places = np.linspace(-1.0, 1.0, n + 1)
+    weights = np.full(n + 1, 1.0 / n)
+    weights[[0, -1]] *= 0.5
+    moments = weights * places
+    moments[[0, -1]] *= 1.0 - 2.0 / (3.0 * n)
+    loads = np.zeros((2 * size, 2))
+    loads[size + n :, 1] = -(weights + tilt * moments)
+    if sheared:
+        loads[size : size + n, 0] = 1.0 / n
+    else:
+        loads[:, 0] = -push[0, : 2 * size]
+    # 2.
+    basis = np.eye(size)
+    if pressing == "plate":
+        basis = np.append(basis[:, :n], np.repeat([[0.0], [1.0]], [n, n + 1], axis=0), axis=1)
+    factor = cho_factor(basis.T @ far[:, size : 2 * size] @ basis)
+    between, on_top = basis.T @ far[:, :size], basis.T @ loads[size:]
+    # 3.
+    solved = cho_solve(factor, np.column_stack([between, on_top]))
+    stiffness = surface[:, :size] - between.T @ solved[:, :size]
+    forces = loads[:size] - between.T @ solved[:, size:]
+    travel = -on_top[:, 0] @ solved[:, size] + (0.0 if sheared else push[0, -1])
+    # Translation, lift and (without a plate) rotation cause no force. The sums of merging leave
+    # up to 1e-13 of the diagonal, which A^-1 would amplify.
+    motions = np.zeros((size, 3 - (pressing == "plate")))
+    motions[:n, 0] = motions[n:, 1] = 1.0
+    motions[n:, 2:] = places[:, None]
+    motions = np.linalg.qr(motions)[0]
+    stiffness -= motions @ (motions.T @ stiffness)
+    stiffness -= (stiffness @ motions) @ motions.T
+    return 0.5 * (stiffness + stiffness.T), forces, float(travel)
