@@ -25,7 +25,7 @@ from scipy.special import ndtr
 
 import stiction as st
 from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import make_program
+from stiction.methods.equilibrium.solver import make_search
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """xi_0/h_n of Albertini et al. (2020)."""
@@ -245,11 +245,11 @@ def planes():
         plain = 5 * timed(lambda v=values: np.fft.ifft2(np.fft.fft2(v)))
         row("  local criterion", ours, [("five plain convolutions", plain)])
         row("  equilibrium", solver_time(problem, st.Equilibrium(), sample(), 3)[0])
-        program = make_program(problem)
-        one = sample_of(problem.sample(sample()), program.pieces, 0)
-        onset = timed(lambda p=program, s=one: p.next(s), 3)
-        found = program.next(one)
-        ours = timed(lambda p=program, s=one, f=found: p.jump(s, f), 3)
+        search = make_search(problem)
+        one = sample_of(problem.sample(sample()), search.pieces, 0)
+        onset = timed(lambda p=search, s=one: p.next(s), 3)
+        found = search.next(one)
+        ours = timed(lambda p=search, s=one, f=found: p.jump(s, f), 3)
         row("  its jump", ours, [("its onset", onset)])
     problem, strength = plane(128)
     friction = line(weakening_rate=0.5e12, residual_strength=0.65e6).friction

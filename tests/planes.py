@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.sample import LINEAR, make_sample
+from stiction.methods.equilibrium.strength import LINEAR, make_sample
 from stiction.methods.equilibrium.transforms.plane import AT_CORNER
 
 

@@ -16,10 +16,11 @@ import time
 import numpy as np
 
 import stiction as st
-from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.dynamics.summary import front_speeds
-from stiction.methods.equilibrium.sample import Outcome, PathStatus, sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
+from stiction.methods.equilibrium.endings import Outcome, PathStatus
+from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
 
 MACHINE = 2e7
 DRIVES = {
@@ -62,14 +63,14 @@ def compared(
     problem: st.Problem, samples: int, strengths: st.RandomField
 ) -> dict[str, list[float]]:
     """Return what is compared, a number for each event or each sample."""
-    program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
+    search, overdamped = RuptureSearch(problem, st.Rupture()), make_search(problem)
     names = ["shorter", "through", "drop", "seconds", "speed", "stress", "end", "count"]
     found: dict[str, list[float]] = {name: [] for name in names}
     for strength in strengths.sample(problem.interface, samples=samples, seed=1):
         rows = problem.sample(strength)
-        sample = sample_of(rows, program.pieces, 0)
+        sample = sample_of(rows, search.pieces, 0)
         began = time.process_time()
-        path = follow_to_sliding(program, sample)
+        path = follow_to_sliding(search, sample)
         found["seconds"].append(time.process_time() - began)
         found["count"].append(len(path.events))
         found["drop"].append(path.peak / follow_to_sliding(overdamped, sample).peak - 1.0)
@@ -79,8 +80,8 @@ def compared(
                 continue
             least = overdamped.jump(sample, before)
             arrested = least.outcome == Outcome.ARRESTED
-            event = program.event(sample, before)
-            event.run(program.max_steps)
+            event = search.event(sample, before)
+            event.run(search.max_steps)
             found["through"].append(float(arrested and after is None))
             if after is not None:  # as the waves leave it, before the rest comes to rest
                 short = least.state.slip - event.waves.slip

@@ -20,10 +20,10 @@ from scipy.optimize import brentq
 from scipy.special import comb
 
 import stiction as st
-from stiction.methods.dynamics.specimens import RuptureProgram
+from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.equilibrium.patches import line_patch
 from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"
@@ -313,15 +313,15 @@ def last_events(problem, strength, method=None):
     With a `Rupture` as method waves run on until all is at rest; without, until equilibrium.
     `slope` is that of a line through the times at which a front arrives, s/m.
     """
-    program = RuptureProgram(problem, method) if method else make_program(problem)
+    search = RuptureSearch(problem, method) if method else make_search(problem)
     x, rows = problem.interface.x, []
     for one in strength.sample(problem.interface, samples=CYCLES, seed=1):
-        sample = sample_of(problem.sample(one), program.pieces, 0)
-        path = follow_to_sliding(program, sample)
+        sample = sample_of(problem.sample(one), search.pieces, 0)
+        path = follow_to_sliding(search, sample)
         before, grows = path.last.slip, path.last.direction
         slope = crossed = np.nan
         if method:
-            event, moved = program.event(sample, path.last), np.inf
+            event, moved = search.event(sample, path.last), np.inf
             while moved > 1e-4 * (event.waves.slip - before).max():
                 slip = event.waves.slip.copy()
                 event.take_steps(event.mesh.window, ends=False)

@@ -11,11 +11,12 @@ from specimens import crooked, rough
 
 import stiction as st
 from stiction.methods.dynamics.mesh import condensed, layer_matrix, make_mesh
-from stiction.methods.dynamics.specimens import RuptureProgram, begin
+from stiction.methods.dynamics.specimens import RuptureSearch, begin
 from stiction.methods.dynamics.waves import block_at_rest, wave_steps
-from stiction.methods.equilibrium.sample import LINEAR, sample_of
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding as path_of
-from stiction.methods.equilibrium.solver import make_program
+from stiction.methods.equilibrium.solver import make_search
+from stiction.methods.equilibrium.strength import LINEAR
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
 FREE = st.Pusher(height=0.006, width=0.004)
@@ -172,7 +173,7 @@ def test_energy_is_kept(drive, mode, attenuation):
     W = 0.19e12 if mode == "II" else SLOW
     problem = crooked(nodes=48, drive=drive, mode=mode, weakening_rate=W)
     sample = of(problem, rough(problem, 2)[0])
-    path = path_of(make_program(problem), sample)
+    path = path_of(make_search(problem), sample)
     state = path.events[0].before if path.events else path.last
     mesh = make_mesh(problem)._replace(viscous_time=0.0, attenuation=attenuation)
     event = begin(sample, mesh, problem.blocks.stiffness, state, 0.5)
@@ -213,10 +214,10 @@ def test_energy_is_kept(drive, mode, attenuation):
 @pytest.mark.parametrize("drive", [LOW, st.Platen(stiffness=2e7)])
 def test_heavy_attenuation_comes_to_rest_where_an_overdamped_jump_does(drive):
     checked, problem = 0, crooked(nodes=64, drive=drive)
-    program, mesh = make_program(problem), make_mesh(problem)._replace(attenuation=3e5)
+    search, mesh = make_search(problem), make_mesh(problem)._replace(attenuation=3e5)
     for seed in range(1, 4):
         sample = of(problem, rough(problem, seed)[0])
-        for before, after, _ in path_of(program, sample).events[:3]:
+        for before, after, _ in path_of(search, sample).events[:3]:
             event = begin(sample, mesh, problem.blocks.stiffness, before, 0.5)
             event.take_steps(60 * mesh.window)
             moved = after.slip - before.slip
@@ -236,7 +237,7 @@ def test_a_mirrored_block_ruptures_like_its_mirror_image():
     strength = rough(left, 4)[0]
     for problem, profile in ((left, strength), (right, strength[::-1])):
         sample = of(problem, profile)
-        path = path_of(make_program(problem), sample)
+        path = path_of(make_search(problem), sample)
         state = path.events[0].before if path.events else path.last
         events.append(begin(sample, make_mesh(problem), problem.blocks.stiffness, state, 0.5))
         events[-1].run(10**6)
@@ -273,9 +274,9 @@ def test_an_event_that_has_come_to_rest_moves_no_further():
     problem = crooked(nodes=64, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
     x = problem.interface.x
     strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
-    program, sample = RuptureProgram(problem, st.Rupture()), of(problem, strength)
-    for before, _, _ in path_of(program, sample).events:
-        event = program.event(sample, before)
+    search, sample = RuptureSearch(problem, st.Rupture()), of(problem, strength)
+    for before, _, _ in path_of(search, sample).events:
+        event = search.event(sample, before)
         event.run(10**6)
         slip = event.waves.slip.copy()
         assert not event.slides
@@ -292,8 +293,8 @@ def test_half_the_spacing_changes_an_event_by_two_per_cent():
         problem = crooked(nodes=nodes, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
         x = problem.interface.x
         strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
-        program = RuptureProgram(problem, st.Rupture())
-        path = path_of(program, of(problem, strength))
+        search = RuptureSearch(problem, st.Rupture())
+        path = path_of(search, of(problem, strength))
         sizes = [np.ptp(one.after.slip - one.before.slip) for one in path.events]
         before, after, _ = path.events[int(np.argmax(sizes))]
         added = after.slip - before.slip

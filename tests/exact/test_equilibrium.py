@@ -14,10 +14,11 @@ from stiction.elasticity.line import stiffness_column
 from stiction.elasticity.stiffness import entry
 from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
-from stiction.methods.equilibrium.dense.program import DenseProgram
 from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
+from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.patches import count_patches, main_patch
-from stiction.methods.equilibrium.sample import LINEAR, make_sample, pieces_of, sample_of
+from stiction.methods.equilibrium.sample import pieces_of, sample_of
+from stiction.methods.equilibrium.strength import LINEAR, make_sample
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
 
@@ -59,12 +60,12 @@ def test_stiffness_of_a_third_kind_is_refused():
 
 def test_first_bound_is_a_bound(problem, make_strength):
     """A y <= 0 for the window chosen, where the weakening rate varies."""
-    program, symbol = DenseProgram(problem), symbol_of(problem)
+    search, symbol = DenseSearch(problem), symbol_of(problem)
     tau_p = make_strength(0.5).sample(problem.interface, samples=18, seed=6)
     for number, excess in enumerate(tau_p):
         W = 0.4e12 * (1.0 + 0.6 * np.sin((number % 9 + 1) * turns(256)))
         sample = make_sample(excess, np.zeros(256), np.ones(256), W, LINEAR)
-        _, y = program.bound(sample)
+        _, y = search.bound(sample)
         # The eigenvalue of the window may equal the rate: round-off of its eigenvector.
         assert (times(symbol, y) - W * y).max() < 1e-12 * W.max() * y.max()
         assert np.count_nonzero(y) < 128
@@ -82,12 +83,12 @@ def test_kernels_are_compiled_for_one_kind_of_array():
 
 def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     """From slip and multiplier that are allowed but not optimal."""
-    program = DenseProgram(problem)
+    search = DenseSearch(problem)
     excess = make_strength(0.5).sample(problem.interface, samples=1, seed=4)[0]
-    sample = sample_of(problem.sample(excess), program.pieces, 0)
-    load, multiplier = program.bound(sample)
+    sample = sample_of(problem.sample(excess), search.pieces, 0)
+    load, multiplier = search.bound(sample)
     # Without slip nothing below the weakest node is overstressed; above is the local bound.
-    workspace = make_workspace(program.elastic.entries, program.nodes)
+    workspace = make_workspace(search.elastic.entries, search.nodes)
     slip, Kd, Ky = np.zeros((3, 256))
     gap = certificate(sample, slip, Kd, multiplier, workspace, Ky)
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)

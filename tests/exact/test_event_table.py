@@ -13,7 +13,7 @@ import stiction as st
 from stiction.base.errors import StoreError
 from stiction.methods.dynamics.summary import rate_spectrum
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
-from stiction.methods.equilibrium.sample import EquilibriumState
+from stiction.methods.equilibrium.state import EquilibriumState
 from stiction.plot.ruptures import _line_film, crack_moment
 
 DROP = 2e5

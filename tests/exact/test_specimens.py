@@ -15,9 +15,11 @@ from specimens import crooked, rough
 import stiction as st
 from stiction.elasticity.protocol import DenseEntries
 from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
-from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
-from stiction.methods.equilibrium.sample import PathStatus, make_sample, pieces_of, sample_of
+from stiction.methods.equilibrium.endings import PathStatus
+from stiction.methods.equilibrium.sample import pieces_of, sample_of
+from stiction.methods.equilibrium.strength import make_sample
 from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")
@@ -206,11 +208,11 @@ def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
     problem = crooked(weakening_rate=weakening_rate, residual=0.0)
     strength = rough(problem, 11, 8)
     exact = first(problem, strength)
-    program, rows = DenseProgram(problem), problem.sample(strength)
+    search, rows = DenseSearch(problem), problem.sample(strength)
     above = []
     for i, stress in enumerate(exact):
-        sample = sample_of(rows, program.pieces, i)
-        bound, multiplier = program.bound(sample)
+        sample = sample_of(rows, search.pieces, i)
+        bound, multiplier = search.bound(sample)
         assert multiplier.min() >= 0.0
         assert multiplier @ sample.profile == pytest.approx(1.0)
         assert multiplier @ sample.excess == pytest.approx(bound)
@@ -251,7 +253,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     monkeypatch,
 ):
     """A pusher near the interface: of three samples, those closer than a fiftieth of the fall."""
-    monkeypatch.setattr(DenseProgram, "widest_gap", -1.0)
+    monkeypatch.setattr(DenseSearch, "widest_gap", -1.0)
     problem = crooked(
         nodes=128,
         residual=0.61e6,

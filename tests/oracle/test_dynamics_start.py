@@ -8,7 +8,7 @@ from setups import make_problem, within
 
 import stiction as st
 from stiction.methods.dynamics import slow_start as module
-from stiction.methods.dynamics.slow_start import slow_start, static_program
+from stiction.methods.dynamics.slow_start import slow_start, static_search
 from stiction.methods.equilibrium.sample import sample_of
 
 PROBLEM = st.paper.problem(nodes=512)
@@ -87,7 +87,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
     The run's own error at 2e7 Pa/s, seen by halving its steps, is 1e-5 of the stress scale.
     """
     method = st.Rupture(loading_rate=2e7, stop="onset")
-    tau_p, setting = profiles(0.5, 3), static_program(PROBLEM)
+    tau_p, setting = profiles(0.5, 3), static_search(PROBLEM)
     rest = solve(tau_p, loading_rate=2e7, stop="onset", start="rest")["critical_stress"]
     monkeypatch.setattr(module, "_MAX_ERROR", 1.0)
     for strength, exact in zip(tau_p, rest, strict=True):
@@ -124,20 +124,20 @@ def test_where_no_equilibrium_is_followed_it_begins_at_rest(initial_stress, exte
 def test_laws_without_straight_pieces_and_planes_have_no_equilibrium_to_begin_from():
     curved = st.ExponentialWeakening(weakening_rate=2e10)
     plane = make_problem((16, 16), (0.1, 0.1), weakening_rate=2e10)
-    assert static_program(make_problem(64, weakening_rate=2e10)) is not None
-    assert static_program(make_problem(64, friction=curved)) is None
-    assert static_program(plane) is None
+    assert static_search(make_problem(64, weakening_rate=2e10)) is not None
+    assert static_search(make_problem(64, friction=curved)) is None
+    assert static_search(plane) is None
 
 
 def test_the_state_at_the_start_is_that_of_the_slow_path():
     """Slip rates by central differences of equilibria; what is radiated only begins there."""
     run = run_of(CROOKED, CROOKED_STRENGTH, st.Rupture(loading_rate=1e7))
-    program, rows = static_program(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
-    state = slow_start(program, run, rows, 0, 1e7)
-    static, impedance = sample_of(rows, program.pieces, 0), run.medium.impedance
+    search, rows = static_search(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
+    state = slow_start(search, run, rows, 0, 1e7)
+    static, impedance = sample_of(rows, search.pieces, 0), run.medium.impedance
     load = state.now["load"] - impedance * state.slip_rate.mean() / 1.2  # <p>
-    step = 0.01 * (program.solve(static).load - load)
-    slips = [program.solve(static, load + side * step).slip for side in (-1.0, 1.0)]
+    step = 0.01 * (search.solve(static).load - load)
+    slips = [search.solve(static, load + side * step).slip for side in (-1.0, 1.0)]
     slip_rate = 1e7 * (slips[1] - slips[0]) / (2.0 * step)
     # Extrapolated as at a fold, by 1/16; on this grid the path is straight there.
     assert np.all(

@@ -8,10 +8,12 @@ from oracles import largest_load, relaxed
 from setups import SOLID, exact_onset, make_problem, turns
 
 import stiction as st
-import stiction.methods.equilibrium.dense.program
-from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.sample import PathStatus, Search, at_rest, sample_of
+import stiction.methods.equilibrium.dense.search
+from stiction.methods.equilibrium.dense.search import DenseSearch
+from stiction.methods.equilibrium.endings import PathStatus, Route
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding
+from stiction.methods.equilibrium.state import at_rest
 
 
 def assert_first(problem, tau_p, weakening_rate=None):
@@ -32,10 +34,10 @@ def assert_first(problem, tau_p, weakening_rate=None):
 def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
     tau_p = make_strength(ratio).sample(problem.interface, samples=5, seed=7)
     loads = assert_first(problem, tau_p).first_instability.values
-    rows, program = problem.sample(tau_p), DenseProgram(problem)
+    rows, search = problem.sample(tau_p), DenseSearch(problem)
     for row, load in enumerate(loads):
-        sample = sample_of(rows, program.pieces, row)
-        found = program.next(sample, replace(at_rest(sample), search=Search.EVENTS))
+        sample = sample_of(rows, search.pieces, row)
+        found = search.next(sample, replace(at_rest(sample), search=Route.EVENTS))
         assert found.status == PathStatus.UNSTABLE
         assert found.load == pytest.approx(load, rel=1e-11)
 
@@ -72,13 +74,13 @@ def test_transforms_agree_with_the_dense_factor(make_strength, monkeypatch):
     """Lines on which very many nodes slip are solved as planes are."""
     weakening_rate = 0.5e12 * (1.0 + 0.4 * np.sin(5 * turns(1024)))
     problem = make_problem(1024, weakening_rate=weakening_rate)
-    program = DenseProgram(problem)
+    search = DenseSearch(problem)
     rows = problem.sample(make_strength(0.25).sample(problem.interface, samples=3, seed=12))
-    samples = [sample_of(rows, program.pieces, row) for row in range(3)]
-    dense = [program.solve(sample) for sample in samples]
-    monkeypatch.setattr(stiction.methods.equilibrium.dense.program, "MAX_WEAK_NODES", 10)
+    samples = [sample_of(rows, search.pieces, row) for row in range(3)]
+    dense = [search.solve(sample) for sample in samples]
+    monkeypatch.setattr(stiction.methods.equilibrium.dense.search, "MAX_WEAK_NODES", 10)
     for sample, exact in zip(samples, dense, strict=True):
-        found = program.solve(sample)
+        found = search.solve(sample)
         assert found.load == pytest.approx(exact.load, rel=1e-9)
         assert found.load != exact.load
         # At the optimum slip may be steep in the load; 1e-3 of d_c is far below any use of it.
@@ -96,8 +98,8 @@ def test_patches_alike_on_a_long_interface():
     for periods in (1, 32):
         problem = make_problem(128 * periods, 0.0135 * periods)
         tau_p = np.tile(1e6 + 0.3e6 * np.cos(turns(128)), periods)
-        program = DenseProgram(problem)
-        loads.append(program.solve(sample_of(problem.sample(tau_p), program.pieces, 0)).load)
+        search = DenseSearch(problem)
+        loads.append(search.solve(sample_of(problem.sample(tau_p), search.pieces, 0)).load)
     assert loads[1] == pytest.approx(loads[0], rel=1e-11)
 
 
@@ -186,12 +188,12 @@ def test_sliding_is_proved(problem, make_strength):
     """Without any length taken for unstoppable, the same loads and events."""
     tau_p = make_strength(0.5, high=2.66e6).sample(problem.interface, samples=200, seed=17)
     plain = exact_onset(problem, tau_p)
-    program = DenseProgram(problem)
+    search = DenseSearch(problem)
     # Griffith's length grows with the modulus, of which the test for arrest knows only here.
-    program.runs = program.runs._replace(modulus=np.inf)
+    search.runs = search.runs._replace(modulus=np.inf)
     rows = problem.sample(tau_p)
     paths = [
-        follow_to_sliding(program, sample_of(rows, program.pieces, row)) for row in range(200)
+        follow_to_sliding(search, sample_of(rows, search.pieces, row)) for row in range(200)
     ]
     loads = [path.last.load for path in paths]
     np.testing.assert_allclose(plain.critical_load, loads, rtol=1e-12)

@@ -20,9 +20,10 @@ from setups import (
 import stiction as st
 from stiction.elasticity.operator import lowest_eigenvector, make_operator
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.sample import present_pieces, sample_of
+from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.strength import present_pieces
 from stiction.methods.equilibrium.transforms.bracket import Bracket
-from stiction.methods.equilibrium.transforms.plane import PlaneProgram, plane_onset
+from stiction.methods.equilibrium.transforms.plane import PlaneSearch, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import (
     stable_equilibrium,
 )
@@ -229,9 +230,9 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
     law = {"slip": [0.02, 0.05, 1.0], "strength": [0.98, 0.9, 0.0], "weakening_rate": 6e10}
     friction = st.PiecewiseWeakening(**law, residual_strength=1.5e5)
     problem, strength = crooked((24, 20), (0.023, 0.0164), friction=friction)
-    program = PlaneProgram(problem)
-    sample = sample_of(problem.sample(strength), program.pieces, 0)
-    operator = program._operator(sample)
+    search = PlaneSearch(problem)
+    sample = sample_of(problem.sample(strength), search.pieces, 0)
+    operator = search._operator(sample)
     stiffness, slopes = dense(symbol_of(problem), (24, 20)), sample.pieces.slopes
     first = (sample.excess / sample.profile).min()
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as hs
 from setups import exact_onset, make_problem, turns
 
 import stiction as st
-from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.sample import sample_of
 
 NODES = 96
@@ -59,8 +59,8 @@ def test_gap_closes_and_bounds_hold(problem, tau_p):
 @settings(max_examples=30, deadline=None)
 @given(problem=uniform_problems, tau_p=profiles)
 def test_never_above_the_discrete_local_criterion(problem, tau_p):
-    program = DenseProgram(problem)
-    bound, _ = program.bound(sample_of(problem.sample(tau_p), program.pieces, 0))
+    search = DenseSearch(problem)
+    bound, _ = search.bound(sample_of(problem.sample(tau_p), search.pieces, 0))
     onset = solve(problem, tau_p)
     assert onset.first_instability.item() <= bound * (1.0 + 1e-13)
 

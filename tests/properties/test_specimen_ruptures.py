@@ -6,9 +6,11 @@ from setups import beta_strength
 from specimens import crooked, rough
 
 import stiction as st
-from stiction.methods.dynamics.specimens import RuptureProgram
-from stiction.methods.equilibrium.sample import Outcome, present_pieces, sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_program
+from stiction.methods.dynamics.specimens import RuptureSearch
+from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
+from stiction.methods.equilibrium.strength import present_pieces
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
 SPECIMEN = crooked(nodes=64, drive=LOW)
@@ -31,10 +33,10 @@ def run():
 @pytest.mark.parametrize("drive", DRIVES)
 def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(drive):
     problem = crooked(nodes=64, drive=drive)
-    program, overdamped = RuptureProgram(problem, st.Rupture()), make_program(problem)
+    search, overdamped = RuptureSearch(problem, st.Rupture()), make_search(problem)
     for strength in rough(problem, 5, samples=4):
-        sample = sample_of(problem.sample(strength), program.pieces, 0)
-        for before, after, _ in follow_to_sliding(program, sample).events:
+        sample = sample_of(problem.sample(strength), search.pieces, 0)
+        for before, after, _ in follow_to_sliding(search, sample).events:
             least = overdamped.jump(sample, before)
             assert least.outcome == Outcome.ARRESTED
             assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())

@@ -9,8 +9,9 @@ from setups import exact_onset
 
 import stiction as st
 from stiction.methods.equilibrium import solver
-from stiction.methods.equilibrium.sample import Jump, Outcome, PathStatus
-from stiction.methods.equilibrium.transforms import plane as program
+from stiction.methods.equilibrium.endings import Outcome, PathStatus
+from stiction.methods.equilibrium.state import Jump
+from stiction.methods.equilibrium.transforms import plane as search
 from stiction.methods.equilibrium.transforms.relaxation import Relaxed
 
 TWO = np.stack([PLANE_STRENGTH, 1.04 * np.roll(PLANE_STRENGTH, (5, 7), (0, 1))])
@@ -18,8 +19,8 @@ TWO = np.stack([PLANE_STRENGTH, 1.04 * np.roll(PLANE_STRENGTH, (5, 7), (0, 1))])
 
 def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch):
     # As if Newton's method and bisection had got nowhere.
-    monkeypatch.setattr(program, "close", lambda *a, **k: (False, 0.0))
-    monkeypatch.setattr(program, "_narrow", lambda *a, **k: 0.0)
+    monkeypatch.setattr(search, "close", lambda *a, **k: (False, 0.0))
+    monkeypatch.setattr(search, "_narrow", lambda *a, **k: 0.0)
     with pytest.warns(st.AccuracyWarning, match=r"2 of 2 samples \(0, 1\).*apart"):
         found = exact_onset(PLANE, TWO)
     assert (found["certificate_gap"] > 1e-3 * found["first_instability"]).all()
@@ -27,24 +28,24 @@ def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch)
 
 def test_a_path_that_is_lost_is_warned_of(monkeypatch):
     """In its first jump, before it, or after a jump that came to rest."""
-    follow_on = program.PlaneProgram.next
+    follow_on = search.PlaneSearch.next
     whole = exact_onset(PLANE, PLANE_STRENGTH).critical_load.item()
 
     def path_lost(*given):
         return dataclasses.replace(follow_on(*given), status=PathStatus.GIVEN_UP)
 
     def at_rest(own, sample, state, to_rest):
-        monkeypatch.setattr(program.PlaneProgram, "next", path_lost)
+        monkeypatch.setattr(search.PlaneSearch, "next", path_lost)
         return Jump(Outcome.ARRESTED, state)
 
     for owner, name, lost in (
         (
-            program,
+            search,
             "least_equilibrium",
             lambda *given, **_: Relaxed(Outcome.UNDECIDED, given[3]),
         ),
-        (program.PlaneProgram, "next", path_lost),
-        (program.PlaneProgram, "jump", at_rest),
+        (search.PlaneSearch, "next", path_lost),
+        (search.PlaneSearch, "jump", at_rest),
     ):
         monkeypatch.setattr(owner, name, lost)
         text = r"not followed .* in 1 of 1 samples \(0\): .* a lower bound"

@@ -17,7 +17,7 @@ from stiction.methods.dynamics import checks, specimens
 from stiction.methods.dynamics.diagnostics import stress_scale
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.medium import Medium, prepare_medium
-from stiction.methods.dynamics.slow_start import slow_start, static_program
+from stiction.methods.dynamics.slow_start import slow_start, static_search
 from stiction.methods.dynamics.state import (
     UNSTABLE_STRESS,
     Nodes,
@@ -304,10 +304,10 @@ class Rupture:
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of a problem. The memory kernel is fitted once."""
         if problem.specimen is not None:
-            return specimens.RuptureSolver(problem, self.events, self.program(problem))
+            return specimens.RuptureSolver(problem, self.events, self.search(problem))
         medium, loading_rate = self.medium(problem), self.loading_rate
         from_rest = self.start != "equilibrium" or not self.implicit
-        static = None if from_rest or loading_rate is None else static_program(problem)
+        static = None if from_rest or loading_rate is None else static_search(problem)
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_of_coarse_grid(problem, rows)
@@ -326,11 +326,11 @@ class Rupture:
 
         return solve
 
-    def program(self, problem: Problem) -> specimens.RuptureProgram:
+    def search(self, problem: Problem) -> specimens.RuptureSearch:
         """Return the search for equilibria of a specimen, with waves between equilibria."""
         if reasons := refusals(problem, self):
             raise InputError(reasons)
-        return specimens.RuptureProgram(problem, self)
+        return specimens.RuptureSearch(problem, self)
 
     def _summary_of(
         self, run: Run, state: RuptureState | None, rows: Sample, row: int

@@ -21,18 +21,15 @@ from stiction.methods.dynamics.mesh import layer_matrix
 from stiction.methods.dynamics.save import FIELDS, OVER_NODES, SCALARS, TIME, Save, over
 from stiction.methods.dynamics.specimens import (
     DynamicEvent,
-    RuptureProgram,
+    RuptureSearch,
     refuse_overstress,
 )
 from stiction.methods.dynamics.summary import SPEEDS, front_speeds, rate_spectrum
+from stiction.methods.equilibrium.endings import PathStatus
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
-from stiction.methods.equilibrium.sample import (
-    PathStatus,
-    present_pieces,
-    residual_nodes,
-    sample_of,
-)
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import SamplePath, follow_to_sliding
+from stiction.methods.equilibrium.strength import present_pieces, residual_nodes
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
@@ -79,10 +76,10 @@ def simulate_event(
             "save: leave 'to' and 'stations' out, as on specimens all is in memory"
         )
     refuse_overstress(rows)
-    program: RuptureProgram = method.program(problem)
-    sample = sample_of(rows, program.pieces, 0)
+    search: RuptureSearch = method.search(problem)
+    sample = sample_of(rows, search.pieces, 0)
     with Meter("rupture", show=progress, unit="events") as meter:
-        path = follow_to_sliding(program, sample)  # 1.
+        path = follow_to_sliding(search, sample)  # 1.
         # Arrested events began at `before`. The path ends with the
         # sliding event, if any.
         states = [event.before for event in path.events]
@@ -93,11 +90,11 @@ def simulate_event(
         if (number or 0) >= len(states):
             raise InputError(f"event: must be below {len(states)}, the number of events")
         before = states[-1 if number is None else number]
-        trial = program.event(sample, before)  # 2.
+        trial = search.event(sample, before)  # 2.
         trial.run(method.max_steps)
         # A sliding event goes on until the last waves have crossed the block.
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
-        record = EventRecord(problem, rows, program.event(sample, before), save, trial)  # 3.
+        record = EventRecord(problem, rows, search.event(sample, before), save, trial)  # 3.
         record.add()
         for _ in range(0, steps, save.every):
             record.event.take_steps(save.every, ends=False)

@@ -40,8 +40,9 @@ from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.memory import grown_memory
 from stiction.methods.dynamics.state import Phase, RuptureState
 from stiction.methods.dynamics.summary import energy_balance
-from stiction.methods.equilibrium.dense.program import DenseProgram
-from stiction.methods.equilibrium.sample import StaticSample, exceeds, refused, sample_of
+from stiction.methods.equilibrium.dense.search import DenseSearch
+from stiction.methods.equilibrium.sample import refused, sample_of
+from stiction.methods.equilibrium.strength import StaticSample, exceeds
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
@@ -51,15 +52,15 @@ _RATE_SHARE = 0.25  # share of the distance to the onset over which the mean rat
 _MAX_TRIALS = 5
 
 
-def static_program(problem: Problem) -> DenseProgram | None:
+def static_search(problem: Problem) -> DenseSearch | None:
     """Return the search for equilibria of a problem, or `None` for planes and curved laws."""
     if problem.interface.is_plane or refused(problem.friction):
         return None
-    return DenseProgram(problem)
+    return DenseSearch(problem)
 
 
 def slow_start(
-    program: DenseProgram, run: Run, rows: Sample, number: int, loading_rate: float
+    search: DenseSearch, run: Run, rows: Sample, number: int, loading_rate: float
 ) -> RuptureState | None:
     """Return the state closest to the onset with a small error, or `None` without such a state.
 
@@ -68,20 +69,20 @@ def slow_start(
     nodes = run.setting.nodes
     if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):
         return None
-    static = sample_of(rows, program.pieces, number)
-    onset = program.solve(static)
+    static = sample_of(rows, search.pieces, number)
+    onset = search.solve(static)
     if onset is None:
         return None
     # 1. The onset, and the first distance.
     allowed = _MAX_ERROR * run.scale_at(onset.load)
-    crossing = program.problem.nucleation_lengths(run.steepest_weakening_rate)[0] / (
-        program.problem.solid.shear_wave_speed
+    crossing = search.problem.nucleation_lengths(run.steepest_weakening_rate)[0] / (
+        search.problem.solid.shear_wave_speed
     )
     distance = max(_CROSSINGS * crossing * loading_rate, 1e-6 * allowed)
     for _ in range(_MAX_TRIALS):
         if onset.load - (1.0 + _RATE_SHARE) * distance <= run.first_load:  # 6.
             return None
-        state = _state_at(program, run, static, onset.load, distance, loading_rate)
+        state = _state_at(search, run, static, onset.load, distance, loading_rate)
         # 5. Close enough, or a greater distance.
         if state is None:
             distance *= 4.0
@@ -93,7 +94,7 @@ def slow_start(
 
 
 def _state_at(
-    program: DenseProgram,
+    search: DenseSearch,
     run: Run,
     static: StaticSample,
     onset: float,
@@ -109,7 +110,7 @@ def _state_at(
     nodes, grid = run.setting.nodes, run.medium.grid
     # 2. Two equilibria, and the slip rate between them.
     load, load_rise = onset - distance, _RATE_SHARE * distance
-    present, before = (program.solve(static, cap) for cap in (load, load - load_rise))
+    present, before = (search.solve(static, cap) for cap in (load, load - load_rise))
     if present is None or before is None or exceeds(static, present.slip):
         return None
     weakens = nodes.residual_slip > 0.0

@@ -15,7 +15,7 @@ Algorithm of an event: our own
 2. Follow the waves. The block is at rest when no node slips while shear
    waves cross the block and return (`DynamicEvent.run`).
 3. Let slip that is still under way come to rest in a static state
-   (`RuptureProgram.jump`). Nodes that waves carried beyond this
+   (`RuptureSearch.jump`). Nodes that waves carried beyond this
    equilibrium count as stopped.
 """
 
@@ -37,19 +37,14 @@ from stiction.methods.dynamics.summary import SPEEDS, front_speeds
 from stiction.methods.dynamics.waves import Waves, block_at_rest, wave_steps
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
-from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.dense.search import DenseSearch
+from stiction.methods.equilibrium.endings import Outcome, PathStatus, Route
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.method import Equilibrium
-from stiction.methods.equilibrium.sample import (
-    EquilibriumState,
-    Jump,
-    Outcome,
-    PathStatus,
-    Search,
-    StaticSample,
-    refused,
-)
+from stiction.methods.equilibrium.sample import refused
 from stiction.methods.equilibrium.solver import OnsetSolver, SamplePath
+from stiction.methods.equilibrium.state import EquilibriumState, Jump
+from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
@@ -168,7 +163,7 @@ def begin(
     return DynamicEvent(sample, mesh, before, start, waves, front)
 
 
-class RuptureProgram(DenseProgram):
+class RuptureSearch(DenseSearch):
     """Search for equilibria of a specimen, with waves between equilibria.
 
     Between events loading is slow. Nodes that waves carried beyond the
@@ -207,7 +202,7 @@ class RuptureProgram(DenseProgram):
             slip_state = SlipState(sample, slip, stiff, elastic, self.may_stop, self.ends)
             outcome = jump(slip_state, unstable.load, np.inf, true)
         state = EquilibriumState(
-            unstable.load, slip, unstable.direction, stiff, PathStatus.STABLE, Search.EVENTS,
+            unstable.load, slip, unstable.direction, stiff, PathStatus.STABLE, Route.EVENTS,
             stopped=True,
         )  # fmt: skip
         now = event.waves.now
@@ -218,11 +213,11 @@ class RuptureProgram(DenseProgram):
 class RuptureSolver(OnsetSolver):
     """Solver for samples of a specimen with inertia. It is thread-safe."""
 
-    program: RuptureProgram
+    search: RuptureSearch
     inertia = True
 
-    def __init__(self, problem: Problem, events: int, program: RuptureProgram) -> None:
-        super().__init__(problem, Equilibrium(events=events), program)
+    def __init__(self, problem: Problem, events: int, search: RuptureSearch) -> None:
+        super().__init__(problem, Equilibrium(events=events), search)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Rupture`. The first dimension of each is the sample."""

@@ -22,7 +22,7 @@ from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Floats, RuptureState, Spectrum
 from stiction.methods.equilibrium.events import ArrestedEvent, moment_of
-from stiction.methods.equilibrium.sample import EquilibriumState
+from stiction.methods.equilibrium.state import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.results import per_area, position

@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating, jit_inside
 from stiction.methods.dynamics.mesh import Mesh
-from stiction.methods.equilibrium.sample import StaticSample, strength_at
+from stiction.methods.equilibrium.strength import StaticSample, strength_at
 
 
 class Waves(NamedTuple):

@@ -41,7 +41,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.patches import largest_patch
-from stiction.methods.equilibrium.sample import EquilibriumState
+from stiction.methods.equilibrium.state import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.results import per_area, position

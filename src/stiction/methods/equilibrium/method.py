@@ -10,7 +10,7 @@ from stiction.base.model import Flag, Number, Real, model
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.sample import pieces_of, refused
-from stiction.methods.equilibrium.solver import OnsetSolver, make_program
+from stiction.methods.equilibrium.solver import OnsetSolver, make_search
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample
@@ -194,4 +194,4 @@ class Equilibrium:
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of a problem."""
-        return OnsetSolver(problem, self, make_program(problem, self.gap))
+        return OnsetSolver(problem, self, make_search(problem, self.gap))

@@ -33,19 +33,15 @@ from stiction.methods.equilibrium.events import (
     event_variables,
     travel_of,
 )
-from stiction.methods.equilibrium.sample import (
-    EquilibriumState,
-    Program,
-    StaticSample,
-    at_rest,
-    sample_of,
-)
+from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import (
     SamplePath,
     follow_to_sliding,
-    make_program,
+    make_search,
     warn_of_signs,
 )
+from stiction.methods.equilibrium.state import EquilibriumSearch, EquilibriumState, at_rest
+from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.unit_doubts import doubt_sample
@@ -79,7 +75,7 @@ def _check_loads(loads: Any) -> Array:
 
 
 def _states_at(
-    program: Program, sample: StaticSample, path: SamplePath, loads: Array
+    search: EquilibriumSearch, sample: StaticSample, path: SamplePath, loads: Array
 ) -> Iterator[EquilibriumState]:
     """Yield the equilibrium at each of the rising loads, until the interface slides."""
     events = path.all_events
@@ -98,7 +94,7 @@ def _states_at(
         state = max(starts[n_passed], state, key=lambda start: start.load)
         # 3. Close to an event, round-off may hide the equilibrium that
         # is about to jump.
-        reached = program.at(sample, state, load)
+        reached = search.at(sample, state, load)
         if reached is None and n_passed < len(events):
             about_to_jump = events[n_passed].before
             if load > (1.0 - LOAD_RTOL) * about_to_jump.load:
@@ -199,7 +195,7 @@ def equilibrium_path(
     """
     given = _check_loads(loads)
     check("problem", problem, Problem)
-    if method is not None and (problem.specimen is None or not hasattr(method, "program")):
+    if method is not None and (problem.specimen is None or not hasattr(method, "search")):
         raise InputError("method: only specimens take a method, st.Rupture(). Leave it out")
     rows = problem.sample(profiles)
     if rows.samples != 1:
@@ -208,11 +204,11 @@ def equilibrium_path(
     # Slip and stress, each of 8 bytes, at every load and node.
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
-    program = make_program(problem) if method is None else method.program(problem)
+    search = make_search(problem) if method is None else method.search(problem)
     warn_of_signs(problem)
-    sample = sample_of(rows, program.pieces, 0)
+    sample = sample_of(rows, search.pieces, 0)
     # 1.
-    path = follow_to_sliding(program, sample, to_rest=True)
+    path = follow_to_sliding(search, sample, to_rest=True)
     events, end = path.all_events, path.last.load
     # An event counts at all loads above its own.
     n_events = np.searchsorted([event.before.load for event in events], given)
@@ -220,11 +216,11 @@ def equilibrium_path(
     slip, stress = np.full((2, given.size, interface.size), np.nan)
     travel, far = np.full((2, given.size), np.nan)
     sliding = np.ones(given.size, dtype=np.bool_)
-    for i, state in enumerate(_states_at(program, sample, path, given)):
+    for i, state in enumerate(_states_at(search, sample, path, given)):
         load = float(given[i])
         sliding[i] = load > end
         slip[i] = state.slip
-        released = program.stress_released(state)
+        released = search.stress_released(state)
         stress[i] = rows.initial_stress[0].reshape(-1) + load * sample.profile - released
         if problem.specimen is not None:
             travel[i] = travel_of(problem, load, state.slip)

@@ -15,12 +15,12 @@ load at which the path of equilibria turns first, and a patch jumps.
 
 Algorithm for a sample
 ----------------------
-The algorithm is our own (`follow_to_sliding`). A `Program` supplies the two searches:
+The algorithm is our own (`follow_to_sliding`). A `EquilibriumSearch` supplies the two searches:
 
 1. Start from rest and raise the load to the next instability
-   (`Program.next`).
+   (`EquilibriumSearch.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
-3. Let the unstable patch jump at constant load (`Program.jump`). If no
+3. Let the unstable patch jump at constant load (`EquilibriumSearch.jump`). If no
    equilibrium stops it, the interface slides: stop.
 4. If the patch comes to rest, this is an arrested event. Go to step 1
    from the new equilibrium.
@@ -33,25 +33,25 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
-from stiction.methods.equilibrium.dense.program import DenseProgram
+from stiction.methods.equilibrium.dense.search import DenseSearch
+from stiction.methods.equilibrium.endings import Outcome, PathStatus
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
-from stiction.methods.equilibrium.sample import (
+from stiction.methods.equilibrium.sample import refused, sample_of
+from stiction.methods.equilibrium.state import (
+    EquilibriumSearch,
     EquilibriumState,
-    Outcome,
-    PathStatus,
-    Program,
+    multiplier_of,
+)
+from stiction.methods.equilibrium.strength import (
     StaticSample,
     all_breakable_slip,
     make_sample,
-    multiplier_of,
     present_pieces,
-    refused,
     residual_nodes,
     row_of,
-    sample_of,
 )
-from stiction.methods.equilibrium.transforms.plane import PlaneProgram
+from stiction.methods.equilibrium.transforms.plane import PlaneSearch
 from stiction.problem.problem import Problem
 from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.sample import Sample
@@ -103,7 +103,7 @@ class SamplePath(NamedTuple):
 
 
 def follow_to_sliding(
-    program: Program, sample: StaticSample, to_rest: bool = False
+    search: EquilibriumSearch, sample: StaticSample, to_rest: bool = False
 ) -> SamplePath:
     """Follow a sample from rest to global sliding.
 
@@ -117,11 +117,11 @@ def follow_to_sliding(
     events: list[ArrestedEvent] = []
     outcome, arrival = Outcome.NOT_UNSTABLE, None
     # 1.
-    state = program.next(sample)
+    state = search.next(sample)
     peak = state.highest
     while state.status == PathStatus.UNSTABLE:  # 2.
         # 3. Without ends there is no difference between sliding and all slip.
-        jump = program.jump(sample, state, to_rest and ends)
+        jump = search.jump(sample, state, to_rest and ends)
         outcome = jump.outcome
         if outcome != Outcome.NOT_UNSTABLE:
             first = first or state
@@ -132,7 +132,7 @@ def follow_to_sliding(
         if slides:
             arrival = jump.arrival
             break
-        state = program.next(sample, jump.state)
+        state = search.next(sample, jump.state)
         peak = max(peak, state.highest)
     known = outcome != Outcome.UNDECIDED and state.status != PathStatus.GIVEN_UP
     if ends and known and events and outcome != Outcome.SLIDING:
@@ -142,11 +142,11 @@ def follow_to_sliding(
     return SamplePath(first or state, state, peak, events, known, arrival, sliding)
 
 
-def make_program(problem: Problem, gap: float = 1e-6) -> Program:
+def make_search(problem: Problem, gap: float = 1e-6) -> EquilibriumSearch:
     """Return the programme that finds equilibria for a problem, or raise an `InputError`."""
     if reasons := refused(problem.friction):
         raise InputError(reasons)
-    return PlaneProgram(problem, gap) if problem.interface.is_plane else DenseProgram(problem)
+    return PlaneSearch(problem, gap) if problem.interface.is_plane else DenseSearch(problem)
 
 
 def warn_of_signs(problem: Problem) -> None:
@@ -164,8 +164,8 @@ class OnsetSolver:
 
     inertia = False
 
-    def __init__(self, problem: Problem, options: Any, program: Program) -> None:
-        self.problem, self.options, self.program = problem, options, program
+    def __init__(self, problem: Problem, options: Any, search: EquilibriumSearch) -> None:
+        self.problem, self.options, self.search = problem, options, search
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
@@ -178,11 +178,11 @@ class OnsetSolver:
         )
         # One after the other, so that the result of a sample depends on
         # this sample alone.
-        samples, table, flags = sample_of(rows, self.program.pieces), [], []
+        samples, table, flags = sample_of(rows, self.search.pieces), [], []
         for row in range(rows.samples):
             sample = row_of(samples, row)
             try:
-                path = follow_to_sliding(self.program, sample, self.options.events > 0)
+                path = follow_to_sliding(self.search, sample, self.options.events > 0)
             except Exception as error:  # say which sample failed
                 error.add_note(
                     f"in sample {row} of the {rows.samples} that were solved together"
@@ -241,7 +241,7 @@ class OnsetSolver:
         if self.options.sensitivity:
             derivative = np.full(first.slip.size, np.nan)
             if not stable:
-                derivative = _sensitivity(self.problem, self.program, sample, first)
+                derivative = _sensitivity(self.problem, self.search, sample, first)
             values["sensitivity"] = derivative.reshape(shape) * rows.mean(rows.load_profile)
         if most := self.options.events:
             variables = event_variables(interface, self.inertia)
@@ -272,10 +272,10 @@ class OnsetSolver:
         # divide them.
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
-            f"the bounds of the first instability did not close to {self.program.widest_gap:g} of"
+            f"the bounds of the first instability did not close to {self.search.widest_gap:g} of"
             " the load in {samples}. They hold, but are up to {worst:.2g} of the load apart. Take"
             " more nodes",
-            ~unproved & ~(share <= self.program.widest_gap),
+            ~unproved & ~(share <= self.search.widest_gap),
             share,
         )
         if self.problem.interface.is_plane:
@@ -329,7 +329,7 @@ class OnsetSolver:
 
 
 def _sensitivity(
-    problem: Problem, program: Program, sample: StaticSample, state: EquilibriumState
+    problem: Problem, search: EquilibriumSearch, sample: StaticSample, state: EquilibriumState
 ) -> Array:
     """Return the derivative (n,) of an instability's stress with respect to peak strengths.
 
@@ -338,18 +338,18 @@ def _sensitivity(
     """
     pieces = sample.pieces
     if state.stopped:
-        return _quotients(problem, program, sample, state)
+        return _quotients(problem, search, sample, state)
     if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
-    # The program's derivative is by the present piece continued to zero
+    # The search's derivative is by the present piece continued to zero
     # slip, which is share tau_p + (1 - share) tau_r. The chain rule
     # gives the derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
-    return program.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
+    return search.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
 
 
 def _quotients(
-    problem: Problem, program: Program, sample: StaticSample, first: EquilibriumState
+    problem: Problem, search: EquilibriumSearch, sample: StaticSample, first: EquilibriumState
 ) -> Array:
     """Return derivatives of a first instability as difference quotients, with a path for each node.
 
@@ -367,6 +367,6 @@ def _quotients(
         residual[node] += step * (sample.critical[node] == 0.0)  # its strength is constant
         W = sample.weakening_rate
         raised = make_sample(excess, residual, sample.profile, W, sample.pieces)
-        state = program.next(raised)
+        state = search.next(raised)
         derivative[node] = (state.load - problem.relief(state.slip) - stress_before) / step
     return derivative

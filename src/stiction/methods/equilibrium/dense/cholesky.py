@@ -57,7 +57,7 @@ from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.base.lanes import LANES, load, multiply_add, totals, zeros
 from stiction.elasticity.operator import dot
 from stiction.elasticity.stiffness import apply, apply_outside, entry
-from stiction.methods.equilibrium.sample import StaticSample
+from stiction.methods.equilibrium.strength import StaticSample
 
 ROWS_APPENDED_TOGETHER = 4
 PIVOT_RTOL = 1e-13

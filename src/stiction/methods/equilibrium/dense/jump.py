@@ -68,8 +68,8 @@ from stiction.methods.equilibrium.dense.stable_path import (
     NEGATIVE_RATE_RTOL,
     ends_sliding,
 )
-from stiction.methods.equilibrium.sample import (
-    Outcome,
+from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.strength import (
     StaticSample,
     piece_at,
     step_to_corner,

@@ -52,7 +52,7 @@ from stiction.base.jit import ZERO, jit, jit_inside
 from stiction.elasticity.stiffness import apply, entry
 from stiction.methods.equilibrium.dense import cholesky
 from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
-from stiction.methods.equilibrium.sample import StaticSample, strength_at
+from stiction.methods.equilibrium.strength import StaticSample, strength_at
 
 OVERSTRESS_RTOL = 1e-12
 """Share of the mean strength below which an overstress is round-off."""

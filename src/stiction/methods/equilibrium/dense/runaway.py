@@ -48,9 +48,9 @@ from stiction.methods.equilibrium.dense.cholesky import (
     forward_substitute,
     row_start,
 )
+from stiction.methods.equilibrium.endings import Outcome
 from stiction.methods.equilibrium.patches import main_patch
-from stiction.methods.equilibrium.sample import (
-    Outcome,
+from stiction.methods.equilibrium.strength import (
     StaticSample,
     step_to_corner,
     strength_at,

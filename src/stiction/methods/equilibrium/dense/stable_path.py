@@ -72,7 +72,8 @@ from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense import cholesky
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
-from stiction.methods.equilibrium.sample import PathStatus, piece_at, start_of, strength_at
+from stiction.methods.equilibrium.endings import PathStatus
+from stiction.methods.equilibrium.strength import piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16
 """Slip is computed anew from L after so many events, so that round-off does not accumulate."""

@@ -36,7 +36,7 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import SOLVED, Mask, Operator, inner, product, solve_inside
-from stiction.methods.equilibrium.sample import StaticSample, present_pieces
+from stiction.methods.equilibrium.strength import StaticSample, present_pieces
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, solve_pieces
 
 MAX_EVENTS = 300

@@ -15,11 +15,11 @@ The algorithm is our own. `plane_onset` finds the onset without corners, also fo
    the nucleation length.
 2. On the coarsest grid, bisect the trivial bounds until Newton's method
    on the turning point succeeds (`_narrow`).
-3. On each finer grid, start Newton's method (`turning_point.close`)
+3. On each finer grid, start Newton's method (`turning_point.close_by_newton`)
    from the slip and the multiplier on the previous grid. If it fails,
    continue as in step 2.
 
-`PlaneProgram` follows a sample from instability to instability:
+`PlaneSearch` follows a sample from instability to instability:
 
 4. From rest, the next instability is the onset without corners, if no
    node reaches a corner of its law before. A coarse grid usually shows
@@ -41,25 +41,17 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.sample import (
-    EquilibriumState,
-    Jump,
-    Outcome,
-    PathStatus,
-    StaticSample,
-    all_breakable_slip,
-    at_rest,
-    exceeds,
-    multiplier_of,
-    pieces_of,
-)
+from stiction.methods.equilibrium.endings import Outcome, PathStatus
+from stiction.methods.equilibrium.sample import pieces_of
+from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest, multiplier_of
+from stiction.methods.equilibrium.strength import StaticSample, all_breakable_slip, exceeds
 from stiction.methods.equilibrium.transforms.bracket import Bracket, TooSmallError, bisect
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
 )
-from stiction.methods.equilibrium.transforms.turning_point import close
+from stiction.methods.equilibrium.transforms.turning_point import close_by_newton
 from stiction.problem.problem import Problem
 
 MIN_STIFFNESS_RATIO = 8.0
@@ -143,7 +135,7 @@ def _narrow(bracket: Bracket, gap: float) -> float:
         # which is close to the patch that turns.
         residual = BISECTED_RESIDUAL * min(share, COARSE_GAP)
         direction = bisect(bracket, share, residual)
-        _, bend = close(bracket, direction, bracket.lower, bracket.slip, gap)
+        _, bend = close_by_newton(bracket, direction, bracket.lower, bracket.slip, gap)
         if share <= finest:
             break
         share = max(BISECTED_GAP_FACTOR * share, finest)
@@ -211,7 +203,7 @@ def plane_onset(
             # Interpolation spreads both to nodes that cannot break.
             guess, phi = np.where(bracket.can_break, (guess, phi), 0.0)
             phi *= 1.0 / np.sqrt((phi**2).sum())
-            closed, bend = close(bracket, phi, coarser.lower, guess, goal, bend)
+            closed, bend = close_by_newton(bracket, phi, coarser.lower, guess, goal, bend)
         if not closed:  # 2.
             bend = _narrow(bracket, goal)
         # Beyond a corner the finer onsets would not hold either.
@@ -221,7 +213,7 @@ def plane_onset(
         coarser = bracket
 
 
-class PlaneProgram:
+class PlaneSearch:
     """Search for equilibria of a plane, to a relative gap between bounds. It is thread-safe."""
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:

@@ -71,8 +71,8 @@ from stiction.elasticity.operator import (
     residual_of,
     solve_inside,
 )
-from stiction.methods.equilibrium.sample import (
-    Outcome,
+from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.strength import (
     Present,
     StaticSample,
     all_breakable_slip,

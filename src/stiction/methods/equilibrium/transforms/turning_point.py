@@ -190,7 +190,7 @@ def _step_across(state: Held, step: float, last: float, curvature: float, moved:
     return min(max(step, -longest), longest)
 
 
-def close(
+def close_by_newton(
     bracket: Bracket, phi: Array, load: float, slip: Array, gap: float, bend: float = 0.0
 ) -> tuple[bool, float]:
     """Close a bracket by Newton's method on the turning point of a patch.

@@ -7,7 +7,7 @@
    transforms are used (`plane_onset`), because they are faster.
 2. Otherwise the path is followed event by event (`stable_path`). On
    this path the programme is not tried again, except from rest. A state
-   says in `search` how the path goes on.
+   says in `route` how the path goes on.
 3. With a machine, the path is always followed: slip lowers the force,
    and the force may be largest before the instability. If all nodes
    slip without an instability, the interface slides stably.
@@ -40,18 +40,13 @@ from stiction.methods.equilibrium.dense.linear_program import (
 )
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
 from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
+from stiction.methods.equilibrium.endings import Outcome, PathStatus, Route
 from stiction.methods.equilibrium.patches import count_patches
-from stiction.methods.equilibrium.sample import (
-    EquilibriumState,
-    Jump,
-    Outcome,
-    PathStatus,
-    Search,
+from stiction.methods.equilibrium.sample import pieces_of
+from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest, multiplier_of
+from stiction.methods.equilibrium.strength import (
     StaticSample,
-    at_rest,
     exceeds,
-    multiplier_of,
-    pieces_of,
     present_pieces,
     step_to_corner,
 )
@@ -71,7 +66,7 @@ RESTING_MULTIPLIER_RTOL = 1e-9
 """Share of the largest multiplier below which it is zero, as at nodes at rest."""
 
 
-class DenseProgram:
+class DenseSearch:
     """Search for equilibria of a line or a specimen. It is thread-safe."""
 
     widest_gap = 1e-9
@@ -101,7 +96,7 @@ class DenseProgram:
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
         """Workspaces of the thread, for elastic steps (and programmes) and for true pieces."""
-        # Threads share the program, but kernels overwrite the workspaces.
+        # Threads share the search, but kernels overwrite the workspaces.
         if not hasattr(self._of_thread, "workspaces"):
             self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
@@ -193,16 +188,16 @@ class DenseProgram:
         state = state or at_rest(sample)
         from_rest = not state.slip.any()
         # Behind a machine the stress may be largest before the instability.
-        search = Search.EVENTS if self.driven else state.search
+        route = Route.EVENTS if self.driven else state.route
         if from_rest:
             for workspace in self._workspaces:
                 workspace.n_factored[0] = 0  # the rows belong to another sample
-        if target == np.inf and search != Search.EVENTS:
+        if target == np.inf and route != Route.EVENTS:
             instability = self._next_by_programme(sample, state, from_rest)
             if instability is not None:
                 return instability
             if not from_rest:  # a corner is near, so the programme would fail again
-                search = Search.EVENTS
+                route = Route.EVENTS
         # The kernel moves these arrays, and the state before must stay.
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         # Between given loads, a path goes on although the interface slides.
@@ -210,7 +205,7 @@ class DenseProgram:
         slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, goes_on)
         end = follow_stable_path(slip_state, state.load, target, direction)
         reached = EquilibriumState(
-            end.load, slip, direction, Kd, PathStatus(end.status), search,
+            end.load, slip, direction, Kd, PathStatus(end.status), route,
             stopped=end.stopped or state.stopped, peak=end.peak,
         )  # fmt: skip
         # No multiplier bounds the load from above if a law steepens or
@@ -255,12 +250,12 @@ class DenseProgram:
             return state
         # From rest, a programme that ends at
         # the load is faster than the events.
-        if state.search == Search.PROGRAMME_FROM_REST and not self.driven:
+        if state.route == Route.PROGRAMME_FROM_REST and not self.driven:
             solution = self.solve(sample, load)
             if solution is not None and not exceeds(sample, solution.slip):
                 status = PathStatus.STABLE
                 return replace(solution, load=load, direction=state.direction, status=status)
-        reached = self.next(sample, replace(state, search=Search.EVENTS), load)
+        reached = self.next(sample, replace(state, route=Route.EVENTS), load)
         return reached if reached.status == PathStatus.STABLE else None
 
     def jump(
@@ -280,7 +275,7 @@ class DenseProgram:
                 outcome = Outcome.UNDECIDED
         state = EquilibriumState(
             instability.load, slip, instability.direction, Kd, PathStatus.STABLE,
-            max(instability.search, Search.PROGRAMME), stopped=instability.stopped,
+            max(instability.route, Route.PROGRAMME), stopped=instability.stopped,
         )  # fmt: skip
         return Jump(Outcome(outcome), state)
 

@@ -1,0 +1,104 @@
+"""Equilibrium states, and the protocol for the search for equilibria."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.elasticity.operator import inner
+from stiction.methods.equilibrium.endings import Outcome, PathStatus, Route
+from stiction.methods.equilibrium.strength import Pieces, StaticSample
+
+
+@dataclass
+class EquilibriumState:
+    """An equilibrium on the path of a sample."""
+
+    load: float  # tau_0, Pa
+    slip: Array  # (n,): d, m
+    direction: Array  # (n,): direction of the instability
+    Kd: Array = field(default_factory=lambda: np.empty(0))  # (n,): K d, Pa; empty on planes
+    status: PathStatus = PathStatus.UNSTABLE
+    route: Route = Route.PROGRAMME_FROM_REST
+    gap: float | None = None  # distance to a load without equilibrium, Pa, if it is known
+    certified: bool = True  # a multiplier proves the gap
+    stopped: bool = False  # a slipping node stopped on the way
+    # Largest mean stress on the way here, divided by the mean of the
+    # load profile, Pa. Without a machine it is the load itself (None).
+    peak: float | None = None
+    K_direction: Array | None = None  # (n,): K times the direction, if it is known
+    # The exact y with <p, y> = 1, if the direction is exact; otherwise
+    # the direction replaces it.
+    multiplier: Array | None = None
+
+    @property
+    def highest(self) -> float:
+        """Largest load that the interface carried on the way to this state, Pa."""
+        return self.load if self.peak is None else self.peak
+
+
+def at_rest(sample: StaticSample) -> EquilibriumState:
+    """Return the state in which the first node is about to slip."""
+    load = float((sample.excess / sample.profile).min())
+    slip, direction, Kd = np.zeros((3, sample.excess.size))
+    return EquilibriumState(load, slip, direction, Kd, PathStatus.STABLE)
+
+
+def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
+    """Return the multiplier y of an instability, <p, y> = 1."""
+    if state.multiplier is not None:
+        return state.multiplier
+    return state.direction / max(inner(state.direction, sample.profile), 1e-300)
+
+
+class Jump(NamedTuple):
+    """End of an instability."""
+
+    outcome: Outcome
+    state: EquilibriumState
+    arrival: Array | None = None  # with inertia: arrival time of the front at each node, s
+    timed: Mapping[str, float] = MappingProxyType({})  # with inertia: variables of the event
+
+
+class EquilibriumSearch(Protocol):
+    """Thread-safe protocol for the search for equilibria: `DenseSearch` or `PlaneSearch`.
+
+    `widest_gap` is the largest certificate gap without a warning, as a
+    share of the load.
+    """
+
+    pieces: Pieces
+    widest_gap: float
+
+    def next(
+        self, sample: StaticSample, state: EquilibriumState | None = None
+    ) -> EquilibriumState:
+        """Return the next instability from a stable state, or from rest."""
+
+    def jump(
+        self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
+    ) -> Jump:
+        """Let an unstable state jump to a new equilibrium, or to sliding.
+
+        If an interface ends, the jump stops when all nodes that can
+        break slip. With `to_rest`, it goes on.
+        """
+
+    def at(
+        self, sample: StaticSample, state: EquilibriumState, load: float
+    ) -> EquilibriumState | None:
+        """Return the equilibrium at a load above a state, or `None` if it is not found."""
+
+    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
+        """Return the derivative (n,) of an instability's stress with respect to the strengths.
+
+        The stress is the mean stress divided by the mean of the load
+        profile. The strengths are the present pieces of the law,
+        continued to zero slip.
+        """
+
+    def stress_released(self, state: EquilibriumState) -> Array:
+        """Return the stress K d that slip releases, Pa."""
