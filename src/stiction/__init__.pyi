@@ -38,7 +38,6 @@ from stiction.problem.solid import Solid as Solid
 from stiction.problem.specimen import Blocks as Blocks
 from stiction.problem.specimen import Platen as Platen
 from stiction.problem.specimen import Pusher as Pusher
-from stiction.random.equally_likely import uncertain as uncertain
 from stiction.random.fields import RandomField as RandomField
 from stiction.random.fields import RandomInterface as RandomInterface
 from stiction.random.marginals import Beta as Beta

@@ -207,29 +207,3 @@ def test_no_dimension_of_a_sweep_is_a_keyword_of_sel():
     for keyword in SELECTION_KEYWORDS:
         (dimension,) = grid_axes([{f"method.{keyword}": [1.0, 2.0]}], (), ())
         assert dimension == f"method_{keyword}"
-
-
-def test_a_complete_list_has_no_error_by_the_list():
-    """By counting, of three batches that are equally common: the mean of their probabilities."""
-    problem, stress = make_problem(128, 0.05), 0.76e6
-    batches = [beta_strength(4e-3, low=low) for low in (0.6e6, 0.66e6, 0.72e6)]
-    ask = partial(
-        st.failure_probability, problem, batches, stress, method=LOCAL, algorithm="plain",
-        max_evaluations=3000, progress=False,
-    )  # fmt: skip
-    sampled, mixed = ask(), ask(mixture=True)
-    assert sampled.members_cv > 0.1
-    assert mixed.members_cv == 0.0
-    assert mixed.interval[1] - mixed.interval[0] < 0.2 * np.subtract(*sampled.interval[::-1])
-    each = [ensemble(problem, batch, 2000).critical_stress.values < stress for batch in batches]
-    error = np.sqrt(mixed.probability * (1.0 - mixed.probability) / 2000)
-    assert abs(np.mean(each) - mixed.probability) < 4.0 * error
-    for several in (FIELD, [FIELD]):
-        with pytest.raises(st.InputError, match="mixture: needs a list of all"):
-            st.failure_probability(problem, several, stress, method=LOCAL, mixture=True)
-    study = st.Study(
-        problem=problem, random=batches, method=LOCAL, ensemble=st.Ensemble(samples=2),
-        mixture=True,
-    )  # fmt: skip
-    assert st.Study.from_dict(study.to_dict()) == study
-    assert study.experiments[0].random.complete

@@ -111,25 +111,6 @@ def a_field_that_is_known_in_places():
     return found | {"both": both.profiles(INTERFACE, samples=2, seed=6)}
 
 
-@calls("draws of each member by itself, tests/properties/test_reliability.py")
-def equally_likely_interfaces_of_uncertain_parameters():
-    members = three_properties().uncertain(
-        {
-            "strength.marginal.low": (5e5, 6.5e5),
-            "residual_strength.spectrum.correlation_length": (2e-3, 4e-3),
-        },
-        count=3,
-        seed=3,
-    )
-    return {
-        str(number): {
-            "written": repr(one.strength),
-            "profiles": one.profiles(INTERFACE, samples=2, seed=1),
-        }
-        for number, one in enumerate(members)
-    }
-
-
 @calls("each sample as by onset, to the bit")
 def an_ensemble_by_equilibrium_that_keeps_its_profiles():
     friction = dataclasses.replace(LINE.friction, residual_strength=0.0)

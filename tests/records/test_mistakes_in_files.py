@@ -110,7 +110,6 @@ def scanned(**given):
 BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 LENGTH = "random.strength.spectrum.correlation_length"
 POWER = {"type": "power_law", "correlation_length": 3e-3}
-SOME = {"count": 4, "random.strength.marginal.low": [0.58e6, 0.7e6]}
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(COUNT * SPACING, COUNT)
 FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), True)

@@ -222,10 +222,14 @@ report study.toml""".splitlines():
     "st.failure_curve in memory, tests/user/test_failure_run.py; counting, tests/oracle",
     close=1e-4,
 )
-def reliability_of_uncertain_interfaces():
+def reliability_of_equally_likely_interfaces():
     study = small(0.31e12)
     study["problem"]["interface"]["width"] = 0.013
-    study["uncertain"] = {"count": 3, "strength.marginal.alpha": [1.4, 1.9]}
+    strength = study["random"]["strength"]
+    study["random"] = [
+        {"strength": strength | {"marginal": strength["marginal"] | {"alpha": alpha}}}
+        for alpha in (1.4, 1.65, 1.9)
+    ]
     study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
     return of_commands(
         study,

@@ -1,11 +1,10 @@
-"""Designs: factors between specimens, what moves a design, uncertain constants, and its page."""
+"""Designs: factors between specimens, what moves a design, and its page."""
 
 import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import scipy.stats
 from joint import FIELD, GIVEN, PROBLEM, RANDOM
 from refusals import refuses
 from scipy.stats import norm
@@ -13,7 +12,6 @@ from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
 from stiction.cli.commands import app
-from stiction.random.equally_likely import drawn_from
 
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
@@ -101,9 +99,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
         dataclasses.replace(RANDOM, between={"strength": kind(mean=1.0, cv=0.12)})
         for kind in families
     ]
-    design = st.design_stress(
-        PROBLEM, likely, probability=1e-2, mixture=True, sensitivities=True, **GIVEN
-    )
+    design = st.design_stress(PROBLEM, likely, probability=1e-2, sensitivities=True, **GIVEN)
     found = design.sensitivities.sel(source=PRESSURE)
     assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
     assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
@@ -129,84 +125,6 @@ def test_a_design_is_in_proportion_to_the_pressure():
     )
     plain = st.design_stress(PROBLEM, RANDOM, probability=1e-2, **GIVEN)
     refuses("has no sensitivities", lambda: st.plot.sensitivities(plain))
-
-
-@pytest.mark.parametrize("several", [False, True], ids=["field", "list"])
-def test_an_uncertain_pressure_is_one_more_factor(several):
-    """The probability is an integral over pressure, factor and 5,000 onsets of the field."""
-    law = scipy.stats.lognorm(0.15, scale=5e6)
-    given = [RANDOM, RANDOM] if several else RANDOM
-    source = st.uncertain(given, {PRESSURE: law})
-    demand = 0.72e6
-    found = st.failure_probability(PROBLEM, source, demand, seed=2, **GIVEN)
-    inner = ensemble(PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"])
-    shares = (np.arange(200) + 0.5) / 200
-    at = demand * 5e6 / law.ppf(shares)[:, None] / inner.critical_stress.values
-    exact = RANDOM.between["strength"].distribution.cdf(at).mean()
-    assert np.log(found.probability / exact) == pytest.approx(0.0, abs=4.0 * found.cv)
-    assert len(source.constants(0)) == 40
-    # Each failing profile has the pressure of its sample.
-    assert np.all(found.failing_profiles.critical_stress < demand)
-
-
-def test_a_coefficient_is_that_of_each_uncertain_pressure():
-    """In proportion to the pressure, so that its scatter does not matter."""
-    uncertain = st.uncertain(RANDOM, {PRESSURE: scipy.stats.lognorm(0.2, scale=5e6)})
-    given = GIVEN | {"friction_coefficient": 0.12, "target_cv": 0.1}
-    known = st.failure_probability(PROBLEM, RANDOM, **given)
-    found = st.failure_probability(PROBLEM, uncertain, **given)
-    error = 4.0 * np.hypot(known.cv, found.cv)
-    assert np.log(found.probability / known.probability) == pytest.approx(0.0, abs=error)
-    state = st.external.limit_state(PROBLEM, uncertain, GIVEN["method"])
-    draws = state.draws(0, 0, 3)
-    onset = st.onset(PROBLEM, {"strength": state.profiles(draws)["strength"]}, method=LOCAL)
-    np.testing.assert_allclose(onset.critical_stress, state(draws), rtol=1e-9)
-
-
-def test_a_study_has_uncertain_constants():
-    table = {"count": 50, PRESSURE: [4e6, 6e6]}
-    study = st.Study(
-        problem=PROBLEM, random=RANDOM, method=GIVEN["method"], ensemble=st.Ensemble(samples=20),
-        uncertain=table, reliability={"probability": 1e-2, "target_cv": 0.3},
-    )  # fmt: skip
-    (point,) = study.experiments
-    design = study.reliability.answer(point)
-    ends = design.sensitivities.sel(source=PRESSURE)
-    assert [float(ends.low), float(ends.high)] == pytest.approx([4.1e6, 5.9e6])
-    fixed = dataclasses.replace(study, uncertain=None)
-    stress = study.run(progress=False, pilot=False).critical_stress
-    own = fixed.run(progress=False, pilot=False).critical_stress
-    ratio = (stress / own).values
-    assert 0.8 < ratio.min() < 0.9
-    assert 1.1 < ratio.max() < 1.2
-
-
-def test_members_in_proportion_share_uncertain_values():
-    """As 128 specimens are made of each solved one only where strengths are in proportion."""
-
-    class Source:
-        def interfaces(self, count, seed=0):
-            cvs = np.array([0.12, 0.15, 0.2])[
-                np.random.default_rng(seed).integers(3, size=count)
-            ]
-            marginals = [st.Gamma(mean=0.2 + 1e-5 * n, cv=cv) for n, cv in enumerate(cvs)]
-            return [
-                dataclasses.replace(
-                    RANDOM, strength=dataclasses.replace(RANDOM.strength, marginal=marginal)
-                )
-                for marginal in marginals
-            ]
-
-    laws = {"strength.spectrum.correlation_length": (3e-3, 5e-3), PRESSURE: (4e6, 6e6)}
-    random = drawn_from(st.uncertain(Source(), laws), 200, 0)
-    forms = {}
-    for number, (member, group) in enumerate(zip(random.members, random.groups, strict=True)):
-        field, turn = member.strength, number % len(random.constants)
-        form = field.marginal.cv, field.spectrum.correlation_length, turn
-        assert forms.setdefault(group, form) == form
-    assert 200 / 8 <= len(forms) <= 100
-    moved = drawn_from(st.uncertain(Source(), {"strength.marginal.low": (0.0, 0.01)}), 200, 0)
-    assert np.unique(moved.groups).size == 200
 
 
 def make(**tables):
@@ -284,41 +202,22 @@ def test_the_command_writes_the_page(tmp_path):
     assert "Joint A" in page.read_text(encoding="utf-8")
 
 
-def test_the_command_makes_constants_uncertain(tmp_path, capsys):
-    """As the table of a study does, to the digit."""
-    table = {PRESSURE: {"low": 4e6, "high": 6e6}, "count": 40}
-    study = make(random=RANDOM)
-    path = tmp_path / "study.toml"
-    study.to_toml(path)
-
-    def command(*lines):
-        options = [word for line in lines for word in ("--uncertain", line)]
-        app(["reliability", str(path), *options], standalone_mode=False)
-        return capsys.readouterr().out
-
-    printed = command(f"{PRESSURE} = [4e6, 6e6]", "count = 40")
-    wanted = dataclasses.replace(study, uncertain=table)
-    assert printed.startswith(str(wanted.reliability.answer(wanted.experiments[0])))
-    refuses("--uncertain: must be a line of TOML", lambda: command(PRESSURE))
-    refuses(
-        "uncertain: problem.load: unknown 'weight'",
-        lambda: command("problem.load.weight = [1, 2]"),
-    )
-
-
 def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeypatch):
     """The file beside the study holds the same interfaces, and a file of peaks is compared."""
     monkeypatch.setattr("stiction.study.study.FIRST_MEMBERS", 20)
-    source = st.uncertain(RANDOM, {"strength.marginal.mean": (0.19, 0.21)})
-    refuses("give them as uncertain=", lambda: make(random=source))
-    plain = SimpleNamespace(interfaces=source.interfaces)
 
-    study = make(random=plain, peaks=np.array([0.7, 0.72, 0.9]) * 1e6)
+    def interfaces(count, seed=0):
+        marginals = (st.Gamma(mean=mean, cv=0.15) for mean in np.linspace(0.19, 0.21, count))
+        fields = (dataclasses.replace(FIELD, marginal=marginal) for marginal in marginals)
+        return [dataclasses.replace(RANDOM, strength=field) for field in fields]
+
+    source = SimpleNamespace(interfaces=interfaces)
+    study = make(random=source, peaks=np.array([0.7, 0.72, 0.9]) * 1e6)
     study.to_toml(tmp_path / "study.toml")
     text = (tmp_path / "study.toml").read_text()
     assert 'random = "study.random.json"' in text
     again = st.Study.from_toml(tmp_path / "study.toml")
-    assert again.random == source.interfaces(20)
+    assert again.random == interfaces(20)
     np.testing.assert_array_equal(again.peaks.values[0], study.peaks.values[0])
     assert st.Study.from_dict(again.to_dict()).random == again.random
     # The same with a file of peaks, in other units, which lie far above the prediction.

@@ -12,11 +12,6 @@ from stiction.ensemble import batches
 from stiction.study import failure
 
 SMALLEST = 0.05
-UNCERTAIN = {
-    "count": 4,
-    "random.strength.marginal.low": [0.58e6, 0.7e6],
-    "random.strength.marginal.high": {"type": "truncated_normal", "mean": 1.6e6, "cv": 0.1},
-}
 
 
 def study(*swept, **tables):
@@ -64,21 +59,6 @@ def test_interrupted_in_parts_and_grown_it_has_the_same_bits(tmp_path):
     next((tmp_path / "parts" / "chunks").iterdir()).write_bytes(b"damaged")
     with pytest.warns(UserWarning, match="its repetitions are missing"):
         found.dataset()
-
-
-def test_uncertain_parameters_are_interfaces_that_are_equally_likely(tmp_path):
-    """A study file, and the list it stands for."""
-    one = study(uncertain=UNCERTAIN)
-    one.to_toml(tmp_path / "study.toml")
-    assert st.Study.from_toml(tmp_path / "study.toml") == one
-    likely = one.experiments[0].given
-    lows = sorted(member.strength.marginal.low for member in likely)
-    assert np.floor((np.array(lows) - 0.58e6) / 0.03e6).tolist() == [0, 1, 2, 3]
-    again = st.Study(
-        problem=one.problem, random=likely, method=one.method, ensemble=one.ensemble
-    )
-    found = computed(tmp_path / "run", one, 1)
-    xr.testing.assert_equal(computed(tmp_path / "list", again, 1), found)
 
 
 def test_fewer_repetitions_after_the_study_was_lost_are_the_first_ones(tmp_path):

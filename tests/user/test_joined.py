@@ -10,7 +10,6 @@ from setups import make_problem
 
 import stiction as st
 from stiction.inference.specimens import PRIOR_SCALE
-from stiction.random.equally_likely import as_random, origin
 from stiction.reliability.answer import unseen_batch
 
 PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
@@ -124,8 +123,6 @@ def test_profiles_and_peaks_are_joined():
         apart = st.infer(PROBLEM, fit, 1.5 * peaks, **LOCAL)
     assert any("contradict" in note for note in apart.notes)
     # A design repeats the doubts, and says what so few specimens cannot exclude.
-    uncertain = st.uncertain(apart, {"problem.friction.weakening_rate": (0.2e12, 0.3e12)})
-    assert origin(as_random(uncertain)) is apart
     design = st.design_stress(
         PROBLEM, apart, probability=0.1, method=st.LocalCriterion(), target_cv=0.5,
         sensitivities=False, progress=False,

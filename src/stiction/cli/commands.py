@@ -11,11 +11,9 @@ import os
 import re
 import signal
 import sys
-import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -336,9 +334,6 @@ def description(study: Any) -> dict[str, str]:
     different = distinct(points, "problem", "random", "method")
     methods = ", ".join(dict.fromkeys(point.method.label for point in different))
     lines = {"method": methods, "samples": samples}
-    if study.uncertain:
-        keys = ", ".join(key for key in study.uncertain if key != "count")
-        lines["uncertain"] = f"{keys}: {study.uncertain['count']} equally likely interfaces"
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
         values, variable = coordinates[dim]
@@ -558,14 +553,6 @@ def reliability(
         float | None, Option(help="Shear stress over normal pressure to carry.")
     ] = None,
     probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
-    lines: Annotated[
-        list[str] | None,
-        Option(
-            "--uncertain",
-            metavar="LINE",
-            help="A line of the table [uncertain]; may be repeated.",
-        ),
-    ] = None,
     out: Annotated[
         Path | None,
         Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
@@ -595,32 +582,20 @@ def reliability(
     Problem, strength, method, seed and sweep come from the study file, whose
     number of samples is not used. The stress is the mean shear stress on the
     interface. Failure means that the whole interface slides below that stress.
-    With a table [uncertain], the probability is the mean over equally likely
-    interfaces, and a band contains 90 % of them. `--uncertain` adds a line to
-    this table, such as an assumed constant and its range. Rerunning the command
-    resumes an interrupted run and adds repetitions if `--repetitions` was raised.
-    `stiction export` writes the curve as a table, and `stiction report` writes a
-    page with its figure.
+    With a list of equally likely interfaces, the probability is their mean, and
+    a band contains 90 % of them. Rerunning the command resumes an interrupted run
+    and adds repetitions if `--repetitions` was raised. `stiction export` writes the
+    curve as a table, and `stiction report` writes a page with its figure.
 
     \b
     Examples:
       stiction reliability study.toml --force 40e3
       stiction reliability study.toml --probability 1e-3
-      stiction reliability study.toml --uncertain "problem.friction.residual_ratio = [0.6, 0.8]"
       stiction reliability study.toml --out curve --smallest 1e-6
     """
     from stiction.study.run import table_of
 
     loaded = st.Study.from_toml(study)
-    if lines:
-        try:
-            table = tomllib.loads("\n".join(lines))
-        except ValueError as error:
-            raise InputError(
-                "--uncertain: must be a line of TOML, such as"
-                f" 'problem.friction.residual_ratio = [0.6, 0.8]': {error}"
-            ) from None
-        loaded = replace(loaded, uncertain=(loaded.uncertain or {}) | table)
     asked = _given(
         force=force, stress=stress, friction_coefficient=friction_coefficient,
         probability=probability,

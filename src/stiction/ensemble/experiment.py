@@ -11,7 +11,6 @@ from itertools import chain, pairwise
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from stiction.base.arrays import Array
@@ -32,7 +31,6 @@ from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
 from stiction.problem.sample import Sample
 from stiction.problem.unit_doubts import doubt_strengths
-from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,
@@ -74,11 +72,6 @@ class Experiment:
                 except InputError as error:
                     mistakes |= dict.fromkeys(f"{name}: {text}" for text in error.problems)
         problems = list(mistakes)
-        for constants in getattr(random, "constants", ())[:1]:  # all have the same keys
-            try:
-                with_values(self.problem, constants, "problem")
-            except InputError as error:
-                problems += [f"uncertain: {text}" for text in error.problems]
         problems += refusals(self.problem, self.method)
         unknown = [name for name in self.keep if name not in random.names]
         problems += [unknown_name("keep", name, random.names) for name in unknown]
@@ -180,23 +173,8 @@ class Experiment:
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return the profiles (samples, *shape) of draws by name, in SI."""
-        parts = [(rows, part._profiles(draws[rows])) for rows, part in self._variants(draws)]
-        return _in_order(*zip(*parts, strict=True))
-
-    def _profiles(self, draws: Array) -> dict[str, Array]:
         profiles = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, profiles)
-
-    def _variants(self, draws: Array) -> Iterator[tuple[Any, Experiment]]:
-        """Yield rows of draws, and the experiment with the uncertain constants of these rows."""
-        constants = getattr(self.random, "constants", ())
-        if not constants:
-            yield slice(None), self
-            return
-        variant = self.random.variant(draws)
-        for number in np.unique(variant).tolist():
-            problem = with_values(self.problem, constants[number], "problem")
-            yield np.flatnonzero(variant == number), self._unchecked(problem=problem)
 
     def onset(self, profiles: Mapping[str, Array]) -> Values:
         """Solve profiles (samples, *shape), given by name."""
@@ -211,22 +189,9 @@ class Experiment:
         return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
 
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
-        """Return profiles and results of draws. Each draw uses the constants of its interface."""
-        parts = []
-        for rows, part in self._variants(draws):
-            profiles = part._profiles(draws[rows])
-            parts.append((rows, profiles, part.onset(profiles)))
-        order, profiles_of_parts, values_of_parts = zip(*parts, strict=True)
-        return _in_order(order, profiles_of_parts), _in_order(order, values_of_parts)
-
-    def pressures(self, draws: Array, profiles: Mapping[str, Array]) -> Array:
-        """Return the mean normal pressure, Pa, of each sample."""
-        if "normal_pressure" in profiles:
-            return np.asarray(self.problem.interface.mean(profiles["normal_pressure"]))
-        pressures = np.empty(len(draws))
-        for rows, part in self._variants(draws):
-            pressures[rows] = part.pressure
-        return pressures
+        """Return profiles and results of draws."""
+        profiles = self.profiles(draws)
+        return profiles, self.onset(profiles)
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method. The next call reuses the solver."""
@@ -256,16 +221,6 @@ class Experiment:
 
 
 _solver = lru_cache(maxsize=8)(prepared)
-
-
-def _in_order(
-    rows: Sequence[NDArray[np.int64]], parts: Sequence[dict[str, NDArray[Any]]]
-) -> dict[str, NDArray[Any]]:
-    """Return arrays by name in the order of samples, from parts that hold given rows."""
-    if len(parts) == 1:
-        return parts[0]
-    places = np.argsort(np.concatenate(rows))
-    return {name: np.concatenate([part[name] for part in parts])[places] for name in parts[0]}
 
 
 @model(kw_only=True)

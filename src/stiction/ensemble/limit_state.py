@@ -63,9 +63,7 @@ class LimitState:
     @property
     def _random_pressure(self) -> bool:
         """Whether stresses are divided by a pressure that differs between samples."""
-        random = self.experiment.random
-        constants = bool(getattr(random, "constants", ()))
-        return self.per_pressure and (constants or "normal_pressure" in random.varying)
+        return self.per_pressure and "normal_pressure" in self.experiment.random.varying
 
     def by(self, method: Any) -> Self:
         """Return the same limit state with a different method."""
@@ -126,7 +124,7 @@ class LimitState:
         profiles, values = self.experiment.solve(draws)
         stress: Array = values[self.event]
         if self._random_pressure:
-            pressures = self.experiment.pressures(draws, profiles)
+            pressures = self.experiment.problem.interface.mean(profiles["normal_pressure"])
             stress = stress * self.experiment.pressure / pressures
         self.meter.advance(draws.shape[0])
         return stress
@@ -135,11 +133,6 @@ class LimitState:
     def several(self) -> bool:
         """Whether there are several equally likely interfaces."""
         return len(self.experiment.random.members) > 1
-
-    @property
-    def is_sample(self) -> bool:
-        """Whether these interfaces are only a sample of the interfaces that may be true."""
-        return self.several and not self.experiment.random.complete
 
     @property
     def may_survive(self) -> bool:
@@ -159,8 +152,6 @@ class LimitState:
     def bounds_of_members(self, negligible: float = 0.0) -> list[tuple[float, float]]:
         """Return bounds for each of the equally likely interfaces."""
         members = self.experiment.random.members
-        if getattr(self.experiment.random, "constants", ()):  # they move the bounds
-            return [(-math.inf, math.inf)] * len(members)
         return [self._bounds_of(member, negligible) for member in members]
 
     def _bounds_of(self, random: RandomInterface, negligible: float) -> tuple[float, float]:

@@ -92,9 +92,9 @@ def _differences(
             chosen["pilot_weakest"] = solved[np.argsort(stress[solved])[:size]]
         if not solved.size:
             return {}
-        # 2. The test is for the constants of the problem.
-        may_differ = bool(getattr(experiment.random, "constants", ()))
-        for rows in () if may_differ else chosen.values():
+        # 2.
+        may_differ = False
+        for rows in chosen.values():
             draws = np.concatenate([experiment.draws(first + row, 1) for row in rows.tolist()])
             sample = experiment.sample(experiment.profiles(draws))
             if optional_member(method, "may_differ")(problem, sample, stress[rows]):

@@ -71,7 +71,6 @@ from stiction.inference.whittle import SpectrumFamily, spectrum_family
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.load import NotNegative
-from stiction.random.equally_likely import UncertainSource, uncertain
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 
@@ -301,10 +300,6 @@ class FieldFit(Result):
         members = tuple(of_mean(RandomInterface(strength=one), mean) for one in fields)
         families = self._families or families_of(True)
         return Profiles(members, mean, levels, within, families, self._prior)
-
-    def uncertain(self, parameters: Mapping[str, Any]) -> UncertainSource:
-        """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
-        return uncertain(self, parameters)
 
     def _summary(self) -> Summary:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")

@@ -22,7 +22,6 @@ from stiction.inference.prior import Prior
 from stiction.inference.specimens import FactorGrid
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key
-from stiction.random.equally_likely import UncertainSource, uncertain
 from stiction.random.fields import RandomInterface
 from stiction.random.spectra import Share
 
@@ -154,10 +153,6 @@ class Posterior(Result):
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return [self.at(int(draw))[1] for draw in draws]
-
-    def uncertain(self, parameters: Mapping[str, Any]) -> UncertainSource:
-        """Return a source that also has uncertain parameters, as `stiction.uncertain` does."""
-        return uncertain(self, parameters)
 
     def prior_transform(self, u: Any) -> Array:
         """Return the parameters at points u in the unit cube, in which the prior is uniform.

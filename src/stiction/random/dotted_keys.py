@@ -76,32 +76,15 @@ def full_key(key: str) -> str:
     return f"random.strength.spectrum.{key}"
 
 
-def hypercube(laws: Mapping[str, Any], count: int, seed: int) -> list[dict[str, float]]:
-    """Return a Latin hypercube: each distribution has a value in every 1/count of probability."""
-    rng = np.random.default_rng([seed, 6])
-    # Permute the intervals of each distribution, and take a random
-    # place in each interval.
-    cells = rng.permuted(np.tile(np.arange(count), (len(laws), 1)), axis=1)
-    shares = (cells + rng.random(cells.shape)) / count
-    rows = [law.ppf(share) for law, share in zip(laws.values(), shares, strict=True)]
-    return [dict(zip(laws, values, strict=True)) for values in np.transpose(rows).tolist()]
-
-
-def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
-    """Return frozen distributions by key, or raise an `InputError` that lists all mistakes.
-
-    Full keys must begin with `begin`.
-    """
+def distributions_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return frozen distributions by key, or raise an `InputError` that lists all mistakes."""
     problems: list[str] = []
     distributions: dict[str, Any] = {}
     for key, value in given.items():
         # A name and its full key are the same
         # parameter. All mistakes are listed.
         try:
-            full = full_key(str(key))
-            if not full.startswith(begin):
-                problems.append(f"{full}: is not a parameter of a random property")
-            if full in map(full_key, distributions):
+            if full_key(str(key)) in map(full_key, distributions):
                 problems.append(f"{key} is given twice: it is the same parameter")
             distributions[str(key)] = distribution_of(str(key), value)
         except InputError as error:
@@ -109,15 +92,6 @@ def distributions_of(given: Mapping[str, Any], begin: str = "") -> dict[str, Any
     if problems:
         raise InputError(problems)
     return distributions
-
-
-def uncertain_laws(given: Mapping[str, Any], begin: str = "") -> dict[str, Any]:
-    """Return frozen distributions by full key without `begin`, or raise an `InputError`."""
-    with prefixed("uncertain"):
-        laws = distributions_of(given, begin)
-        if not laws:
-            raise InputError("must map keys to distributions, got an empty mapping")
-    return {full_key(key).removeprefix(begin): law for key, law in laws.items()}
 
 
 def distribution_of(key: str, value: Any) -> Any:

@@ -11,7 +11,7 @@ failures covers all members.
    (`EquallyLikely.from_draws`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import (
@@ -31,10 +31,7 @@ from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.representation import Result, Row, Summary
-from stiction.base.variables import unit_of_key
 from stiction.problem.interface import Interface
-from stiction.random.dotted_keys import hypercube, uncertain_laws, with_values
 from stiction.random.fields import (
     FACTOR,
     RandomField,
@@ -49,11 +46,6 @@ MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
 MAX_DRAWS_OF_STREAM = 1 << 40
 """Upper bound of the number of draws in a stream."""
 
-VARIANTS = 40
-"""Number of values of each uncertain constant of the problem."""
-SHARED_VALUES = 8
-"""Number of members in proportion that share the value of an uncertain parameter, and so remain in
-proportion."""
 FORM_SHARES = np.array([0.05, 0.5, 0.95])
 """Shares whose quantiles over the mean tell marginals apart."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
@@ -103,8 +95,6 @@ class EquallyLikely:
     members: tuple[RandomInterface, ...]
     order: tuple[int, ...] = ()  # of the members along the first draw; empty keeps their order
     source: Source | None = None  # from which the members were drawn
-    complete: bool = False  # whether the members are all possible interfaces, not a sample
-    constants: tuple[Mapping[str, float], ...] = ()  # of the problem, taken in turn by members
 
     def __post_init__(self) -> None:
         if not self.members:
@@ -140,9 +130,7 @@ class EquallyLikely:
     @cached_property
     def groups(self) -> NDArray[np.int64]:
         """Number of each member's group. The strengths in a group are proportional."""
-        _, numbers = _numbered([form_of(member.strength) for member in self.members])
-        variants = max(len(self.constants), 1)
-        return numbers * variants + np.arange(numbers.size) % variants
+        return _numbered([form_of(member.strength) for member in self.members])[1]
 
     @cached_property
     def means(self) -> Array:
@@ -171,10 +159,6 @@ class EquallyLikely:
         # The middle of a member's interval, so that round-off cannot
         # select its neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
-
-    def variant(self, draws: Array) -> NDArray[np.int64]:
-        """Return, for each sample, the number of the set of constants that it uses."""
-        return self.member(draws) % max(len(self.constants), 1)
 
     def larger(self, count: int, seed: int) -> "EquallyLikely":
         """Return a mixture of `count` members from the same source."""
@@ -275,123 +259,16 @@ def form_of(field: RandomField) -> Any:
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     """Return a mixture that holds `count` interfaces from a source."""
-    constants = source.constants(seed) if isinstance(source, UncertainSource) else ()
-    members = tuple(source.interfaces(count, seed))
-    return EquallyLikely(members, source=source, constants=tuple(constants))
+    return EquallyLikely(tuple(source.interfaces(count, seed)), source=source)
 
 
-def origin(random: Any) -> Any:
-    """Return the fit or posterior from which random interfaces were drawn, or `None`."""
-    source = getattr(random, "source", None)
-    return (
-        origin(source.given) or source.given if isinstance(source, UncertainSource) else source
-    )
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class UncertainSource(Result):
-    """Source with distributions of parameters and of constants in the problem."""
-
-    given: Any  # a random interface, several, or a source
-    laws: Mapping[str, Any]  # by full key
-
-    def _summary(self) -> Summary:
-        rows = [
-            Row(key, law.mean(), law.ppf([0.05, 0.95]).tolist(), unit_of_key(key, ""))
-            for key, law in self.laws.items()
-        ]
-        return Summary("Uncertain parameters, means", rows, "90 % interval")
-
-    def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
-        """Return `count` equally likely interfaces, without constants of the problem."""
-        source = self.given.source if isinstance(self.given, EquallyLikely) else self.given
-        if isinstance(source, Source):
-            likely: Any = drawn_from(source, count, seed)
-        else:
-            likely = as_random(self.given)
-        keys = [key for key in self.laws if not key.startswith("problem.")]
-        ranks = np.arange(count)
-        # Member n takes the constants n % VARIANTS. Members with the
-        # same constants get neighbouring ranks and thereby, in the
-        # order of groups, strengths in proportion.
-        if len(keys) < len(self.laws):
-            turns = np.array_split(ranks, VARIANTS)
-            ranks = np.array([turns[n % VARIANTS][n // VARIANTS] for n in range(count)])
-        numbers = np.argsort(np.resize(likely.groups, count), kind="stable")[ranks]
-        members = [likely.members[number % len(likely.members)] for number in numbers]
-        if not keys:
-            return members
-        # Neighbours in a group also share values of parameters.
-        several = 1 < np.unique(likely.groups).size < len(likely.members)
-        shared = SHARED_VALUES if several else 1
-        rows = hypercube({key: self.laws[key] for key in keys}, -(-count // shared), seed)
-        row = ranks // shared if several else np.arange(count)
-        return [
-            with_values(member, {k.removeprefix("random."): v for k, v in rows[number].items()})
-            for member, number in zip(members, row, strict=True)
-        ]
-
-    def constants(self, seed: int) -> list[dict[str, float]]:
-        """Return values for constants in the problem, by key. The keys omit ``problem.``."""
-        keys = [key for key in self.laws if key.startswith("problem.")]
-        laws = {key.removeprefix("problem."): self.laws[key] for key in keys}
-        return hypercube(laws, VARIANTS, seed + 1) if keys else []
-
-
-def uncertain(random: Any, parameters: Mapping[str, Any]) -> UncertainSource:
-    """Give distributions to parameters of random properties and to constants in the problem.
-
-    Parameters
-    ----------
-    random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The random properties.
-    parameters : mapping
-        Distributions by dotted key, such as
-        ``"problem.friction.residual_ratio"``, ``"problem.load.pressing_force"``
-        or ``"strength.spectrum.correlation_length"``, as in
-        `RandomInterface.uncertain`. They are independent.
-
-    Returns
-    -------
-    UncertainSource
-        Pass it to `design_stress`, `failure_probability` or any
-        function that takes a fit. Each constant of the problem takes
-        forty values, evenly spread over its distribution.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=256)
-    >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-    >>> source = st.uncertain(strength, {"problem.friction.weakening_rate": (4e12, 6e12)})
-    >>> len(source.constants(seed=0))
-    40
-    """
-    laws = uncertain_laws(parameters)
-    # Another interface has other nodes, so its draws and profiles would
-    # not fit together.
-    if wrong := [key for key in laws if key.startswith("problem.interface.")]:
-        raise InputError(f"uncertain: {wrong[0]}: cannot be uncertain. Sweep over it instead")
-    with prefixed("random"):
-        _known(random)
-    return UncertainSource(random, laws)
-
-
-def as_random(
-    given: Any, seed: int = 0, mixture: bool = False
-) -> RandomInterface | EquallyLikely:
-    """Return a random interface. A list or a source of several interfaces gives a mixture.
-
-    If `mixture` is true, the list is
-    complete: no other interface is possible.
-    """
-    if mixture and not (isinstance(given, list | tuple) and len(given) > 1):
-        raise InputError("mixture: needs a list of all possible interfaces, two or more")
+def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:
+    """Return a random interface. A list or a source of several interfaces gives a mixture."""
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
         return drawn_from(given, FIRST_MEMBERS, seed)
     if not isinstance(given, list | tuple):
         return as_random_interface(given)
-    random = EquallyLikely(tuple(map(as_random_interface, given)), complete=mixture)
+    random = EquallyLikely(tuple(map(as_random_interface, given)))
     return random if len(random.members) > 1 else random.members[0]

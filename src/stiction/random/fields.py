@@ -32,10 +32,9 @@ from scipy.optimize import brentq
 from scipy.special import ndtri
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
+from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import (
     Converted,
-    Count,
     Flag,
     Number,
     Positive,
@@ -50,7 +49,6 @@ from stiction.base.units import is_in
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
 from stiction.random.conditioning import MIN_PIVOT, Conditions, conditionings, lower_factor
-from stiction.random.dotted_keys import hypercube, uncertain_laws, with_values
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.modes import Modes, make_modes
@@ -544,49 +542,6 @@ class RandomInterface:
         Sample i depends on the seed and on i only.
         """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
-
-    @checked
-    def uncertain(
-        self, parameters: Mapping[str, Any], count: Count, seed: Number = 0
-    ) -> list[RandomInterface]:
-        """Return equally likely random interfaces whose parameters have given distributions.
-
-        Pass the list to a failure probability. The parameters are
-        independent. Each parameter has a value in every interval of
-        probability 1/count (a Latin hypercube: McKay and others, 1979).
-
-        Parameters
-        ----------
-        parameters : mapping
-            Distributions by dotted key, like the priors of `infer`:
-            frozen `scipy.stats` distributions, ranges (low, high), or
-            tables as in a study file.
-        count : int
-            Number of interfaces. 30 are enough for a 90 % band.
-        seed : int
-            Seed for the values, not negative.
-
-        Examples
-        --------
-        >>> import scipy.stats
-        >>> import stiction as st
-        >>> problem = st.paper.problem(nodes=256)
-        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-        >>> likely = st.RandomInterface(strength=strength).uncertain(
-        ...     {"strength.spectrum.correlation_length": scipy.stats.loguniform(1e-3, 6e-2)}, 30
-        ... )
-        >>> len(likely), likely[0].strength.marginal == strength.marginal
-        (30, True)
-        """
-        laws = uncertain_laws(parameters, "random.")
-        # A value may be invalid together with the others, so the
-        # message names all of them.
-        interfaces = []
-        for values in hypercube(laws, count, seed):
-            where = ", ".join(f"{key} = {value:.4g}" for key, value in values.items())
-            with prefixed(f"uncertain: at {where}"):
-                interfaces.append(with_values(self, values))
-        return interfaces
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn if the grid is too coarse or the interface too short for a field."""

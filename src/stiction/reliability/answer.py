@@ -35,7 +35,7 @@ from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.problem.problem import Problem
-from stiction.random.equally_likely import MAX_MEMBERS, origin
+from stiction.random.equally_likely import MAX_MEMBERS
 from stiction.reliability.counting import CONFIDENCE
 from stiction.reliability.tail import TailPoint, guide_of
 
@@ -85,7 +85,7 @@ class Answer(Result):
         Part of `cv` that arises because a list of equally
         likely interfaces is only a sample of the interfaces
         that may be true. The squares of this part and the
-        sampling error add up. 0 for a mixture.
+        sampling error add up. 0 for a single interface.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and samples solved only by its
         less expensive first stage.
@@ -469,7 +469,7 @@ def bounded(lowest: float) -> bool:
 
 def sampling_target(state: LimitState, target_cv: float) -> float:
     """Return the part of the target that is left for the sampling error."""
-    return target_cv * (SAMPLING_SHARE if state.is_sample else 1.0)
+    return target_cv * (SAMPLING_SHARE if state.several else 1.0)
 
 
 def wanted_members(random: Any, cv: float, target_cv: float) -> int:
@@ -493,7 +493,7 @@ def answered(
         experiment, answer = with_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
-    source = origin(experiment.random)
+    source = getattr(experiment.random, "source", None)
     return replace(
         answer,
         warnings=tuple(texts_of(warned)),

@@ -23,7 +23,7 @@ import xarray as xr
 
 from stiction.base.arrays import Array
 from stiction.base.errors import merge_warnings, warn_accuracy
-from stiction.base.model import Count, Flag, Number, Progress, checked
+from stiction.base.model import Count, Number, Progress, checked
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.ensemble.experiment import Experiment
@@ -83,7 +83,6 @@ def failure_curve(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
-    mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
@@ -98,7 +97,7 @@ def failure_curve(
         It is lower at other points. Repetitions are added until it is
         reached. They are the same as in `Study.failure_curve` with the
         same numbers.
-    problem, random, method, seed, max_evaluations, event, mixture,
+    problem, random, method, seed, max_evaluations, event,
     workers, progress
         As in `design_stress`.
 
@@ -136,7 +135,7 @@ def failure_curve(
     >>> bool((curve.stress.diff("point") < 0.0).all())
     True
     """
-    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
 
     def solve(experiment: Experiment, meter: Meter) -> TailPoint:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
@@ -154,7 +153,7 @@ def failure_curve(
         for text in curve_doubts(end, smallest, target_cv):
             warn_accuracy(text)
     attributes = study_attributes(problem=problem, random=experiment.given, method=method)
-    attributes |= {"seed": seed} | ({"mixture": 1} if mixture else {})
+    attributes["seed"] = seed
     # 3. If the event never happens, the only point is NaN.
     last = smallest if end.tail.complete else end.probability or COMMONEST
     return curve_of(end.tail, end.state, chances(last), attributes)

@@ -23,8 +23,7 @@ Steps:
    interfaces with this family. These interfaces
    are draws from the posterior given the family.
 5. For each constant solve the same samples at both ends of its range: a
-   stated range, the 5 and 95 % quantiles of an uncertain constant, or
-   `USUAL_SHARE` below and above its value.
+   stated range, or `USUAL_SHARE` below and above its value.
 6. Multiply the design by the ratios of the quantiles from steps 4 and 5
    to the quantile from step 3.
 """
@@ -87,7 +86,6 @@ def design_stress(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
-    mixture: Flag = False,
     confidence: Share = 0.75,
     sensitivities: Flag | dict[str, tuple[Real, Real]] | None = None,
     workers: Count | None = None,
@@ -113,11 +111,11 @@ def design_stress(
         Confidence of the `characteristic_stress`.
     sensitivities : bool or mapping, optional
         Whether to compute how families and constants affect the design. By default
-        this is done if `random` is a fit, a posterior or `uncertain`. A mapping from
+        this is done if `random` is a fit or a posterior. A mapping from
         dotted keys in the problem to ranges, such as
         ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 %
         on either side.
-    problem, random, seed, max_evaluations, event, mixture, workers, progress
+    problem, random, seed, max_evaluations, event, workers, progress
         As in `failure_probability`.
 
     Returns
@@ -158,7 +156,7 @@ def design_stress(
             answer = replace(answer, sensitivities=effects)
         return replace(answer, quantity="stress" if math.isnan(answer.area) else "force")
 
-    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
     return answered(experiment, target_cv, "design_stress", progress, solve)
 
 
@@ -216,22 +214,18 @@ def value_at(problem: Any, key: str) -> Any:
     return value
 
 
-def ranges_of(problem: Any, random: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
+def ranges_of(problem: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
     """Return the range of each constant by dotted key without ``problem.``."""
     ranges = {}
     for key in CONSTANTS:
         value = value_at(problem, key)
         if np.ndim(value) == 0 and is_finite(value) and value > 0.0:
             ranges[key] = value * (1.0 - USUAL_SHARE), value * (1.0 + USUAL_SHARE)
-    laws = getattr(getattr(random, "source", None), "laws", {})
-    given: dict[str, Any] = {key: law.ppf([0.05, 0.95]).tolist() for key, law in laws.items()}
-    given |= stated
-    for key, ends in given.items():
+    for key, ends in stated.items():
         short = key.removeprefix("problem.")
-        if key.startswith("problem.") and value_at(problem, short) is not None:
-            ranges[short] = tuple(ends)
-        elif key in stated:
+        if not key.startswith("problem.") or value_at(problem, short) is None:
             raise InputError(f"sensitivities: {key}: is not a constant of this problem")
+        ranges[short] = tuple(ends)
     return ranges
 
 
@@ -240,10 +234,7 @@ def sensitivities_of(
 ) -> xr.Dataset:
     """Return the design stress at both ends of each source, with the largest effect first."""
     experiment = state.experiment
-    problem, random = experiment.problem, experiment.random
-    # Constants are all at their values, because their ranges are sources.
-    if getattr(random, "constants", ()):
-        random = replace(random, constants=())
+    problem = experiment.problem
 
     def quantile_at(constants: Mapping[str, float]) -> float:
         changed = replace(experiment, problem=with_values(problem, constants, "problem"))
@@ -254,15 +245,14 @@ def sensitivities_of(
     with collect_warnings():
         # 3. and 4. The reference takes the same samples as the ends,
         # not those of the design.
-        experiment = replace(experiment, random=random)
-        counts = solve_specimens(replace(state, experiment=experiment), 0, SAMPLES_PER_END)
+        counts = solve_specimens(state, 0, SAMPLES_PER_END)
         reference = counts.tail.quantile(probability)
         families = _by_family(counts, probability)
         if len(families) > 1:
             least, most = (pick(families, key=families.__getitem__) for pick in (min, max))
             rows.append((FAMILY, least, most, families[least], families[most]))
         # 5. Only the problem changes, so the draws remain the same.
-        for key, ends in ranges_of(problem, state.experiment.random, stated).items():
+        for key, ends in ranges_of(problem, stated).items():
             state.meter.note = f"what moves the design: {key}"
             try:
                 low, high = (quantile_at({key: end}) for end in ends)

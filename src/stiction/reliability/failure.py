@@ -29,7 +29,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Flag, Number, Positive, Progress, Real, checked
+from stiction.base.model import Count, Number, Positive, Progress, Real, checked
 from stiction.base.progress import Meter
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES
@@ -93,7 +93,6 @@ def failure_probability(
     seed: Number = 0,
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
-    mixture: Flag = False,
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Answer:
@@ -139,12 +138,6 @@ def failure_probability(
         Whether failure is sliding of the whole interface, or the first
         instability of a patch, which may be arrested. By the local
         criterion both are the same.
-    mixture : bool
-        Whether a list of interfaces is complete, for
-        example three equally common batches. The interval
-        then contains only the sampling error. By default
-        the list is a sample of the interfaces that may be
-        true, and a short list makes the interval wide.
 
     Returns
     -------
@@ -200,7 +193,7 @@ def failure_probability(
         answer = _probability(state, wanted, algorithm, target_cv, budget, max_evaluations)
         return replace(answer, quantity=name)
 
-    experiment = Experiment(problem, as_random(random, seed, mixture), method, seed=seed)
+    experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
     return answered(experiment, target_cv, "failure_probability", progress, solve)
 
 
@@ -268,7 +261,7 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
         reason = f"no interface carries more than {high:.7g} Pa"
     reason += "" if certain else f", but for a probability below {doubt:g}"
     members = len(state.experiment.random.members)
-    if state.is_sample:  # another list might have other bounds
+    if state.several:  # another list might have other bounds
         doubt = max(doubt, binomial_interval(0, members)[1])
     return Answer.at(
         TailPoint(state, Tail((), "exact", reason), stress),

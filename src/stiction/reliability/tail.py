@@ -285,8 +285,8 @@ class TailPoint:
 
     @cached_property
     def members_cv(self) -> float:
-        """Part of `cv` due to the list of interfaces. 0 for a single interface or a mixture."""
-        if not self.state.is_sample:
+        """Part of `cv` due to the list of interfaces. 0 for a single interface."""
+        if not self.state.several:
             return 0.0
         return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
 

@@ -40,14 +40,7 @@ from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem, stress_of
 from stiction.random.dotted_keys import with_values
-from stiction.random.equally_likely import (
-    FIRST_MEMBERS,
-    Source,
-    UncertainSource,
-    as_random,
-    drawn_from,
-    uncertain,
-)
+from stiction.random.equally_likely import FIRST_MEMBERS, Source
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer, Probability, TargetCv
 from stiction.reliability.design import design_stress
@@ -55,7 +48,7 @@ from stiction.reliability.failure import failure_probability
 from stiction.study.failure import Repetitions, complete_curves
 from stiction.study.reading import TABLES, check_toml, read_toml, validated
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, Uncertain, grid_axes
+from stiction.study.sweep import Point, Sweep, grid_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,10 +76,6 @@ _Interface: Any = Annotated[
 
 def _interfaces(given: Any) -> Any:
     """Return the interfaces from a fit or a posterior. Return other values unchanged."""
-    if isinstance(given, UncertainSource):
-        raise InputError(
-            "random: has uncertain parameters. Give them as uncertain= of the study"
-        )
     return given.interfaces(FIRST_MEMBERS) if isinstance(given, Source) else given
 
 
@@ -158,7 +147,6 @@ class Question:
             "method": experiment.method,
             "seed": experiment.seed,
             "workers": workers,
-            "mixture": getattr(experiment.random, "complete", False),
         }
         if self.probability is None:
             return failure_probability(experiment.problem, experiment.random, **options)
@@ -195,15 +183,6 @@ class Study(_Parts):
         Axes of the sweep. All their combinations are computed. An axis
         maps dotted keys, which vary together, to lists of values. The
         samples are the same at every point of the sweep.
-    uncertain : dict, optional
-        Distributions of parameters in ``random`` by dotted key, as in
-        `RandomInterface.uncertain`, and a ``count``, by default 30.
-        With the seed, ``count`` equally likely interfaces are drawn.
-        `failure_curve` computes their mean and band, and `run` draws
-        samples from all of them.
-    mixture : bool
-        Whether a list in ``random`` is complete, as in
-        `stiction.failure_probability`.
     save : Save, optional
         Results that `stiction rupture` keeps, and the positions of stations.
     reliability : Question, optional
@@ -241,8 +220,6 @@ class Study(_Parts):
     """
 
     sweep: Sweep = ()
-    uncertain: Uncertain = None
-    mixture: Flag = False
     save: Save | None = None
     reliability: Question | None = None
     peaks: PeaksOfStudy | None = None
@@ -305,15 +282,10 @@ class Study(_Parts):
                     if key not in made:
                         made[key] = getattr(with_values(base, values), name)
                     parts[name] = made[key]
-                random = parts["random"]
-                if self.uncertain or self.mixture:
-                    key = "several", id(random)
-                    made[key] = random = made.get(key) or self._several(random)
-                key = id(parts["problem"]), id(random), id(parts["method"])
+                problem, random, method, _ = parts.values()
+                key = id(problem), id(random), id(method)
                 if key not in made:
-                    made[key] = Experiment(
-                        parts["problem"], random, parts["method"], self.ensemble.keep
-                    )
+                    made[key] = Experiment(problem, random, method, self.ensemble.keep)
                 experiments.append(made[key].with_seed(parts["ensemble"].seed))
             except InputError as error:
                 where = f", at {point} of the sweep" if point.values else ""
@@ -322,27 +294,6 @@ class Study(_Parts):
         if problems:
             raise InputError(problems.values())
         return experiments
-
-    def _several(self, random: Any) -> Any:
-        """Return a mixture of a complete list, or of what the uncertain parameters allow."""
-        parameters = dict(self.uncertain or {})
-        count = parameters.pop("count", 0)
-        if not parameters:
-            return as_random(random, mixture=True)
-        if self.mixture:
-            raise InputError(
-                "mixture: cannot be combined with [uncertain], whose interfaces are a sample and"
-                " not a complete mixture. Remove mixture"
-            )
-        axes = [key for axis in self.sweep for key in axis]
-        for key in parameters:
-            if any(f"{key}.".startswith(f"{axis}.") for axis in axes):
-                raise InputError(
-                    f"uncertain: {key} is also swept. Remove it from [uncertain] or from the sweep"
-                )
-        if isinstance(random, list) or any(key.startswith("problem.") for key in parameters):
-            return drawn_from(uncertain(random, parameters), count, self.ensemble.seed)
-        return random.uncertain(parameters, count, self.ensemble.seed)
 
     @property
     def axes(self) -> GridAxes:
@@ -494,7 +445,7 @@ class Study(_Parts):
             Python function.
         """
         plain = to_plain(self).items()
-        left_out = ("title", "sweep", "mixture")
+        left_out = ("title", "sweep")
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:

@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, PlainSerializer
 
 from stiction.base.errors import InputError, prefixed, unknown_name
-from stiction.base.model import Count, check, describe, to_plain
+from stiction.base.model import describe, to_plain
 from stiction.base.variables import UNITS, Variable, unit_of_key
 from stiction.ensemble.dataset import Coordinates, GridAxes
-from stiction.random.dotted_keys import distributions_of, full_key
-from stiction.random.marginals import Marginal, marginal_of
 from stiction.study.reading import TABLES
 
-INTERFACES = 30
-"""Number of equally likely interfaces of a study with uncertain parameters."""
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
 """Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
@@ -72,7 +68,7 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         inner = value.values() if isinstance(value, Mapping) else ()
         if any(isinstance(one, Mapping | list | tuple | np.ndarray) for one in inner):
             result |= _flat(value, f"{prefix}{key}.")
-        else:  # values, or a distribution
+        else:
             result[f"{prefix}{key}"] = value
     return result
 
@@ -115,35 +111,6 @@ def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
 
 Sweep: TypeAlias = Annotated[Any, BeforeValidator(read_axes), PlainSerializer(_plain_axes)]
 """Axes that are crossed: tables of dotted keys that vary together, with lists of values."""
-
-
-def _read_uncertain(given: Any) -> dict[str, Any] | None:
-    """Return ``count``, and by full key the distributions as tables of marginals."""
-    if given is None:
-        return None
-    if not isinstance(given, Mapping):
-        raise InputError(
-            f"must be a table of keys and their distributions, got {describe(given)}"
-        )
-    rest = dict(given)
-    uncertain: dict[str, Any] = {"count": check("count", rest.pop("count", INTERFACES), Count)}
-    flat = _flat(rest)
-    for key, distribution in distributions_of(flat).items():
-        try:
-            given = flat[key]
-            table = isinstance(given, Marginal) or (
-                isinstance(given, Mapping) and "type" in given
-            )
-            uncertain[full_key(key)] = to_plain(marginal_of(given if table else distribution))
-        except ValueError as error:
-            raise InputError(f"{key}: {error}") from None
-    if len(uncertain) == 1:
-        raise InputError("names no parameter. Give its dotted key and a distribution")
-    return uncertain
-
-
-Uncertain: TypeAlias = Annotated[Any, BeforeValidator(_read_uncertain)]
-"""Distributions by dotted key, and the number of interfaces."""
 
 
 def _text(value: Any) -> str:
