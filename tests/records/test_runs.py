@@ -5,13 +5,11 @@ import io
 import math
 import re
 import sys
-import tomllib
 import warnings
 from functools import partial
 from pathlib import Path
 from unittest import mock
 
-import numpy as np
 import pandas as pd
 import tomli_w
 import xarray as xr
@@ -130,69 +128,24 @@ def commands_of_a_plane():
     return of_commands(plain, *lines)
 
 
-@calls("st.onset and st.simulate_rupture of the same profile", close=1e-5)
-def onset_and_rupture_of_a_profile():
-    study = small(0.31e12, method={"type": "rupture", "loading_rate": 6e8})
-    x = np.arange(96) * 0.047 / 96
-    strength = 0.95 + 0.2 * np.sin(400.0 * x) + 0.1 * np.cos(933.0 * x)
-    found = {}
-    with beside(study):
-        table = np.column_stack([1e3 * x, strength])
-        np.savetxt(
-            "scan.csv", table, delimiter=";", header="x (mm);strength (MPa)", comments=""
-        )
-        strength[20:31] = np.nan
-        np.savetxt("gaps.csv", np.column_stack([x, 1e6 * strength]), delimiter=",")
-        np.savetxt("three.csv", np.ones((2, 3)), delimiter=",")
-        plain = tomllib.loads(Path("study.toml").read_text())
-        plain["problem"]["load"] = {"normal_pressure": 2e6, "profile": "load.csv"}
-        Path("joint").mkdir()
-        np.savetxt("joint/load.csv", np.column_stack([x, table[::-1, 1]]), delimiter=",")
-        Path("joint/problem.toml").write_text(tomli_w.dumps({"problem": plain["problem"]}))
-        head = "Weg [mm];Reibzahl [-]"
-        table = np.column_stack([1e3 * x, table[:, 1] / 2.0])
-        np.savetxt("mu.csv", table, delimiter=";", header=head, comments="")
-        varying = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
-        Path("joint/varying.toml").write_text(tomli_w.dumps({"problem": varying}))
-        Path("wrong.toml").write_text("title = 'nothing'\n[randon]\na = 1\n")
-        for line in """onset study.toml --strength scan.csv
-rupture study.toml --strength scan.csv --out found
-onset study.toml --strength scan.csv --method equilibrium --unit GPa
-onset joint/problem.toml --strength scan.csv
-onset joint/problem.toml --strength mu.csv --quantity friction_coefficient
-onset joint/problem.toml --strength mu.csv
-onset joint/varying.toml --strength scan.csv
-onset wrong.toml --strength scan.csv
-onset study.toml --strength gaps.csv
-onset study.toml --strength gaps.csv --gaps fill
-onset study.toml --strength three.csv
-onset study.toml --strength p.npy --method local
-onset study.toml --strength missing.npy
-onset study.toml --strength missing.tif
-rupture study.toml --out study.toml""".splitlines():
-            found[line] = command(line)
-    return found
-
-
 @calls("the same answers by st.failure_probability", close=1e-4)
 def answers_of_commands():
     plain = small(0.31e12, sweep=lengths(4e-3, 6e-3))
     plain["problem"]["interface"]["width"] = 0.013
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
-    plain["reliability"] = {"force": 430.0, "target_cv": 0.5}
-    lines = """
- --probability 0.02
- --friction-coefficient 0.26
- --stress 7e5 --force 7e3
- --probability 2
- --out run --stress 7e5
- --part 1/3 --stress 7e5""".splitlines()
+    found = {}
+    asked = {"force": 430.0}, {"probability": 0.02}, {"friction_coefficient": 0.26}
     with beside(plain):
-        found = {line: command(f"reliability study.toml{line}") for line in lines}
-        del plain["reliability"], plain["problem"]["interface"]["width"]
-        Path("other.toml").write_text(tomli_w.dumps(plain))
-        asked = ("", " --force 7e3")
-        return found | {f"other{one}": command(f"reliability other.toml{one}") for one in asked}
+        for question in asked:
+            text = tomli_w.dumps(plain | {"reliability": question | {"target_cv": 0.5}})
+            Path("study.toml").write_text(text)
+            found[str(question)] = command("reliability study.toml")
+        wrong = {"stress": 7e5, "force": 7e3}, {"probability": 2}, None
+        for question in wrong:
+            asked = {} if question is None else {"reliability": question}
+            Path("study.toml").write_text(tomli_w.dumps(plain | asked))
+            found[str(question)] = command("reliability study.toml")
+    return found
 
 
 @calls("read beside the folder")
@@ -216,28 +169,6 @@ export run out.txt
 report study.toml""".splitlines():
             found[line] = command(line)
     return found
-
-
-@calls(
-    "st.failure_curve in memory, tests/user/test_failure_run.py; counting, tests/oracle",
-    close=1e-4,
-)
-def reliability_of_equally_likely_interfaces():
-    study = small(0.31e12)
-    study["problem"]["interface"]["width"] = 0.013
-    strength = study["random"]["strength"]
-    study["random"] = [
-        {"strength": strength | {"marginal": strength["marginal"] | {"alpha": alpha}}}
-        for alpha in (1.4, 1.65, 1.9)
-    ]
-    study["sweep"] = [{"random.strength.marginal.low": [6.1e5, 7.0e5]}]
-    return of_commands(
-        study,
-        "reliability study.toml --out run --smallest 1e-2 --repetitions 2 --workers 1",
-        "status run",
-        "export run all.csv",
-        "report run",
-    )
 
 
 @calls("the samples that fail are those that are said to")

@@ -99,7 +99,6 @@ MISTAKES = {
     f"run study.toml --out {LONG}": "error: ",
     "run study.toml --out not-utf8-\udcff": "error: ",
     f"check {LONG}.toml": "error: ",
-    "rupture study.toml --sample -1": "--sample",
     "nothing": "nothing",
 }
 """Those that tests/records does not hold: what they print depends on the terminal or the system."""

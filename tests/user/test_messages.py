@@ -116,11 +116,12 @@ def test_every_help_has_examples_and_no_text_is_cut(runs):
 
 @pytest.mark.filterwarnings("always")
 def test_the_example_is_a_study_that_runs_without_a_doubt(inside, runs):
-    (inside / "study.toml").write_text(runs("example"))
+    runs("example study.toml")
+    runs("example study.toml", "exists already", code=2)
     for line in ("check study.toml", "run study.toml --out run", "report run"):
         said = runs(line)
         assert "warning" not in said, said
-    assert "P = " in runs("reliability study.toml --stress 0.7e6")
+    assert "P = " in runs("reliability study.toml")
 
 
 @pytest.mark.parametrize(
@@ -159,10 +160,14 @@ def test_a_cache_that_cannot_be_used_is_said_once(inside):
 def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs):
     study = text(title="Größe")
     contents = {
-        "utf16.toml": (study.encode("utf-16"), "save it as UTF-8"),
+        "tab.toml": (b'peaks = "data\\tau.csv"\n' + text().encode(), "write / for \\, or"),
+        "letter.toml": (b'peaks = "data\\xau.csv"', "in paths, write / for \\, or"),
         "latin.toml": (study.encode("latin-1"), "save it as UTF-8"),
-        "json.toml": (b'{"problem": 1}', "`stiction example` prints a study"),
-        "other.toml": (b"[tool.poetry]\n", "`stiction example` prints a study to start from"),
+        "json.toml": (b'{"problem": 1}', "`stiction example FILE` writes a study"),
+        "other.toml": (
+            b"[tool.poetry]\n",
+            "`stiction example FILE` writes a study to start from",
+        ),
         "case.toml": (study.replace("[ensemble]", "[Ensemble]").encode(), "mean 'ensemble'"),
     }
     for name, (content, words) in contents.items():
@@ -170,7 +175,9 @@ def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs)
         (line,) = runs(f"check {name}", words, code=2).splitlines()
         assert line.startswith("error: ")
     (inside / "mark.toml").write_bytes(study.encode("utf-8-sig"))
+    (inside / "wide.toml").write_bytes(study.encode("utf-16"))  # `>` of PowerShell 5.1
     runs("check mark.toml", "valid")
+    runs("check wide.toml", "valid")
     (line,) = runs("check Mark.toml", "mean 'mark.toml'", code=2).splitlines()
     for folder, code in (("none", 1), ("mark.toml", 2)):
         assert len(runs(f"status {folder}", "give the folder", code=code).splitlines()) == 1

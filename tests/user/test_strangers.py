@@ -29,7 +29,6 @@ from stiction.base.netcdf import read_netcdf
 from stiction.ensemble import batches, store
 from stiction.methods.dynamics.save import open_rupture
 from stiction.problem.profiles.files import IMAGES, NETCDF, TEXT
-from stiction.study.study import read_setup
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has other means")
 SOURCES = Path(__file__).parents[2] / "src"
@@ -120,7 +119,6 @@ READERS = {
     **{f"p{ending}": st.read_profile for ending in (*TEXT, *NETCDF, *IMAGES, ".xlsx", ".npy")},
     "peaks.csv": st.read_peaks,
     "study.toml": st.Study.from_toml,
-    "setup.toml": read_setup,
     "study.json": lambda path: st.open_run(path.parent),
     "pilot.json": lambda path: st.open_run(path.parent).dataset(),
     f"chunks/{'0' * 32}.npz": lambda path: st.open_run(path.parents[1]).status(),
@@ -403,26 +401,6 @@ def _noted(aside, mode):
 
 def test_a_failure_is_printed_without_escapes():
     assert "\x1b" not in str(batches.Failure(0, 1, 2, "\x1b[2Jnice"))
-
-
-def test_a_study_names_no_folder_to_write_to(tmp_path):
-    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | {"save": {"to": "/tmp/x"}}))
-    for read in (st.Study.from_toml, read_setup):
-        refuses("save.to", lambda read=read: read(tmp_path / "study.toml"))
-
-
-@pytest.mark.parametrize("saved", [3, [], "to", {"to": 3, "too": 4}])
-def test_a_table_of_another_kind_is_no_traceback(tmp_path, saved):
-    (tmp_path / "study.toml").write_text(tomli_w.dumps(STUDY | {"save": saved}))
-    refuses("save", lambda: st.Study.from_toml(tmp_path / "study.toml"))
-
-
-@pytest.mark.parametrize("settings", [3, {"smallest": "x", "event": []}, {}])
-def test_forged_settings_of_a_curve_are_no_traceback(tmp_path, run, settings):
-    shutil.copytree(run, tmp_path / "run")
-    study = store.read_study(run) | {"failure_curve": settings}
-    store._write_json(tmp_path / "run" / "study.json", study)
-    refuses("cannot read its study", lambda: st.open_run(tmp_path / "run"), st.RunError)
 
 
 def test_many_mistakes_and_long_keys_are_told_in_few_words(tmp_path):

@@ -242,3 +242,29 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
     sweep = [{"random.strength.given.noise": [5e3, 20e3]}]
     found = loaded(tmp_path, **options, ensemble={"samples": 3}, sweep=sweep).run()
     assert found.critical_stress.sizes == {"noise": 2, "sample": 3}
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.parametrize(
+    ("key", "question", "bad", "words"),
+    [
+        (
+            "method",
+            {"probability": 0.1},
+            {"type": "rupture", "loading_rate": 1e7},
+            "method: 20,000 evaluations",
+        ),
+        (
+            "problem.load.normal_pressure",
+            {"friction_coefficient": 0.4},
+            0.0,
+            "needs a normal pressure",
+        ),
+    ],
+)
+def test_a_question_is_refused_wherever_its_bad_point_is(key, question, bad, words, place):
+    """Before any point is answered, because points may take hours."""
+    good = {"type": "local_criterion"} if key == "method" else {"normal_pressure": 1e6}
+    values = [good, good]
+    values[place] = bad
+    refuses(words, lambda: swept({key: values}, reliability=question))

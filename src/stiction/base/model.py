@@ -183,7 +183,12 @@ def _names(value: Any) -> tuple[str, ...]:
 
 def _path(value: Any) -> Path:
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else ""
-    usable = isinstance(text, str) and text != "" and text.isprintable()
+    usable = isinstance(text, str) and text != ""
+    if usable and not text.isprintable():
+        raise ValueError(
+            "must be a path without tabs and line breaks, which \\t and \\n mean in double quotes."
+            " Write / for \\, or put it in single quotes"
+        )
     if not usable or max(map(len, Path(text).parts), default=0) > 255:
         raise ValueError("must be a path in UTF-8, each name at most 255 letters")
     return Path(text)

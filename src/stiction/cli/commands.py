@@ -4,37 +4,30 @@ Commands import numerics late, so that help is quick. Public names are imported 
 """
 
 import functools
-import inspect
 import io
 import logging
 import os
-import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import typer
 from typer import Argument, Option
-from typer.models import OptionInfo
 
 import stiction as st
-from stiction.base.errors import InputError, RunError, collect_warnings, printable, unknown_name
+from stiction.base.errors import InputError, RunError, printable
 from stiction.base.progress import Meter, duration, interrupted
 from stiction.problem.resolution import nodes_in_nucleation_length
 
 MAX_SHOWN_LINES = 12
 """Points, failures or damaged chunks in a list."""
-RUPTURE = (
-    "critical_stress", "stress_drop", "onset_time", "critical_position", "median_rupture_speed"
-)  # fmt: skip
-"""Printed variables of a rupture."""
-
 StudyFile = Annotated[
-    Path, Argument(metavar="STUDY.toml", help="`stiction example` writes one to start from.")
+    Path,
+    Argument(metavar="STUDY.toml", help="`stiction example FILE` writes one to start from."),
 ]
 RunPath = Annotated[Path, Argument(metavar="RUN", help="Folder of a run.")]
 Workers = Annotated[int | None, Option(help="Threads; all cores by default.", min=1)]
@@ -51,8 +44,6 @@ Part = Annotated[
 ]
 COMPARED_SAMPLES = 1_000
 """Samples with which measured peaks are compared."""
-LOADING_RATE = 2e7
-"""Loading rate of a rupture, Pa/s, if the study has another method."""
 
 
 # -- what commands share -------------------------------------------------------------------------
@@ -61,25 +52,6 @@ LOADING_RATE = 2e7
 def echo(text: Any = "", *, err: bool = False) -> None:
     """Print text that may come from a file. Escape characters that control a terminal."""
     typer.echo(printable(str(text)), err=err)
-
-
-def in_options(text: str, command: Callable[..., Any]) -> str:
-    """Return a message in the words of the command line: ``--gaps fill`` for ``gaps="fill"``."""
-    methods = r"(?:\bmethod=)?st\.(LocalCriterion|Equilibrium|Rupture)\([^)]*\)"
-    text = re.sub(methods, _method, text)
-    for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
-        extras = getattr(parameter.annotation, "__metadata__", ())
-        if any(isinstance(extra, OptionInfo) for extra in extras):
-            option, argument = f"--{name.replace('_', '-')}", rf"(?<![\w.-]){name}"
-            text = re.sub(rf"{argument}=(True\b|\.\.\.)", option, text)
-            value = r"[\"']?([^\s\"',;)]*)[\"']?(?: to st\.\w+(?: or st\.\w+)*)?"
-            text = re.sub(rf"{argument}={value}", rf"{option} \1", text)
-            text = re.sub(rf"^{name}(?=:| must)", option, text)
-    return text
-
-
-def _method(match: re.Match[str]) -> str:
-    return f"the method {re.sub('(?<!^)(?=[A-Z])', '_', match[1]).lower()}"
 
 
 def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
@@ -97,14 +69,6 @@ def _ignore_local_style() -> None:
         matplotlib.rcdefaults()
         matplotlib.use("agg")
         warnings.warn("matplotlibrc: this file in the current folder is not used", stacklevel=1)
-
-
-def _save_figure(axes: Any, path: Path) -> None:
-    from stiction.base.files import write_whole
-
-    for suffix in ("png", "pdf"):
-        save = functools.partial(axes.figure.savefig, format=suffix, dpi=220)
-        write_whole(path.with_suffix(f".{suffix}"), save)
 
 
 # -- studies and runs ----------------------------------------------------------------------------
@@ -189,6 +153,15 @@ def run(
         raise typer.Exit(1)
 
 
+def _state_of(out: Path, part: str | None) -> Any:
+    """Print how much of a run is stored, and return its state."""
+    stored = st.open_run(out)
+    state = stored.status()
+    beginning = f"part {part}: " if part else ""
+    echo(f"{beginning}{state.done} of {state.samples} samples in {out}")
+    return state
+
+
 def status(run: RunPath) -> None:
     """Show the completed, failed and damaged parts of a run.
 
@@ -205,7 +178,7 @@ def status(run: RunPath) -> None:
     samples = state.samples // len(points)
     echo(f"{run}: {' '.join(stored.study.title.split())}".removesuffix(": "))
     share = 100.0 * state.done / state.samples
-    echo(f"  {stored.counted:11s} {state.done} of {state.samples} ({share:.1f} %)")
+    echo(f"  {'samples':11s} {state.done} of {state.samples} ({share:.1f} %)")
     echo(f"  chunks      {state.chunks}")
     echo(f"  computed    {duration(state.seconds)} of one core")
     counts = zip(points, state.done_by_point, strict=True)
@@ -250,7 +223,7 @@ def export(
     stored.export(out, partial=partial, events=events)
     state = stored.status()
     rest = "" if state.complete else "; the others are missing"
-    echo(f"{state.done} of {state.samples} {stored.counted} written to {out}{rest}")
+    echo(f"{state.done} of {state.samples} samples written to {out}{rest}")
 
 
 def report(
@@ -275,23 +248,31 @@ def report(
     echo(f"report: {path}")
     state = stored.status()
     if not state.complete:
-        echo(f"it shows {state.done} of {state.samples} {stored.counted}", err=True)
+        echo(f"it shows {state.done} of {state.samples} samples", err=True)
         raise typer.Exit(1)
 
 
 # -- what a study would do -----------------------------------------------------------------------
 
 
-def example() -> None:
-    """Print a study to start from.
+def example(
+    file: Annotated[Path, Argument(metavar="FILE", help="New file, such as study.toml.")],
+) -> None:
+    """Write a study file to start from.
 
     \b
     Examples:
-      stiction example > study.toml
+      stiction example study.toml
     """
     from importlib.resources import files
 
-    echo(files("stiction.cli").joinpath("example.toml").read_text("utf-8").rstrip("\n"))
+    text = files("stiction.cli").joinpath("example.toml").read_bytes()
+    try:
+        with file.open("xb") as new:
+            new.write(text)
+    except FileExistsError:
+        raise InputError(f"{file}: exists already. Choose another name") from None
+    echo(f"study: {file}")
 
 
 def check(study: StudyFile) -> None:
@@ -379,302 +360,51 @@ def _cost(study: Any) -> dict[str, str]:
     }
 
 
-# -- one interface -------------------------------------------------------------------------------
-
-
-def onset(
-    study: StudyFile,
-    strength: Annotated[Path, Option(metavar="PROFILE", help="File of the peak strength.")],
-    method: Annotated[list[str] | None, Option(help="Only this method (repeatable).")] = None,
-    unit: Annotated[
-        str | None, Option(help="Unit of the values in PROFILE, such as MPa.")
-    ] = None,
-    x_unit: Annotated[str | None, Option(help="Unit of x in PROFILE, such as mm.")] = None,
-    value: Annotated[str | None, Option(help="Column of the values: name or number.")] = None,
-    x: Annotated[str | None, Option(help="Column of x: name, or number from 0.")] = None,
-    quantity: Annotated[
-        Literal["strength", "friction_coefficient"],
-        Option(help="Content of PROFILE. Coefficients need a normal pressure."),
-    ] = "strength",
-    interpolate: Annotated[bool, Option("--interpolate", help="Interpolate to nodes.")] = False,
-    gaps: Annotated[Literal["refuse", "fill"], Option(help="Missing values.")] = "refuse",
-    missing: Annotated[
-        list[str] | None,
-        Option(help="Number or word for a missing value, such as -9999 (repeatable)."),
-    ] = None,
-    decimal: Annotated[Literal[".", ","] | None, Option(help="Decimal mark.")] = None,
-    skip: Annotated[int, Option(min=0, help="Lines above the headings.")] = 0,
-    sheet: Annotated[str, Option(help="Sheet of a workbook: name, or number from 0.")] = "0",
-    record: Annotated[int | None, Option(min=0, help="Number of the record, from 0.")] = None,
-    offset: Annotated[
-        str, Option(help="Added to x, in m; or 'centre' for the centre of the interface.")
-    ] = "0",
-) -> None:
-    """Compute the load and position at which an interface of given strength begins to slide.
-
-    The study file needs the problem only. PROFILE is .npy, text (.csv, .txt, ...)
-    or NetCDF, with or without x. On a plane it is an .npy file of shape (nx, ny)
-    or a map. Values are in Pa and m unless the file states units, such as 'x
-    (mm), strength (MPa)'. Every applicable method is used. The method of the
-    study keeps its options. Other methods have their defaults, and `rupture` has
-    a loading rate of 2e7 Pa/s.
-
-    \b
-    Examples:
-      stiction onset study.toml --strength profile.csv --unit MPa --x-unit mm
-      stiction onset study.toml --strength scan.nc --method equilibrium --gaps fill
-    """
-    import pandas as pd
-
-    from stiction.base.variables import ONSET_VARIABLES
-    from stiction.methods.protocol import METHODS
-    from stiction.study.run import table_of
-    from stiction.study.study import read_setup
-
-    setup = read_setup(study)
-    problem, of_study = setup.problem, setup.method
-    if unknown := [name for name in method or () if name not in METHODS]:
-        raise InputError([unknown_name("--method", name, METHODS) for name in unknown])
-    profile = st.read_profile(
-        strength, interface=problem.interface, unit=unit, x_unit=x_unit, interpolate=interpolate,
-        gaps=gaps, value=_column(value), x=_column(x), quantity=quantity, decimal=decimal,
-        missing=None if missing is None else [_number(text) for text in missing], skip=skip,
-        sheet=_column(sheet) or 0, record=record, offset=_number(offset),
-    )  # fmt: skip
-    with collect_warnings():  # each method refuses, and warns, for itself
-        problem.sample(profile, accept=("overstress",))
-    printed = (
-        *ONSET_VARIABLES, "friction_coefficient", "critical_force", "first_instability_force"
-    )  # fmt: skip
-    rows: dict[str, dict[str, float]] = {}
-    refused: list[str] = []
-    for name in method or METHODS:
-        timed = name == "rupture" and problem.specimen is None
-        options = {"loading_rate": LOADING_RATE} if timed else {}
-        try:
-            given = of_study if of_study and of_study.type == name else None
-            result = st.onset(problem, profile, method=given or METHODS[name](**options))
-            table = table_of(result[[key for key in printed if key in result]])
-            rows[name] = {key: v[0] for key, v in table.items() if key.startswith(printed)}
-        except (InputError, TypeError) as error:  # TypeError: it has options without defaults
-            refused.append(f"{name} does not apply: {error}")
-    if rows:
-        echo(pd.DataFrame(rows).T.to_string(na_rep="", float_format="{:.8g}".format))
-    for text in refused:
-        echo(text)
-    if not rows:
-        raise typer.Exit(1)
-
-
-def _number(text: str) -> Any:
-    with suppress(ValueError):
-        return float(text)
-    return text
-
-
-def _column(text: str | None) -> int | str | None:
-    return int(text) if text is not None and text.isdecimal() else text
-
-
-def rupture(
-    study: StudyFile,
-    out: Annotated[Path, Option(help="Folder of result and figures.")] = Path(
-        "stiction-rupture"
-    ),
-    sample: Annotated[
-        int | None, Option(min=0, help="Sample of the study's strength; 0 by default.")
-    ] = None,
-    strength: Annotated[
-        Path | None, Option(metavar="PROFILE", help="Peak strength, instead of a sample.")
-    ] = None,
-    film: Annotated[bool, Option("--film", help="Also write rupture.gif.")] = False,
-) -> None:
-    """Simulate an interface from its first slip to global sliding, or until its study stops it.
-
-    The strength is a sample of the study (at the first point of a sweep) or your
-    own profile, with or without x. The command writes `rupture.nc` (slip, slip
-    rate and stress over time and x) and a figure of the slip rate in space and
-    time (PNG and PDF). The loading rate comes from the method `rupture` of the
-    study, else it is 2e7 Pa/s. On a specimen the command simulates the event in
-    which the whole interface slides, and draws the blocks too.
-
-    \b
-    Examples:
-      stiction rupture study.toml --sample 3 --film
-      stiction rupture study.toml --strength profile.csv --out rupture
-    """
-    _ignore_local_style()
-    from stiction.study.run import write_result
-    from stiction.study.study import read_setup
-
-    out.mkdir(parents=True, exist_ok=True)
-    profiles: Any
-    if strength is not None and sample is not None:
-        raise InputError("--sample: has no effect beside --strength. Leave one of them out")
-    if strength is None:
-        loaded = st.Study.from_toml(study)
-        point, save = loaded.experiments[0], loaded.save
-        problem, method = point.problem, point.method
-        profiles = point.profiles(point.draws(sample or 0, 1))
-    else:
-        setup = read_setup(study)
-        problem, method, save = setup.problem, setup.method, setup.save
-        profiles = st.read_profile(strength, interface=problem.interface)
-    if not isinstance(method, st.Rupture):
-        method = st.Rupture(loading_rate=None if problem.specimen else LOADING_RATE)
-    result = st.simulate_rupture(problem, profiles, method=method, save=save)
-    write_result(result, out / "rupture.nc")
-    echo(_summary(result))
-    with Meter("drawing the figures"):
-        _save_figure(st.plot.rupture(result, problem=problem), out / "rupture")
-        if problem.specimen is not None:
-            _save_figure(st.plot.block(result, problem=problem).flat[0], out / "block")
-    if film:
-        echo(f"film: {st.plot.film(result, out / 'rupture.gif')}")
-    echo(f"written to {out}")
-
-
-def _summary(result: Any) -> str:
-    """Return the numbers of a rupture, with a line for each variable that is not NaN."""
-    lines = []
-    for name in filter(result.__contains__, RUPTURE):
-        numbers = [f"{number:.5g}" for number in result[name].values.reshape(-1)]
-        if numbers != ["nan"]:
-            about = result[name].attrs
-            lines.append(f"{about['long_name']}: {' and '.join(numbers)} {about['units']}")
-    return "\n".join([*lines, f"ended by: {result.attrs['stopped']}"])
+# -- failure probabilities -----------------------------------------------------------------------
 
 
 def reliability(
     study: StudyFile,
-    force: Annotated[float | None, Option(help="Shear force to carry, N.")] = None,
-    stress: Annotated[float | None, Option(help="Mean shear stress to carry, Pa.")] = None,
-    friction_coefficient: Annotated[
-        float | None, Option(help="Shear stress over normal pressure to carry.")
-    ] = None,
-    probability: Annotated[float | None, Option(help="Probability of a design.")] = None,
-    out: Annotated[
-        Path | None,
-        Option(metavar="RUN", help="Compute the curve; repetitions are stored in this folder."),
-    ] = None,
     page: Annotated[
         Path | None, Option(metavar="HTML", help="Write the design as a page to file.")
     ] = None,
-    smallest: Annotated[
-        float | None, Option(help="Smallest probability of the curve; 1e-9 by default.")
-    ] = None,
-    repetitions: Annotated[
-        int | None, Option(help="Independent repetitions of the curve; 8 by default.", min=1)
-    ] = None,
     workers: Workers = None,
-    scheduler: Scheduler = None,
-    part: Part = None,
 ) -> None:
-    """Compute the probability that an interface slides below a demand, or its design.
+    """Answer the question in the table [reliability] of a study: a probability or a design.
 
-    The answer is a line for each point of the sweep. `--force`, `--stress` and
-    `--friction-coefficient` ask for a probability, `--probability` for a design.
-    Without these options, the table [reliability] of the study asks. `--page`
-    writes a design as a page that prints on A4, with its characteristic value,
-    partial factor, inputs, doubts and sensitivities. `--out` computes the whole
-    curve, decade by decade.
-
-    Problem, strength, method, seed and sweep come from the study file, whose
-    number of samples is not used. The stress is the mean shear stress on the
-    interface. Failure means that the whole interface slides below that stress.
-    With a list of equally likely interfaces, the probability is their mean, and
-    a band contains 90 % of them. Rerunning the command resumes an interrupted run
-    and adds repetitions if `--repetitions` was raised. `stiction export` writes the
-    curve as a table, and `stiction report` writes a page with its figure.
+    The table states a `force` (N), `stress` (Pa) or `friction_coefficient` to
+    carry, or the `probability` of a design. The answer is a line for each point
+    of the sweep. Failure means that the whole interface slides below the demand.
+    `--page` writes a design as a page that prints on A4, with its characteristic
+    value, partial factor, inputs, doubts and sensitivities.
 
     \b
     Examples:
-      stiction reliability study.toml --force 40e3
-      stiction reliability study.toml --probability 1e-3
-      stiction reliability study.toml --out curve --smallest 1e-6
+      stiction reliability study.toml
+      stiction reliability study.toml --page design.html
     """
-    from stiction.study.run import table_of
-
     loaded = st.Study.from_toml(study)
-    asked = _given(
-        force=force, stress=stress, friction_coefficient=friction_coefficient,
-        probability=probability,
-    )  # fmt: skip
-    of_curve = _given(smallest=smallest, repetitions=repetitions, part=part)
-    if out is None:
-        if given := of_curve | _given(scheduler=scheduler):
-            raise InputError(
-                f"{_options_of(given)}: applies to a whole curve only. Add --out FOLDER"
-            )
-        _answer(loaded, asked, workers, page)
-        return
-    if asked := asked | _given(page=page):
-        raise InputError(
-            f"--out: computes a whole curve. Leave out --out or {_options_of(asked)}"
-        )
-    with _resumable(out), _executor(scheduler) as executor:
-        curve = loaded.failure_curve(out=out, workers=workers, executor=executor, **of_curve)
-    echo(table_of(curve).to_string(index=False, float_format="{:.7g}".format, max_rows=200))
-    if "members" in curve:
-        echo(
-            f"probability: the mean over {curve.sizes['member']} equally likely interfaces, with"
-            " its 95 % interval (_low, _high). band_low and band_high: 90 % of the interfaces"
-        )
-    _state_of(out, part)
-
-
-def _state_of(out: Path, part: str | None) -> Any:
-    """Print how much of a run is stored, and return its state."""
-    stored = st.open_run(out)
-    state = stored.status()
-    beginning = f"part {part}: " if part else ""
-    echo(f"{beginning}{state.done} of {state.samples} {stored.counted} in {out}")
-    return state
-
-
-def _given(**options: Any) -> dict[str, Any]:
-    return {name: value for name, value in options.items() if value is not None}
-
-
-def _options_of(names: Iterable[str]) -> str:
-    """Return the options of a command for names of arguments."""
-    return ", ".join(f"--{name.replace('_', '-')}" for name in names)
-
-
-def _answer(
-    study: Any, asked: dict[str, float], workers: int | None, page: Path | None = None
-) -> None:
-    """Print, for each point, the answer to the question in the command or in the study."""
-    from stiction.study.study import Question
-
-    question = study.reliability
-    if asked:
-        given = {} if question is None else {"target_cv": question.target_cv}
-        try:
-            question = Question(**given, **asked)
-        except InputError as error:
-            texts = (text.partition("Question")[2].lstrip(".: ") for text in error.problems)
-            raise InputError(texts) from None
+    question = loaded.reliability
     if question is None:
         raise InputError(
-            "pass --force, --stress, --friction-coefficient or --probability, or add a table"
-            " [reliability] to the study. For a whole failure curve, pass --out FOLDER"
+            "reliability: the study asks no question. Add a table [reliability] with force (N),"
+            " stress (Pa), friction_coefficient, or the probability of a design"
         )
-    for point, experiment in zip(study.points, study.experiments, strict=True):
+    for point, experiment in zip(loaded.points, loaded.experiments, strict=True):
         where = f"{point}: " if point.values else ""
         answer = question.answer(experiment, workers)
         echo(f"{where}{answer}")
         evidence = []
-        if study.peaks is not None:
+        if loaded.peaks is not None:
             predicted = st.monte_carlo(
                 experiment.problem, experiment.random, method=experiment.method,
                 samples=COMPARED_SAMPLES, seed=experiment.seed, workers=workers,
             )  # fmt: skip
-            evidence.append(st.statistics.agreement(predicted, study.peaks))
+            evidence.append(st.statistics.agreement(predicted, loaded.peaks))
             echo(f"{where}{evidence[0]}")
         if page is not None:
             path = page.with_stem(page.stem + (f"_{point.number}" if point.values else ""))
-            title = study.title or "Design of a joint"
+            title = loaded.title or "Design of a joint"
             answer.write_page(path, problem=experiment.problem, evidence=evidence, title=title)
             echo(f"page: {path}")
 
@@ -706,20 +436,16 @@ def _options(
 
 
 def _command(function: Callable[..., None]) -> Callable[..., None]:
-    """Word messages for the command line. After Ctrl-C the exit code is 130, as shells expect."""
+    """Print warnings as lines. After Ctrl-C the exit code is 130, as shells expect."""
 
     def show(message: Warning | str, *args: Any, **kwargs: Any) -> None:
-        echo(f"warning: {in_options(str(message), function)}", err=True)
+        echo(f"warning: {message}", err=True)
 
     @functools.wraps(function)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         warnings.showwarning = show
         try:
             function(*args, **kwargs)
-        except InputError as error:
-            raise InputError([in_options(text, function) for text in error.problems]) from None
-        except RunError as error:
-            raise type(error)(in_options(str(error), function)) from None
         except KeyboardInterrupt:
             echo("interrupted", err=True)
             raise typer.Exit(130) from None
@@ -727,7 +453,7 @@ def _command(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-for _function in (example, check, run, status, export, report, onset, rupture, reliability):
+for _function in (example, check, run, status, export, report, reliability):
     app.command(short_help=(_function.__doc__ or "").partition("\n\n")[0])(_command(_function))
 
 

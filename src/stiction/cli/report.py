@@ -22,12 +22,10 @@ from stiction.base.variables import DIRECTION
 from stiction.ensemble.dataset import GridAxes
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, panel, paper_style
-from stiction.reliability.answer import bounded
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.run import StoredRun
 
 MOST_ROWS = 200
-MOST_FIGURES = 12
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 REPORTED = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
 SPREAD = ("mean", "standard deviation")
@@ -96,18 +94,15 @@ def write_report(run: StoredRun, path: Path) -> None:
     if not state.done:
         reasons = state.damaged or ("no sample is stored yet",)
         raise InputError(f"{run.path}: {reason}" for reason in reasons)
-    what = "Failure probability" if run.settings else "Onset of sliding: a Monte Carlo study"
-    page = Page(run.study.title or what)
-    page.text(f"{state.done:,} of {state.samples:,} {run.counted} by {run.methods}.")
+    page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
+    page.text(f"{state.done:,} of {state.samples:,} samples by {run.methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
-    with paper_style():
-        if run.settings:
-            add_curves(page, run)
-        else:
-            result, axes = (run.dataset(only=[*REPORTED, "critical_position"]), run.study.axes)
-            add_figures(page, result, list(axes))
-            add_tables(page, result, axes)
+    result, axes = run.dataset(only=[*REPORTED, "critical_position"]), run.study.axes
+    if not axes:
+        with paper_style():
+            page.figure(densities(result), "Densities of the onset and of its position.")
+    add_tables(page, result, axes)
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
         page.table(f"Samples that failed ({len(state.failures):,})", ["sample"], rows)
@@ -118,73 +113,15 @@ def write_report(run: StoredRun, path: Path) -> None:
     write_whole(path, page.html().encode())
 
 
-def add_curves(page: Page, run: StoredRun) -> None:
-    """Add a figure and a table of the failure curve at each point of a sweep."""
-    for point, curve in zip(run.study.points, run.curves(), strict=True):
-        where = f" at {point}" if point.values else ""
-        if np.isnan(curve["stress"]).all():
-            page.text(f"No repetition is stored{where}.", warning=True)
-            continue
-        if point.number < MOST_FIGURES:
-            figure = Figure(figsize=(0.75 * PAGE, 3.2))
-            plot.failure_curve(curve, ax=figure.subplots())
-            page.figure(figure, f"Probability of an onset below a stress{where}.")
-        same = "stress_above_bound" if not bounded(curve.attrs["lower_bound"]) else ""
-        columns = [v for name, v in curve.items() if v.dims == ("point",) and name != same]
-        factors, _, labels = zip(*map(scaled, columns), strict=True)
-        rows = np.transpose(columns) * factors
-        mean = ""
-        if "members" in curve:
-            count = curve.sizes["member"]
-            mean = f", mean over {count} equally likely interfaces; the band holds 90 % of them"
-        page.table(f"Failure probability{where}{mean}", labels, rows)
-
-
-def add_figures(page: Page, result: xr.Dataset, dims: list[str]) -> None:
-    """Add the density of the onset, and its quantiles along the longest axis of a sweep."""
-    what = scaled(result[shown_quantity(result)])[2].partition(" (")[0]
-    if not dims:
-        figure = densities(result, None)
-        page.figure(figure, f"{what.capitalize()} and critical position.")
-        return
-    along, *other_dims = sorted(dims, key=lambda dim: -result.sizes[dim])
-    first = result.isel(dict.fromkeys(other_dims, 0))
-    page.figure(
-        densities(first, along),
-        f"Densities of the {what} and of the critical position{_where(first, other_dims)}.",
-    )
-    part = result.isel(dict.fromkeys(other_dims[1:], 0))
-    figure = Figure(figsize=(0.75 * PAGE, 3.2))
-    plot.quantiles(part, along=along, ax=figure.subplots())
-    bands = "" if other_dims else ", pale band: between the 5 % and 95 % quantiles"
-    page.figure(
-        figure,
-        f"Median of the {what} with its 95 % confidence interval{_where(part, other_dims[1:])};"
-        f" band: between quartiles{bands}.",
-    )
-
-
-def _where(part: xr.Dataset, dims: list[str]) -> str:
-    """Return ' at NAME = VALUE' for the dimensions that are held fixed."""
-
-    values = []
-    for dim in dims:
-        factor, unit, _ = scaled(part[dim])
-        value = part[dim].item()
-        number = f"{value * factor:.4g} {unit}".strip() if isinstance(value, float) else value
-        values.append(f"{dim.replace('_', ' ')} = {number}")
-    return f" at {', '.join(values)}" if values else ""
-
-
-def densities(result: xr.Dataset, along: str | None) -> Figure:
-    """Return a figure with densities of the onset and its position, along a sweep."""
+def densities(result: xr.Dataset) -> Figure:
+    """Return a figure with densities of the onset and of its position."""
     parts = [result[[shown_quantity(result)]]]
     if DIRECTION in result["critical_position"].dims:
         place = result[["critical_position"]]
         parts += [place.sel({DIRECTION: direction}) for direction in result[DIRECTION].values]
     else:
         parts.append(result[["critical_position"]])
-    figure = Figure(figsize=(PAGE, 2.6 if along is None else 3.0))
+    figure = Figure(figsize=(PAGE, 2.6))
     panels = figure.subplots(1, len(parts))
     for letter, axes, part in zip("abc", panels, parts, strict=False):
         (name,) = part.data_vars
@@ -194,10 +131,6 @@ def densities(result: xr.Dataset, along: str | None) -> Figure:
         if legend := axes.get_legend():
             legend.remove()
         panel(axes, letter)
-    if along is not None:
-        handles, labels = panels[0].get_legend_handles_labels()
-        title = scaled(result[along])[2]
-        figure.legend(handles, labels, loc="outside lower center", ncols=3, title=title)
     return figure
 
 

@@ -41,6 +41,7 @@ from stiction.base.errors import (
     merged,
     printable,
 )
+from stiction.base.progress import Meter
 from stiction.ensemble.experiment import Experiment
 from stiction.random.synthesis import SAMPLES_PER_BLOCK, block_of
 
@@ -123,6 +124,24 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
     return results
 
 
+def on_executor(
+    function: Callable[[Any], Table], jobs: Sequence[Any], executor: Executor, meter: Meter
+) -> list[NDArray[Any]]:
+    """Return the rows of the tables of all jobs from an executor. Each warning is issued once."""
+    futures = [executor.submit(function, job) for job in jobs]
+    with merge_warnings() as caught:
+        try:
+            tables = []
+            for job, future in zip(jobs, futures, strict=True):
+                tables.append(_result(future, Span(0, 0, len(job))))
+                meter.advance(len(job))
+        finally:
+            for future in futures:
+                future.cancel()
+        caught += [warning.unnumbered() for table in tables for warning in table.warned]
+    return [table.rows for table in tables]
+
+
 @cache
 def versions() -> str:
     """Return the versions of software on which the last digits of a result depend."""
@@ -177,7 +196,7 @@ def piece_size(
     return end - span.first
 
 
-def _workers_of(executor: Executor, workers: int) -> int:
+def workers_of(executor: Executor, workers: int) -> int:
     """Return the current number of workers in an executor. Workers of Dask come and go."""
     client = getattr(executor, "_client", None)
     if client is not None:
@@ -185,31 +204,19 @@ def _workers_of(executor: Executor, workers: int) -> int:
     return int(getattr(executor, "_max_workers", 0) or workers)
 
 
-class SerialExecutor(Executor):
-    """An executor that runs each call at once, in the same thread."""
-
-    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Return the result as a finished future."""
-        future: Future[Any] = Future()
-        future.set_result(fn(*args, **kwargs))
-        return future
-
-
 def solve_spans(
-    points: Sequence[Any],
+    points: Sequence[Experiment],
     spans: Sequence[Span],
-    solve: Callable[[Any, Span], Table],
     *,
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Generator[tuple[Span, Table], None, None]:
-    """Solve spans of items. Yield their pieces with their tables (steps 1 to 4).
+    """Solve spans of samples. Yield their pieces with their tables (steps 1 to 4).
 
     At most two pieces per worker are in progress, so that
     memory stays bounded. Closing the generator cancels the
     pieces that have not begun. A lost worker, or a worker
-    with different versions, raises a `WorkerError`. Only
-    experiments can have spans with more than one item.
+    with different versions, raises a `WorkerError`.
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -222,18 +229,16 @@ def solve_spans(
         try:
             while waiting or running:
                 # 1.
-                slots = _workers_of(executor, workers)
+                slots = workers_of(executor, workers)
                 while waiting and len(running) < 2 * slots:
                     point, first, samples = whole = waiting.popleft()
-                    size = 1
-                    if samples > 1:
-                        size = piece_size(points[point], whole, pace, left, slots)
+                    size = piece_size(points[point], whole, pace, left, slots)
                     if size < samples:
                         waiting.appendleft(Span(point, first + size, samples - size))
                     left -= size
                     # 2.
                     span = Span(point, first, size)
-                    future = executor.submit(solve, points[point], span)
+                    future = executor.submit(solve_span, points[point], span)
                     running[future] = span
                     if future.done():
                         break

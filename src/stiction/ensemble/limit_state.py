@@ -2,19 +2,28 @@
 draws."""
 
 import math
+import time
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from stiction.base.arrays import Array
-from stiction.base.errors import InputError
+from stiction.base.arrays import Array, one_blas_thread
+from stiction.base.errors import InputError, collect_warnings, merged
 from stiction.base.model import Count, checked
 from stiction.base.progress import SILENT, Meter
-from stiction.ensemble.batches import in_threads, usable_cores
+from stiction.ensemble.batches import (
+    Table,
+    in_threads,
+    on_executor,
+    usable_cores,
+    versions,
+    workers_of,
+)
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.protocol import METHODS, MethodObject, optional_member
@@ -50,6 +59,7 @@ class LimitState:
     per_pressure: bool = False
     workers: int = 1  # threads, on which results do not depend
     meter: Meter = SILENT  # counts the samples
+    executor: Executor | None = None  # instead of threads, as in `monte_carlo`
 
     def __repr__(self) -> str:
         text = f"{self.event} by {self.experiment.method.label}"
@@ -103,10 +113,15 @@ class LimitState:
         rows, experiment = np.atleast_2d(draws), self.experiment
         # Parts of at least `MIN_THREAD_SECONDS`, one for each thread,
         # and at most a batch.
-        size = max(int(MIN_THREAD_SECONDS / experiment.seconds), -(-len(rows) // self.workers))
+        workers = self.workers if self.executor is None else workers_of(self.executor, 1)
+        size = max(int(MIN_THREAD_SECONDS / experiment.seconds), -(-len(rows) // workers))
         size = max(1, min(size, experiment.batch))
         parts = np.split(rows, range(size, len(rows), size))
-        if len(parts) == 1:
+        if self.executor is not None:
+            here = replace(self, workers=1, meter=SILENT, executor=None)
+            solved = on_executor(partial(solve_part, here), parts, self.executor, self.meter)
+            stress = np.concatenate(solved)
+        elif len(parts) == 1:
             stress = self._stress(rows)
         else:
             stress = np.concatenate(in_threads(self._stress, parts, self.workers))
@@ -233,6 +248,14 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
         and not (np.any(initial) and np.ptp(problem.load_profile))
         and not (zero and (np.any(np.asarray(friction.residual_strength)) or np.any(initial)))
     )
+
+
+def solve_part(state: LimitState, draws: Array) -> Table:
+    """Return the stresses of draws as a table that comes back from an executor."""
+    begin = time.perf_counter()
+    with one_blas_thread(), collect_warnings() as warned:
+        stress = state._stress(draws)
+    return Table(stress, (), time.perf_counter() - begin, versions(), tuple(merged(warned)))
 
 
 @checked

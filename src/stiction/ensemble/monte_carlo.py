@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.errors import (
@@ -21,9 +22,6 @@ from stiction.base.errors import (
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
 from stiction.base.progress import Meter, Show, duration
 from stiction.ensemble.batches import (
-    Span,
-    Table,
-    solve_span,
     solve_spans,
     spans_of,
     usable_cores,
@@ -75,41 +73,41 @@ def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: 
 
 
 def complete(
-    items: Any,
-    points: Sequence[Any],
-    spans: Sequence[Span],
-    solve: Callable[[Any, Span], Table],
-    meter: Meter,
+    rows: Gathered,
+    missing: NDArray[np.bool_],
     *,
     store: Store | None,
     executor: Executor | None,
     workers: int,
+    progress: Show,
 ) -> None:
-    """Compute spans of items, and pass each finished table to memory and to the store.
+    """Compute missing samples, and pass each finished table to memory and to the store.
 
-    `items` accepts tables (`add`) and marks finished items in `done`,
-    with shape (points, items). `solve` returns the table for a span at
-    a point. Warnings that several tables share are issued once.
+    `missing` is a mask (points, samples). Warnings that several tables
+    share are issued once.
     """
-    lost, total = 0, sum(span.samples for span in spans)
+    points, lost, total = rows.points, 0, int(missing.sum())
+    label = " and ".join({point.method.label: None for point in distinct(points, "method")})
     with ExitStack() as stack:
         if store:  # keep finished samples also after Ctrl-C, or if workers are lost
             stack.callback(store.save)
         warned = stack.enter_context(merge_warnings())
-        stack.enter_context(meter)
+        meter = stack.enter_context(Meter(label, total, progress))
         # Closing the generator cancels pieces that have not begun.
-        work = solve_spans(points, spans, solve, executor=executor, workers=workers)
+        work = solve_spans(
+            points, spans_of(missing, rows.first), executor=executor, workers=workers
+        )
         for span, table in stack.enter_context(closing(work)):
             if store:
                 store.add(table)
-            items.add(table)
+            rows.add(table)
             # Several points have samples with equal numbers.
             warned += table.warned if len(points) == 1 else map(Warned.unnumbered, table.warned)
             meter.advance(span.samples)
-            # If nothing succeeds from the start, later samples would
+            # If no sample succeeds from the start, later samples would
             # fail for the same reason.
             lost += len(table.failures)
-            if lost >= min(MAX_FAILED_FROM_START, total) and not items.done.any():
+            if lost >= min(MAX_FAILED_FROM_START, total) and not rows.done.any():
                 failure = table.failures[0]
                 texts = [f"{failure.name}: {text}" for text in failure.error.splitlines()]
                 raise InputError(texts) if failure.input else RunError("\n".join(texts))
@@ -143,11 +141,7 @@ def gather(
         check_run(points)
         if executor is None:
             _warn_if_long(points, missing, cores)
-    label = " and ".join({point.method.label: None for point in distinct(points, "method")})
-    complete(
-        rows, points, spans_of(missing, ensemble.first), solve_span,
-        Meter(label, int(missing.sum()), progress), store=store, executor=executor, workers=cores,
-    )  # fmt: skip
+    complete(rows, missing, store=store, executor=executor, workers=cores, progress=progress)
     # A stored run is compared once, by the
     # first process that finishes its part.
     comparison = store.pilot if store else None

@@ -6,5 +6,5 @@ for a design stress and for a failure curve. `counting` estimates
 frequent failures, and `factors` counts many specimens for each solved
 field. `tail` estimates rare failures from independent repetitions of
 `subset` simulation, or of `two_level`, in which an inexpensive method
-guides the exact method. `study.failure` keeps curves on disk.
+guides the exact method.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -429,9 +430,11 @@ def prepare(
     *,
     algorithm: str = "subset",
     per_pressure: bool = False,
+    executor: Executor | None = None,
 ) -> tuple[LimitState, int]:
     """Return the limit state and the allowed evaluations, or refuse a method that is too slow."""
-    state = LimitState(experiment, event, per_pressure, workers or usable_cores(), meter)
+    threads = workers or usable_cores()
+    state = LimitState(experiment, event, per_pressure, threads, meter, executor)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
         problems.append("friction_coefficient: needs load.normal_pressure or pressing_force")

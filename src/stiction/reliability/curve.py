@@ -16,6 +16,7 @@ Steps:
 """
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,7 @@ def failure_curve(
     max_evaluations: Budget | None = None,
     event: StressName = "critical_stress",
     workers: Count | None = None,
+    executor: Executor | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
     """Estimate P(onset < s) from 0.5 down to a smallest probability, with three points per decade.
@@ -95,11 +97,12 @@ def failure_curve(
     target_cv : float
         Coefficient of variation to reach at the smallest probability.
         It is lower at other points. Repetitions are added until it is
-        reached. They are the same as in `Study.failure_curve` with the
-        same numbers.
+        reached.
     problem, random, method, seed, max_evaluations, event,
     workers, progress
         As in `design_stress`.
+    executor
+        As in `monte_carlo`. The samples of each step are divided between its workers.
 
     Returns
     -------
@@ -138,7 +141,9 @@ def failure_curve(
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
 
     def solve(experiment: Experiment, meter: Meter) -> TailPoint:
-        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+        state, budget = prepare(
+            experiment, event, workers, meter, max_evaluations, executor=executor
+        )
         state = weakest_first(state)
         goal = Goal(sampling_target(state, target_cv), probability=smallest)
         tail = sample_curve(state, goal, budget)

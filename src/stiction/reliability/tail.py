@@ -76,7 +76,7 @@ class Sizes(NamedTuple):
 
 SUBSET, TWO_LEVELS = Sizes(1, 1_000, 5_000), Sizes(3, 200, 1_000)
 OF_CURVES = Sizes(4, 2_000, 2_000)
-"""Repetitions of curves are stored, and have one size."""
+"""Repetitions of curves have one size."""
 
 
 class Goal(NamedTuple):

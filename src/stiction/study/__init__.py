@@ -3,6 +3,5 @@
 Read `study` first: it joins problem, strength, method and ensemble.
 Then read `sweep`, whose axes turn a study into points. `reading` reads
 TOML files, and the files that they name. `run` reads runs on disk,
-divides them into parts and exports results. `failure` stores
-repetitions of failure curves and computes the curves.
+divides them into parts and exports results.
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import re
 import tomllib
@@ -12,7 +13,7 @@ import pydantic
 
 from stiction.base.errors import InputError, prefixed
 from stiction.base.files import content_of
-from stiction.base.model import check, describe, explain, keys_of
+from stiction.base.model import FilePath, check, describe, explain, keys_of
 from stiction.inference.peaks import read_peaks
 from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 
@@ -46,25 +47,32 @@ def check_toml(content: bytes) -> None:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the tables in a TOML file, or raise an `InputError`."""
+    content = content_of(path)
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # of PowerShell 5.1
     with prefixed(str(path)):
-        content = content_of(path)
-        check_toml(content)
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path}: is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
-        ) from None
-    except (RecursionError, ValueError) as error:  # a ValueError for integers of many digits
-        raise InputError(
-            f"{path}: is not valid TOML: {error} (`stiction example` prints a study)"
-        ) from None
+        try:
+            text = content.decode("utf-16" if wide else "utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
+            ) from None
+        check_toml(text.encode())
+        try:
+            return tomllib.loads(text)
+        except (
+            RecursionError,
+            ValueError,
+        ) as error:  # a ValueError for integers of many digits
+            advice = "`stiction example FILE` writes a study"
+            if "'\\'" in str(error):
+                advice = "in paths, write / for \\, or put them in single quotes"
+            raise InputError(f"is not valid TOML: {error} ({advice})") from None
 
 
 def validated(
     cls: type[T], given: dict[str, Any], folder: Path | None, named: list[Path] | None = None
 ) -> T:
-    """Validate a study or a `Setup` in plain form. Its files are in `folder`.
+    """Validate a study in plain form. Its files are in `folder`.
 
     Paths of files in the study are added to `named`.
     """
@@ -72,16 +80,12 @@ def validated(
     if given and not {*keys_of(cls)} & {*given}:
         some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
         raise InputError(
-            f"study: must have the tables {', '.join(TABLES)}, got {some}. `stiction example`"
-            " prints a study to start from"
+            f"study: must have the tables {', '.join(TABLES)}, got {some}. `stiction example FILE`"
+            " writes a study to start from"
         )
     files = [] if named is None else named
     context = {}
     if folder is not None:
-        if isinstance(given.get("save"), dict) and "to" in given["save"]:
-            raise InputError(
-                "save.to: does not belong in a study file. Pass --out to stiction rupture"
-            )
 
         def read(profile: Any, name: str) -> Any:
             file = profile_in_file(profile, name, folder)
@@ -93,7 +97,7 @@ def validated(
         given = dict(given)
         for key, reader in (("random", _stored_interfaces), ("peaks", read_peaks)):
             if isinstance(given.get(key), str):
-                files.append(folder / given[key])
+                files.append(folder / check(key, given[key], FilePath))
                 with prefixed(key):
                     given[key] = reader(files[-1])
     try:

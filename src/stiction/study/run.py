@@ -25,7 +25,6 @@ from stiction.ensemble.batches import Failure
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.store import Store
 from stiction.random.synthesis import SAMPLES_PER_BLOCK
-from stiction.study.failure import Repetitions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,23 +86,15 @@ class StoredRun:
     ----------
     path : Path
     study : Study
-    settings : dict, optional
-        Smallest probability and event, for failure curves. A run of
-        samples has no settings.
     """
 
-    def __init__(self, store: Store, study: Any, settings: dict[str, Any] | None) -> None:
-        self.path, self.study, self.settings, self._store = store.path, study, settings, store
+    def __init__(self, store: Store, study: Any) -> None:
+        self.path, self.study, self._store = store.path, study, store
 
     def __repr__(self) -> str:
         points, samples = len(self.study.experiments), self.study.ensemble.samples
-        what = f"{points} x {samples} {self.counted} by {self.methods}"
+        what = f"{points} x {samples} samples by {self.methods}"
         return f"{type(self).__name__}({str(self.path)!r}, {what})"
-
-    @property
-    def counted(self) -> str:
-        """Stored items: 'samples' or 'repetitions'."""
-        return "repetitions" if self.settings else "samples"
 
     @property
     def methods(self) -> str:
@@ -145,29 +136,14 @@ class StoredRun:
         """
         return self._checked(self._read(only))
 
-    def _checked(self, rows: Any) -> xr.Dataset:
+    def _checked(self, rows: Gathered) -> xr.Dataset:
         for name, text in self._store.damage.items():
-            self._store.warn(
-                f"{name}: {text}; its {self.counted} are missing. Run the study again"
-            )
-        attributes = self.study.attributes
-        if not self.settings:
-            attributes |= self._store.pilot or {}
-        result: xr.Dataset = rows.dataset(attributes, self.study.axes)
-        return result
+            self._store.warn(f"{name}: {text}; its samples are missing. Run the study again")
+        attributes = self.study.attributes | (self._store.pilot or {})
+        return rows.dataset(attributes, self.study.axes)
 
-    def curves(self) -> list[xr.Dataset]:
-        """Return the failure curve at each point, or NaN at a point without repetitions."""
-        curves: list[xr.Dataset] = self._read().curves(self.study.attributes)
-        return curves
-
-    def _read(self, only: Sequence[str] | None = None) -> Any:
-        points, ensemble = self.study.experiments, self.study.ensemble
-        rows: Any
-        if self.settings:
-            rows = Repetitions(points, ensemble.samples, self.settings, only)
-        else:
-            rows = Gathered(points, ensemble, only)
+    def _read(self, only: Sequence[str] | None = None) -> Gathered:
+        rows = Gathered(self.study.experiments, self.study.ensemble, only)
         self._store.read_into(rows)
         return rows
 
@@ -197,7 +173,7 @@ class StoredRun:
         rows, place = self._read(), check("path", path, FilePath)
         if not (partial or rows.done.all()):
             raise RunError(
-                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} {self.counted} exist."
+                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} samples exist."
                 " Run the study again to compute the others, or pass partial=True"
             )
         export(self._checked(rows), place, events)

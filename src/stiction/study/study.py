@@ -6,7 +6,6 @@ import itertools
 import json
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -32,20 +31,17 @@ from stiction.base.model import (
 )
 from stiction.ensemble.dataset import GridAxes, distinct, variables_in
 from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.limit_state import StressName
 from stiction.ensemble.monte_carlo import gather
 from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks
-from stiction.methods.dynamics.save import Save
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.problem import Problem, stress_of
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import FIRST_MEMBERS, Source
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
-from stiction.reliability.answer import Answer, Probability, TargetCv
+from stiction.reliability.answer import Answer, Probability, TargetCv, too_slow
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
-from stiction.study.failure import Repetitions, complete_curves
 from stiction.study.reading import TABLES, check_toml, read_toml, validated
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
 from stiction.study.sweep import Point, Sweep, grid_axes
@@ -54,8 +50,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
-CURVES = "failure_curve"
-"""Key of the settings of failure curves beside the study of a run."""
 MOST_WRITTEN = 8
 """Random interfaces that a study file holds itself; more of them are in a file beside it."""
 MethodOfStudy: Any = Annotated[
@@ -141,6 +135,18 @@ class Question:
     def _given(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if value is not None}
 
+    def check(self, point: Experiment) -> None:
+        """Refuse a question that a point of a sweep cannot answer."""
+        if self.force is not None:
+            stress_of(point.problem, "reliability.force", self.force)
+        if self.friction_coefficient and not point.pressure > 0.0:
+            raise InputError(
+                "reliability.friction_coefficient: needs a normal pressure (Pa,"
+                " problem.load.normal_pressure) or a pressing force (N)"
+            )
+        if self.probability is not None and (slow := too_slow(point, None)):
+            raise InputError(f"method: {slow}")
+
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
         """Answer the question for a point of a study."""
         options = self._given | {
@@ -183,8 +189,6 @@ class Study(_Parts):
         Axes of the sweep. All their combinations are computed. An axis
         maps dotted keys, which vary together, to lists of values. The
         samples are the same at every point of the sweep.
-    save : Save, optional
-        Results that `stiction rupture` keeps, and the positions of stations.
     reliability : Question, optional
         Question for `stiction reliability`: a ``force`` (N), ``stress``
         (Pa) or ``friction_coefficient`` to carry, or the
@@ -220,7 +224,6 @@ class Study(_Parts):
     """
 
     sweep: Sweep = ()
-    save: Save | None = None
     reliability: Question | None = None
     peaks: PeaksOfStudy | None = None
     title: Text = ""
@@ -235,23 +238,10 @@ class Study(_Parts):
                 f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept. Make a"
                 " separate study for each interface"
             )
-        for point in distinct(points, "problem", "random"):
-            self._check_tables(point)
+        if self.reliability is not None:
+            for point in distinct(points, "problem", "random", "method"):
+                self.reliability.check(point)
         return self
-
-    def _check_tables(self, point: Experiment) -> None:
-        """Refuse a demand or a station that does not fit a point of the sweep."""
-        question = self.reliability
-        if question is not None and question.force is not None:
-            stress_of(point.problem, "reliability.force", question.force)
-        if question is not None and question.friction_coefficient and not point.pressure > 0.0:
-            raise InputError(
-                "reliability.friction_coefficient: needs a normal pressure (Pa,"
-                " problem.load.normal_pressure) or a pressing force (N)"
-            )
-        if self.save is not None:
-            with prefixed("save", "."):
-                self.save.nodes(point.problem.interface)
 
     @property
     def points(self) -> list[Point]:
@@ -362,78 +352,13 @@ class Study(_Parts):
             self.attributes,
             self.axes,
             store=store,
-            elsewhere=self._elsewhere(part, self.ensemble.samples),
+            elsewhere=part is not None
+            and ~samples_of_part(part, len(self.experiments), self.ensemble.samples),
             workers=workers,
             executor=executor,
             progress=progress,
             pilot=pilot and (part is None or part[0] == 1),
         )
-
-    def _elsewhere(self, part: tuple[int, int] | None, samples: int) -> Any:
-        """Return a mask (points, samples) of the samples that other jobs compute."""
-        return part is not None and ~samples_of_part(part, len(self.experiments), samples)
-
-    @checked
-    def failure_curve(
-        self,
-        *,
-        out: FilePath,
-        repetitions: Count = 8,
-        smallest: Probability = 1e-9,
-        event: StressName = "critical_stress",
-        workers: Count | None = None,
-        executor: Executor | None = None,
-        progress: Progress = True,
-        part: PartOfRun | None = None,
-    ) -> xr.Dataset:
-        """Estimate failure probabilities at every point, or at the missing points.
-
-        Each repetition has 2,000 samples per level.
-        Repetition i depends only on (seed, i). The
-        number of samples in the study is not used.
-
-        Parameters
-        ----------
-        out : path
-            Folder in which repetitions are stored as they are computed.
-            If you repeat the call, it resumes an interrupted run, and
-            adds repetitions if `repetitions` was raised.
-        repetitions : int
-            Number of repetitions. At a probability of 1e-9, eight
-            repetitions give a coefficient of variation of about 0.2,
-            and 32 repetitions give about 0.1.
-        smallest, event
-            As in `stiction.failure_curve`.
-        workers, executor, progress, part
-            As in `run`. Parts and executors share repetitions.
-
-        Returns
-        -------
-        xarray.Dataset
-            As from `stiction.failure_curve`, also over the
-            axes of the sweep, and with `lower_bound` (Pa).
-            All stored and computed repetitions are used.
-            Values at a point without repetitions are NaN.
-
-        Raises
-        ------
-        InputError, StoreError, RunError
-            As in `run`. Also if a method is `Rupture`, because its
-            failures can only be counted.
-        """
-        settings = {"smallest": smallest, "event": event}
-        rows = Repetitions(self.experiments, repetitions, settings)
-        study = replace(self, ensemble=replace(self.ensemble, samples=repetitions))
-        complete_curves(
-            rows,
-            Store.open(Path(out), study.to_dict() | {CURVES: settings}),
-            elsewhere=self._elsewhere(part, repetitions),
-            workers=workers,
-            executor=executor,
-            progress=progress,
-            pilot=part is None or part[0] == 1,
-        )
-        return rows.dataset(study.attributes, self.axes)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the study as plain dictionaries, lists and numbers, as in TOML.
@@ -489,21 +414,6 @@ class Study(_Parts):
         return cls.from_dict(given)
 
 
-@model(kw_only=True)
-class Setup:
-    """The interface that a study file describes, without random properties."""
-
-    problem: Problem
-    method: MethodOfStudy | None = None
-    save: Save | None = None
-
-
-def read_setup(path: Path) -> Setup:
-    """Read an interface from a study file. The file need not contain the other tables."""
-    keys, given = Setup.__dataclass_fields__, read_toml(path)
-    return validated(Setup, {key: given[key] for key in given if key in keys}, path.parent)
-
-
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
     """Return the study in a TOML file, and the files beside it that it names."""
     named: list[Path] = []
@@ -535,18 +445,12 @@ def open_run(path: Any) -> StoredRun:
     if place.is_file():
         raise InputError(f"path: {place} is a file. Give the folder of the run")
     plain = read_study(place)
-    store, settings = Store(place, plain), plain.pop(CURVES, None)
+    store = Store(place, plain)
     try:
-        if settings is not None:
-            given = check(CURVES, settings, dict)
-            kinds = {"smallest": Probability, "event": StressName}
-            settings = {
-                name: check(name, given.get(name), kind) for name, kind in kinds.items()
-            }
         study = Study.from_dict(plain)
     except InputError as error:
         raise StoreError(
             f"{place}: this installation cannot read its study: {'; '.join(error.problems)}. "
             " Install the version that wrote it, or the package that defines the missing class"
         ) from None
-    return StoredRun(store, study, settings)
+    return StoredRun(store, study)
