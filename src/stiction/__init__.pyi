@@ -35,9 +35,12 @@ from stiction.problem.load import Load as Load
 from stiction.problem.problem import Problem as Problem
 from stiction.problem.profiles.reading import read_profile as read_profile
 from stiction.problem.solid import Solid as Solid
+from stiction.problem.specimen import Base as Base
 from stiction.problem.specimen import Blocks as Blocks
 from stiction.problem.specimen import Platen as Platen
 from stiction.problem.specimen import Pusher as Pusher
+from stiction.problem.specimen import Slider as Slider
+from stiction.problem.specimen import TopShear as TopShear
 from stiction.random.fields import RandomField as RandomField
 from stiction.random.fields import RandomInterface as RandomInterface
 from stiction.random.marginals import Beta as Beta

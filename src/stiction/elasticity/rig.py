@@ -61,6 +61,18 @@ class Rig:
     C: float  # stiffness of the bodies at the push, without slip and opening, Pa
 
 
+def on_cells(edges: Array) -> Array:
+    """Return normal forces on cells (n, ...) from forces on edges (n + 1, ...).
+
+    A cell carries half of the forces on its edges, and the whole of the
+    force on an edge at an end. Sums are equal.
+    """
+    cells = 0.5 * (edges[:-1] + edges[1:])
+    cells[0] += 0.5 * edges[0]
+    cells[-1] += 0.5 * edges[-1]
+    return np.asarray(cells)
+
+
 @lru_cache(maxsize=8)
 def contact_rig(
     length: float,

@@ -25,6 +25,7 @@ from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
+from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import Gaps, turned
 from stiction.problem.profiles.reading import (
     at_nodes,
@@ -35,10 +36,11 @@ from stiction.problem.profiles.reading import (
 from stiction.problem.resolution import check_resolution, warn_if_short
 from stiction.problem.sample import Sample, contradictions_of
 from stiction.problem.solid import Solid
-from stiction.problem.specimen import Blocks
+from stiction.problem.specimen import Blocks, Slider, Specimen
 
 if TYPE_CHECKING:
     from stiction.elasticity.driven import Driven
+    from stiction.elasticity.rig import Rig
 
 MIN_MACHINE_RATIO = 1e-4
 """Stiffness of a machine over that of its blocks below which it is probably in another unit."""
@@ -49,6 +51,13 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """Advice for a force if the area is unknown."""
+STRENGTHS = ("strength", "residual_strength")
+"""Profiles that a slider takes as friction coefficients only."""
+COEFFICIENTS = (
+    "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1"
+)
+"""Advice for strengths of a slider."""
+NO_INITIAL_STRESS = "follows from the pressing of a slider. Leave it out"
 GIVE_PRESSURE = "Give load.normal_pressure (Pa) or load.pressing_force (N)"
 
 
@@ -75,11 +84,12 @@ class Problem:
     mode : {"II", "III"}
         In-plane or anti-plane shear. A plane is in-plane along x and
         anti-plane along y.
-    specimen : Blocks, optional
-        Finite blocks instead of half-spaces. Their drive determines the
-        load profile. The interface ends with the blocks
+    specimen : Blocks or Slider, optional
+        Finite bodies instead of half-spaces. Their drive determines the
+        load profile. The interface ends with the blocks or the slider
         (`interface.ends` is "free"). tau_0 is the mean stress that the
-        drive would cause without slip.
+        drive would cause without slip. `solid` is the material of the
+        slider.
 
     Raises
     ------
@@ -105,7 +115,7 @@ class Problem:
     friction: Friction
     load: Load = Load()
     mode: Mode = "II"
-    specimen: Blocks | None = None
+    specimen: Specimen | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:
@@ -124,7 +134,7 @@ class Problem:
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
         if problems:
             raise InputError(problems)
-        if self.specimen is not None:
+        if isinstance(self.specimen, Blocks):
             self._check_drive()
         weakening_rate = self.friction.weakening_rate
         if weakening_rate is not None:
@@ -148,6 +158,8 @@ class Problem:
             problems.append("interface.width: give the thickness of a specimen instead")
         if not (isinstance(self.load.profile, float) and self.load.profile == 1.0):
             problems.append("load.profile: comes from the drive of a specimen. Leave it out")
+        if isinstance(specimen, Slider):
+            return problems + self._of_slider(specimen)
         if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
             problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
         if specimen.height < 2.0 * interface.spacing:
@@ -160,6 +172,20 @@ class Problem:
             problems.append(
                 f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
                 f" length in mode II, is {high:.3g} times. Check the units, or shorten flat blocks"
+            )
+        return problems
+
+    def _of_slider(self, slider: Slider) -> list[str]:
+        """Return what does not fit a slider."""
+        load, interface = self.load, self.interface
+        problems = slider.misfits(interface.measure, interface.spacing, self.solid, self.mode)
+        if np.any(self.friction.residual_strength):
+            problems.append(f"friction.residual_strength: {COEFFICIENTS}, or residual_ratio")
+        if np.any(load.initial_stress):
+            problems.append(f"load.initial_stress: {NO_INITIAL_STRESS}")
+        if np.ndim(0.0 if load.normal_pressure is None else load.normal_pressure):
+            problems.append(
+                "load.normal_pressure: follows from the rig. Give pressing_force (N)"
             )
         return problems
 
@@ -212,8 +238,17 @@ class Problem:
         """Stiffness and profiles of the specimen, which must be given."""
         if self.specimen is None:
             raise InputError("problem.specimen: is not given, so the solids are half-spaces")
+        if not isinstance(self.specimen, Blocks):
+            raise InputError("problem.specimen: must be Blocks here, got a Slider")
         interface = self.interface
         return self.specimen.driven(interface.measure, interface.size, self.solid, self.mode)
+
+    @property
+    def rig(self) -> Rig:
+        """Stiffness and loads of the slider, which must be given."""
+        if not isinstance(self.specimen, Slider):
+            raise InputError("problem.specimen: must be a Slider here")
+        return self.specimen.rig(self.interface.measure, self.interface.size, self.solid)
 
     @property
     def has_machine(self) -> bool:
@@ -291,6 +326,8 @@ class Problem:
     @property
     def load_profile(self) -> Any:
         """Load profile p: a number, or an array at the nodes, (*shape)."""
+        if isinstance(self.specimen, Slider):
+            return self.rig.T[: self.interface.size] * self.interface.size
         if self.specimen is not None:
             return self.blocks.shear
         profile = self.load.profile
@@ -299,6 +336,8 @@ class Problem:
     @property
     def effective_modulus(self) -> float:
         """Static modulus G*, Pa, for the plane state and the mode. On a plane, G* along x."""
+        if isinstance(self.specimen, Slider):
+            return self.specimen.effective_modulus(self.solid)
         return self.solid.effective_modulus(self.mode)
 
     @property
@@ -376,10 +415,21 @@ class Problem:
                 given, self.interface, gaps, self.pressing
             )
             problems = self.given_twice(given, "profiles") + mistakes
+            coefficients = [name for name in STRENGTHS if is_coefficient(given.get(name))]
+            if isinstance(self.specimen, Slider):
+                problems += [
+                    f"{name}: {COEFFICIENTS}"
+                    for name in STRENGTHS
+                    if name in given and name not in coefficients
+                ]
+                if "initial_stress" in given:
+                    problems.append(f"initial_stress: {NO_INITIAL_STRESS}")
             if problems:
                 raise InputError(problems)
+            pressure = rows.get("normal_pressure", self.normal_pressure)
+            for name in coefficients:
+                rows[name] = rows[name] * pressure
             if "friction_coefficient" in rows:
-                pressure = rows.get("normal_pressure", self.normal_pressure)
                 rows["strength"] = rows.pop("friction_coefficient") * pressure
             sample = self._made(rows, accept)
             if (constant := sample.strength <= sample.residual_strength).any():
@@ -442,7 +492,13 @@ class Problem:
         overstress = "overstress" in accept
         if problems := contradictions_of(interface, strength, residual, initial, overstress):
             raise InputError(problems)
-        W = self.friction.weakening_rate_of(strength - residual, scale, value)
+        drop = strength - residual
+        if isinstance(self.specimen, Slider):
+            if np.ptp(pressure, axis=-1).any():
+                raise InputError("normal_pressure: follows from the rig. Give its mean")
+            mu, mu_r = strength / pressure, residual / pressure
+            drop = drop * self.specimen.checked_pressing(self.rig, interface.measure, mu, mu_r)
+        W = self.friction.weakening_rate_of(drop, scale, value)
         if interface.is_held and scale != "weakening_rate":
             # Barriers never weaken. Any finite rate will do, and here
             # it is the fastest.
@@ -487,6 +543,8 @@ class Problem:
         pressed = self.given_pressure is not None or "normal_pressure" in names
         if "friction_coefficient" in names and not pressed:
             twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
+        if isinstance(self.specimen, Slider) and not pressed:
+            twice.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
         if self.specimen is not None and self.specimen.pressing == "glued" and not pressed:
             text = "'glued' has no effect without a normal pressure"
             twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")

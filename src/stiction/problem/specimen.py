@@ -1,12 +1,14 @@
-"""Specimens: two equal blocks with free ends, how they are driven and how they are pressed."""
+"""Specimens: two equal blocks or a slider on a base, how they are driven and pressed."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
+from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf
 from stiction.base.model import Mode, Positive, Real, as_number, model
@@ -15,6 +17,7 @@ from stiction.problem.solid import Solid
 if TYPE_CHECKING:
     from stiction.elasticity.blocks import Pushes
     from stiction.elasticity.driven import Driven
+    from stiction.elasticity.rig import Rig
 
 
 def _stiffness(value: Any) -> float:
@@ -33,6 +36,11 @@ Quality = Annotated[
     float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.01)
 ]
 NotNegative = Annotated[Real, Field(ge=0.0)]
+MIN_PRESSURE = 1e-6
+"""Smallest local pressure over its mean with which a critical slip gives a weakening rate."""
+MAX_POSITIVE = 1e-2
+"""Largest positive entry of K_uu + mu Q K_wu of the cells, over its diagonal, for which a path is
+defined. It counts how much the slip of a cell loads another cell forwards."""
 
 
 @model(kw_only=True)
@@ -57,7 +65,9 @@ class Platen:
 
 @model(kw_only=True)
 class Pusher:
-    """A uniform traction on one or both sides of each block. The top face lies on rollers.
+    """A uniform traction on a side of a slider, or on one or both sides of each of two blocks.
+
+    The top faces of pushed blocks lie on rollers.
 
     Parameters
     ----------
@@ -68,12 +78,12 @@ class Pusher:
     width : float
         Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
-        The trailing side, from which slip is driven. Two pushers share
-        the force equally. This is the shear of a lap joint. Its
-        bending, and its change of pressure, are not modelled.
+        The trailing side, from which slip is driven. Two pushers (of
+        blocks only) share the force equally. This is the shear of a lap
+        joint. Its bending, and its change of pressure, are not modelled.
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks,
-        N/m (see `Platen`).
+        Stiffness of the machine between the grips of the two blocks, or
+        behind the slider, N/m (see `Platen`).
     mass : float
         Mass, kg, that moves with the pushers of a block (see `Platen`).
     """
@@ -86,13 +96,54 @@ class Pusher:
     type: Literal["pusher"] = "pusher"
 
 
+@model(kw_only=True)
+class TopShear:
+    """A uniform shear traction on the top face of a slider.
+
+    Parameters
+    ----------
+    stiffness : float
+        Stiffness of the machine, N/m, which carries the mean
+        displacement of the top face (see `Platen`).
+    """
+
+    stiffness: Stiffness = 0.0
+    type: Literal["top_shear"] = "top_shear"
+
+
 DRIVES = Kinds(
     "drives", {"platen": "problem.specimen:Platen", "pusher": "problem.specimen:Pusher"}
+)
+SLIDER_DRIVES = Kinds(
+    "drives of sliders",
+    {"pusher": "problem.specimen:Pusher", "top_shear": "problem.specimen:TopShear"},
 )
 
 
 def _drive(value: Any) -> Any:
     return value if isinstance(value, Platen | Pusher) else NotImplemented
+
+
+def _slider_drive(value: Any) -> Any:
+    return value if isinstance(value, Pusher | TopShear) else NotImplemented
+
+
+def _beyond_side(drive: Any, height: float) -> list[str]:
+    """Return why a pusher does not fit the side of a body with a height (m), or an empty list."""
+    if not isinstance(drive, Pusher):
+        return []
+    low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
+    if low >= -1e-9 * height and high <= (1.0 + 1e-9) * height:
+        return []
+    fitting = (
+        f"Its width is at most {2.0 * min(drive.height, height - drive.height):.6g} m there"
+        if drive.height < height
+        else f"Its middle is at most {height - 0.5 * drive.width:.6g} m high"
+    )
+    return [
+        f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the side from"
+        f" 0 to {height:g} m. {fitting}"
+    ]
 
 
 @model(kw_only=True)
@@ -129,17 +180,12 @@ class Blocks:
     drive: Annotated[Platen | Pusher, OneOf(DRIVES, _drive)] = Platen()
     pressing: Literal["frictionless", "glued"] = "frictionless"
     quality_factor: Quality = 25.0
+    type: Literal["blocks"] = "blocks"
 
     @model_validator(mode="after")
     def _consistent(self) -> Blocks:
         drive, problems = self.drive, []
-        if isinstance(drive, Pusher):
-            low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
-            if low < -1e-9 * self.height or high > (1.0 + 1e-9) * self.height:
-                problems.append(
-                    f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the"
-                    f" side of the block from 0 to {self.height:g} m"
-                )
+        problems += _beyond_side(drive, self.height)
         if self.thickness is None and (drive.mass or 0.0 < drive.stiffness < math.inf):
             problems.append(
                 "thickness: is needed with drive.mass, and unless drive.stiffness is 0 or inf"
@@ -170,3 +216,224 @@ class Blocks:
             length, nodes, self.height, solid.shear_modulus, solid.kolosov, mode == "III",
             self.pushes, self.pressing == "glued", machine,
         )  # fmt: skip
+
+
+@model(kw_only=True)
+class Base:
+    """The body on which a slider lies. It is at least as long as the slider.
+
+    Parameters
+    ----------
+    height : float
+        Height, m.
+    behind, ahead : float
+        Free length beyond the trailing and the leading end of the
+        slider, m.
+    solid : Solid, optional
+        Material. By default the material of the slider.
+    bottom : {"fixed", "rollers"}
+        Whether the bottom is glued to the ground, or lies on rollers, so
+        that a frictionless stop at the leading end takes the push.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> base = st.Base(height=0.03, behind=0.06, ahead=0.10)
+    """
+
+    height: Positive
+    behind: Real = 0.0
+    ahead: Real = 0.0
+    solid: Solid | None = None
+    bottom: Literal["fixed", "rollers"] = "fixed"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Base:
+        ends = {"behind": self.behind, "ahead": self.ahead}
+        problems = [
+            f"{name}: the base ends {-length:g} m before the slider. Give 0 or more"
+            for name, length in ends.items()
+            if length < 0.0
+        ]
+        if problems:
+            raise InputError(problems)
+        return self
+
+
+@model(kw_only=True)
+class Slider:
+    """A slider on a base, pressed from above and pushed until it slides.
+
+    The push changes the pressure on the interface, and the interface may
+    open. Strengths are given as friction coefficients.
+
+    Parameters
+    ----------
+    height : float
+        Height of the slider, m. Its length is the length of the interface.
+    thickness : float, optional
+        Depth, m, which turns stresses into forces, N. A machine of
+        finite stiffness needs it.
+    base : Base
+    drive : Pusher or TopShear
+    pressing : {"soft", "plate"}
+        A uniform pressure on the top face, or a rigid frictionless plate
+        that moves down without rotation.
+    tilt : float
+        Linear part of the soft pressure over its mean, in [-1, 1]. It is
+        positive towards the leading end: the pressure is
+        mean (1 + tilt (2 x/L - 1)), with x from the trailing end.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> slider = st.Slider(
+    ...     height=0.075,
+    ...     thickness=0.006,
+    ...     base=st.Base(height=0.03, behind=0.06, ahead=0.10),
+    ...     drive=st.Pusher(height=0.02, width=0.01),
+    ... )
+    """
+
+    height: Positive
+    thickness: Positive | None = None
+    base: Base
+    drive: Annotated[Pusher | TopShear, OneOf(SLIDER_DRIVES, _slider_drive)]
+    pressing: Literal["soft", "plate"] = "soft"
+    tilt: Annotated[Real, Field(ge=-1.0, le=1.0)] = 0.0
+    type: Literal["slider"] = "slider"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Slider:
+        problems = _beyond_side(self.drive, self.height)
+        if isinstance(self.drive, Pusher):
+            if self.drive.side == "both":
+                problems.append("drive.side: a slider is pushed on a side, 'left' or 'right'")
+            if self.drive.mass:
+                problems.append("drive.mass: has no effect on a slider. Leave it out")
+        if self.thickness is None and 0.0 < self.drive.stiffness < math.inf:
+            problems.append("thickness: is needed unless drive.stiffness is 0 or inf")
+        if self.tilt and self.pressing == "plate":
+            problems.append("tilt: a plate does not rotate. Leave tilt out, or press softly")
+        if problems:
+            raise InputError(problems)
+        return self
+
+    @property
+    def machine(self) -> float:
+        """Stiffness of the machine per unit depth, Pa."""
+        return self.drive.stiffness / (self.thickness or 1.0)
+
+    @property
+    def towards(self) -> Literal[-1, 1]:
+        """Direction of the push along x."""
+        return -1 if isinstance(self.drive, Pusher) and self.drive.side == "right" else 1
+
+    def toppling_ratio(self, length: float) -> float:
+        """Return the largest push over the normal force before the slider topples.
+
+        The push F moves the pressure by h F/N towards the leading end,
+        from the middle or, for a tilted press, from tilt L/6.
+        """
+        if self.pressing == "plate":
+            return math.inf
+        high = self.drive.height if isinstance(self.drive, Pusher) else self.height
+        return length * (0.5 - self.tilt / 6.0) / high
+
+    def rig(self, length: float, nodes: int, solid: Solid) -> Rig:
+        """Return the stiffness and the loads of the rig, per unit depth."""
+        from stiction.elasticity.columns import Material  # scipy
+        from stiction.elasticity.rig import Body, contact_rig
+
+        base, push = self.base, None
+        if isinstance(self.drive, Pusher):
+            half = 0.5 * self.drive.width
+            push = (
+                max(self.drive.height - half, 0.0),
+                min(self.drive.height + half, self.height),
+            )
+        slider, below = (
+            Body(height, Material(of.shear_modulus, of.kolosov))
+            for height, of in ((self.height, solid), (base.height, base.solid or solid))
+        )
+        return contact_rig(
+            length, nodes, slider, below, push=push, pressing=self.pressing, tilt=self.tilt,
+            behind=base.behind, ahead=base.ahead, bottom=base.bottom, towards=self.towards,
+        )  # fmt: skip
+
+    def effective_modulus(self, solid: Solid) -> float:
+        """Return 2/(a (1 - beta^2)), Pa, which is G* for equal materials.
+
+        a = sum (kappa + 1)/(4 G), and beta is Dundurs' second constant.
+        """
+        base = self.base.solid or solid
+        a = (solid.kolosov + 1.0) / (4.0 * solid.shear_modulus)
+        a += (base.kolosov + 1.0) / (4.0 * base.shear_modulus)
+        b = (solid.kolosov - 1.0) / (4.0 * solid.shear_modulus)
+        b -= (base.kolosov - 1.0) / (4.0 * base.shear_modulus)
+        return 2.0 * a / (a**2 - b**2)
+
+    def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
+        """Return why a slider does not fit an interface (m) and a material, or an empty list."""
+        problems, base, drive = [], self.base, self.drive
+        if mode != "II":
+            problems.append("mode: a slider is sheared in its plane. Leave 'II'")
+        if (base.solid or solid).plane != solid.plane:
+            problems.append(
+                f"specimen.base.solid.plane: must be the plane state of the slider, {solid.plane!r}"
+            )
+        heights = {"specimen.height": self.height, "specimen.base.height": base.height}
+        for name, height in heights.items():
+            if height < 2.0 * spacing:
+                nodes = math.ceil(2.0 * length / height)
+                problems.append(
+                    f"{name}: {height:g} m is less than two spacings of the nodes. Give"
+                    f" interface.nodes = {nodes} or more"
+                )
+        if isinstance(drive, Pusher) and drive.width < spacing * (1.0 - 1e-9):
+            problems.append(
+                f"interface.nodes: the spacing {spacing:.3g} m is larger than the width of the"
+                f" pusher, {drive.width:g} m. Give {math.ceil(length / drive.width)} or more"
+            )
+        return problems
+
+    def checked_pressing(self, rig: Rig, length: float, peak: Array, residual: Array) -> Array:
+        """Return the local pressure of the pressing over its mean, for peak slips and energies.
+
+        Refuse friction coefficients (samples, nodes) for which the path
+        is not defined. Coupling must not let the slip of a node shear
+        other nodes forwards, and the slider must not topple before it
+        slides.
+        """
+        from stiction.elasticity.rig import on_cells
+
+        n = peak.shape[-1]
+        K, coupling = rig.K[:n, :n], on_cells(rig.K[n:, :n])
+        forwards = (coupling > 0.0) & ~np.eye(n, dtype=bool)
+        limits = (MAX_POSITIVE * K.diagonal().min() - K[forwards]) / coupling[forwards]
+        if (limit := limits.min(initial=np.inf)) < peak.max():
+            raise InputError(
+                "specimen.base.solid: differs so much from the slider that the path is defined for"
+                f" friction coefficients up to {limit:.3g} only, got {peak.max():.3g}. With more,"
+                " slip at a node loads nodes next to it"
+            )
+        least, ratio = residual.mean(axis=-1).max(), self.toppling_ratio(length)
+        if least >= ratio:
+            raise InputError(
+                f"specimen.drive.height: the slider topples. It takes a push of at most {ratio:.3g}"
+                f" times the normal force, and its residual friction is {least:.3g}. Push lower"
+            )
+        # Nodes without pressure hardly weaken.
+        return np.maximum(-n * on_cells(rig.T_p[n:]), MIN_PRESSURE)
+
+
+SPECIMENS = Kinds(
+    "specimens", {"blocks": "problem.specimen:Blocks", "slider": "problem.specimen:Slider"}
+)
+
+
+def _specimen(value: Any) -> Any:
+    return value if isinstance(value, Blocks | Slider) else NotImplemented
+
+
+Specimen = Annotated[Blocks | Slider, OneOf(SPECIMENS, _specimen, default="blocks")]

@@ -21,7 +21,8 @@ from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.problem.problem import Problem
+from stiction.problem.problem import COEFFICIENTS, Problem
+from stiction.problem.specimen import Slider
 from stiction.random.fields import FACTOR, RandomInterface
 
 # Shares of the strength at or below the residual strength: the largest
@@ -48,6 +49,11 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
                 f"between.{name}: is a factor on the {name} of the problem, which is not given."
                 " Give it there, make it random, or leave the factor out"
             )
+    for name in {*random.names} & {"strength", "residual_strength", "initial_stress"} - {
+        *names
+    }:
+        if isinstance(problem.specimen, Slider):
+            raise InputError(f"random.{name}: {COEFFICIENTS}, or a random field of them")
     if names and problem.given_pressure is None and "normal_pressure" not in random.names:
         raise InputError(
             f"{names[0]}: is given as friction coefficients, which need a normal pressure"

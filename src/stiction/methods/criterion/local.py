@@ -41,6 +41,7 @@ from stiction.problem.profiles.reading import named_profiles
 from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.results import onset_variables, position
 from stiction.problem.sample import Sample
+from stiction.problem.specimen import Slider
 
 MAX_RMS_DIFFERENCE = 0.01
 """Relative difference from the exact onset (rms) above which samples are solved by both methods."""
@@ -131,6 +132,11 @@ class LocalCriterion:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         friction, reasons = problem.friction, []
+        if isinstance(problem.specimen, Slider):
+            return [
+                "problem.specimen: the pressure under a slider changes with the push and with slip,"
+                " so that no patch has a fixed strength. Use st.Equilibrium()"
+            ]
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"

@@ -47,6 +47,7 @@ from stiction.methods.equilibrium.state import EquilibriumState, Jump
 from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
+from stiction.problem.specimen import Slider
 
 OPTIONS = ("courant", "arrival", "max_steps", "events")
 """Options of `Rupture` with an effect on specimens. The others need a load that rises in time."""
@@ -62,6 +63,11 @@ CHECKS_PER_WINDOW = 8
 
 def refusals(method: Any, problem: Problem) -> list[str]:
     """Return the reasons why a rupture cannot run on the specimen of a problem."""
+    if isinstance(problem.specimen, Slider):
+        return [
+            "problem.specimen: waves run through two equal blocks only, whose pressure does not"
+            " change. Use st.Equilibrium()"
+        ]
     # An option with its default value was not asked for.
     usual = type(method)()
     reasons = [

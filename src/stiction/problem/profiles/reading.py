@@ -373,7 +373,10 @@ def named_profiles(given: Any) -> dict[str, Any]:
         unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
     if unknown and not hasattr(given, "data_vars"):
         raise InputError(unknown)
-    return {name: given[name] for name in given if name in known}
+    profiles = {name: given[name] for name in given if name in known}
+    if is_coefficient(profiles.get("strength")):
+        profiles["friction_coefficient"] = profiles.pop("strength")
+    return profiles
 
 
 def placed_profiles(
@@ -398,9 +401,11 @@ def placed_profiles(
     samples = None
     for name in (first, *(name for name in given if name != first)):
         try:
-            value, known = at_nodes(name, given[name], interface, gaps)
+            of_friction = name == "residual_strength" and is_coefficient(given[name])
+            quantity = "friction_coefficient" if of_friction else name
+            value, known = at_nodes(quantity, given[name], interface, gaps)
             with prefixed(name):
-                rows[name] = rows_of(name, value, interface, samples)
+                rows[name] = rows_of(quantity, value, interface, samples)
             if name == "normal_pressure" and np.shape(value) in ((), (samples, 1)):
                 rows[name] = rows[name] * pressing
             if not np.all(known):
