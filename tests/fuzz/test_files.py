@@ -41,7 +41,8 @@ def workbook():
 
 def netcdf(folder, **options):
     data = xr.Dataset({"strength": ("x", Y, {"units": "MPa"})}, {"x": ("x", X)})
-    data.to_netcdf(folder / "p.nc", engine="netcdf4", **options)
+    engine = "scipy" if options.get("format") else "h5netcdf"
+    data.to_netcdf(folder / "p.nc", engine=engine, **options)
     return "p.nc", (folder / "p.nc").read_bytes(), {}
 
 

@@ -214,7 +214,7 @@ def write_result(result: xr.Dataset, path: Path) -> None:
         if variable.ndim and variable.size and variable.dtype.kind in "fiub"
     }
     write_whole(
-        path, lambda aside: result.to_netcdf(aside, engine="netcdf4", encoding=encoding)
+        path, lambda aside: result.to_netcdf(aside, engine="h5netcdf", encoding=encoding)
     )
 
 

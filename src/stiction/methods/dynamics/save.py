@@ -329,7 +329,7 @@ class Recorder:
 
 
 def _write(path: Path, dataset: xr.Dataset) -> None:
-    write_whole(path, lambda aside: dataset.to_netcdf(aside, engine="netcdf4"))
+    write_whole(path, lambda aside: dataset.to_netcdf(aside, engine="h5netcdf"))
 
 
 def _digest(run: Run, saved: str) -> str:
