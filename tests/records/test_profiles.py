@@ -4,23 +4,16 @@ import dataclasses
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 from crooked import (
     LINE,
-    LINE_GAP,
     LINE_STRENGTH,
-    PLANE,
-    PLANE_GAP,
-    PLANE_STRENGTH,
     as_measured,
 )
 from recording import Calls, compared, inside, refusal
-from setups import EXACT, LOCAL
+from setups import LOCAL
 
 import stiction as st
 from stiction.base.units import parse
-from stiction.study.run import export
 
 calls = Calls()
 BACK = "values written out above, tests/oracle/test_crooked.py and tests/user/test_profiles.py"
@@ -38,9 +31,9 @@ def table(text, **options):
 def other_places_and_units():
     dense = [900.0 + 7.0 * i * i for i in range(16)]
     gap = "\n".join(f"{i} {'-' if 5 <= i <= 7 else v}" for i, v in enumerate(dense))
-    between = {"x_unit": "mm", "unit": "kPa", "interpolate": True, "gaps": "skip"}
+    between = {"x_unit": "mm", "unit": "kPa"}
     return {
-        "beside a gap": table(gap, interface=SMALL, **between),
+        "beside a gap": table(gap, **between),
         "stated": table("\n".join(f"{v}" for v in EIGHT), unit="MPa", interface=SMALL),
     }
 
@@ -57,22 +50,6 @@ def friction_coefficients_and_pressures():
         "coefficient": table(text, interface=SMALL, quantity="friction_coefficient"),
         "pressure": table(pressure, interface=SMALL, quantity="normal_pressure"),
     }
-
-
-@calls(BACK)
-def gaps_across_the_seam():
-    holes = as_measured(LINE.interface, np.where(LINE_GAP, np.nan, LINE_STRENGTH))
-    read = st.read_profile(holes, interface=LINE.interface, gaps="fill")
-    local, onset = (
-        st.onset(LINE, holes, method=method, gaps="fill") for method in (LOCAL, EXACT)
-    )
-    with inside():
-        export(onset, Path("onset.csv"))
-        table = pd.read_csv("onset.csv")
-    of_line = {"read": read, "local": local, "exact": onset, "table": table}
-    of_plane = as_measured(PLANE.interface, np.where(PLANE_GAP, np.nan, PLANE_STRENGTH))
-    read = st.read_profile(of_plane, interface=PLANE.interface, gaps="skip")
-    return {"line": of_line, "plane": {"read": read}}
 
 
 @calls(BACK)
@@ -101,28 +78,20 @@ def powers_and_slashes_of_units():
     return {text: [parse(text).factor, parse(text).powers] for text in texts}
 
 
-@calls("coefficients times the pressure, a straight line through each gap")
-def onsets_of_coefficients_and_beside_gaps():
-    """In per cent, in another order, with the unit kept by a product; gaps that are remembered."""
+@calls("coefficients times the pressure")
+def onsets_of_coefficients():
+    """In per cent, in another order, with the unit kept by a product."""
     law = st.LinearWeakening(weakening_rate=0.28e12, residual_ratio=0.1)
     ratio = dataclasses.replace(LINE, friction=law)
     pressure = LINE.load.normal_pressure
     percent = as_measured(LINE.interface, LINE_STRENGTH / pressure, "%", 0.01)
     mu = st.read_profile(percent, interface=LINE.interface, quantity="friction_coefficient")
     product = (mu * pressure).assign_attrs(units="1")
-    weak = int(np.argmin(LINE_STRENGTH))
     found = {
         "reversed": st.onset(LINE, mu[::-1], method=LOCAL),
         "product": refusal(lambda: st.onset(ratio, product, method=LOCAL)),
     }
-    for after in (1, 9):  # in the critical patch, and beyond it
-        gap = np.isin(np.arange(96), (weak + after + np.arange(3)) % 96)
-        holes = as_measured(LINE.interface, np.where(gap, np.nan, LINE_STRENGTH))
-        filled = st.read_profile(holes, interface=LINE.interface, gaps="fill")
-        found[str(after)] = st.onset(LINE, 1.1 * filled[::-1], method=LOCAL)
-    method, save = st.Rupture(loading_rate=6e8, stop="onset"), st.Save([])
-    run = st.simulate_rupture(LINE, filled, method=method, save=save)
-    return found | {"rupture": run.in_gap}
+    return found
 
 
 test_outputs_are_as_recorded = compared(calls, __file__)

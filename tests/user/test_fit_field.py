@@ -74,10 +74,6 @@ def test_missing_values_are_left_out_and_counted():
     assert "10 of 400 points are missing and left out" in str(fit)
     there = np.isfinite(values)
     assert fit.parameters == fitted(RECORD[there]).parameters
-    piece = st.Interface(length=COUNT * SPACING, nodes=COUNT)
-    with pytest.warns(st.AccuracyWarning, match="filled"):  # which is no measurement
-        filled = st.read_profile(labelled(values), interface=piece, gaps="fill")
-    assert fitted(filled).parameters == fit.parameters
 
 
 def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():

@@ -151,41 +151,24 @@ def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
     refuses("needs openpyxl ... save it as .csv", lambda: st.read_profile(tmp_path / "p.xlsx"))
 
 
-def test_between_places_it_is_interpolated_where_it_is_asked_for():
-    """A gap ends where points lie on nodes but for a hundredth; dense points may lack a few."""
-    h = X[1]
-    ends = np.r_[X[:11], 20.01 * h, X[21:], 40.5 * h]
-    dense = np.delete(np.arange(1280) * 0.1 * h, range(297, 303))
-    halves = np.arange(256) * 0.5 * h
-    for at, lost, missing in ((ends, [], range(11, 20)), (dense, [], ()), (halves, [0], [0])):
-        values = 1e6 + 1e6 * at
-        values[lost] = np.nan
-        profile = st.read_profile(
-            labelled(values, at), interface=LINE, interpolate=True, gaps="skip"
-        )
-        assert [*np.flatnonzero(np.isnan(profile))] == [*missing]
-        there = ~np.isnan(profile.values)
-        np.testing.assert_allclose(profile[there], 1e6 + 1e6 * X[there], rtol=1e-14)
-
-
 def test_profiles_in_a_study_file(tmp_path):
     for name, head, columns in (
         ("tau_r.csv", "x (mm);tau_r (kPa)", [X[::-1] * 1e3, 1e-3 * (1e5 + 1e6 * X[::-1])]),
         ("pressure.txt", "# sigma (MPa)", [5.0 + X]),
-        ("load.csv", "x (m);profile", [X[::4], 1.0 + X[::4]]),
+        ("load.csv", "x (m);profile", [X[::-1], 1.0 + X[::-1]]),
     ):
         table = np.column_stack(columns)
         np.savetxt(tmp_path / name, table, "%.12g", ";", header=head, comments="")
     study = small_study(method={"type": "equilibrium"})
     study["problem"]["friction"]["residual_strength"] = "tau_r.csv"
-    load = {"file": "load.csv", "interpolate": True}
+    load = {"file": "load.csv", "x_unit": "m"}
     study["problem"]["load"] = {"profile": load, "normal_pressure": "pressure.txt"}
     loaded = st.Study.from_dict(study, folder=tmp_path)
     problem = loaded.problem
     residual = problem.friction.residual_strength
     np.testing.assert_allclose(residual, 1e5 + 1e6 * X, rtol=1e-11)
     np.testing.assert_allclose(problem.load.normal_pressure, (5.0 + X) * 1e6, rtol=1e-11)
-    np.testing.assert_allclose(problem.load.profile[: NODES - 4], 1.0 + X[:-4], rtol=1e-11)
+    np.testing.assert_allclose(problem.load.profile, 1.0 + X, rtol=1e-11)
     assert st.Study.from_dict(loaded.to_dict()) == loaded
 
 
@@ -211,77 +194,20 @@ FREE = st.Problem(
 )
 
 
-def test_a_scan_is_placed_by_an_offset_or_its_centre():
-    """From 12.3 mm on, on a specimen of 150 mm; on a plane along both directions."""
+def test_a_scan_beyond_a_specimen_or_with_gaps_is_refused():
+    """From 12.3 mm on, on a specimen of 150 mm: the coordinates are moved by the user."""
     x = FREE.interface.x
     values = 1e6 + 1e6 * x
     scan = labelled(values, x + 12.3e-3)
-    refuses("offset= ... 'centre'", lambda: st.read_profile(scan, interface=FREE.interface))
-    for offset in (-12.3e-3, "centre"):
-        given = st.read_profile(scan, interface=FREE.interface, offset=offset)
-        np.testing.assert_allclose(given, values, rtol=1e-14)
-    refuses("'centre' needs an interface", lambda: st.read_profile(scan, offset="centre"))
-    rows = 1e6 + np.arange(512.0).reshape(32, 16)
-    places = {dim: at + 7.7e-3 for dim, at in PLANE.coordinates.items()}
-    array = xr.DataArray(rows, places, ("x", "y"))
-    for offset in (-7.7e-3, (-7.7e-3, -7.7e-3), "centre"):
-        np.testing.assert_array_equal(
-            st.read_profile(array, interface=PLANE, offset=offset), rows
-        )
-
-
-def test_gaps_of_specimens_and_planes_are_interpolated_on_request():
-    """A linear profile comes back; patches that reach into a gap are marked."""
-    x = FREE.interface.x
-    values = 1e6 + 1e6 * x
-    holes = np.where(
-        (np.arange(64) > 20) & (np.arange(64) < 25) | (np.arange(64) == 63), np.nan, values
-    )
-    refuses("gaps='fill' ... given(profile)", lambda: st.onset(FREE, holes, method=LOCAL))
-    with pytest.warns(st.AccuracyWarning, match="straight lines"):
-        filled = st.read_profile(holes, interface=FREE.interface, gaps="fill")
-    np.testing.assert_allclose(filled[:63], values[:63], rtol=1e-14)
-    assert filled[63] == values[62]
-    weak = np.where(np.isnan(holes), np.nan, holes - 5e5 * (np.abs(x - x[19]) < 2e-3))
-    result = st.onset(FREE, weak, method=LOCAL, gaps="fill")
-    assert result.in_gap.values.tolist() == [True]
-    assert not st.onset(
-        FREE, weak[::-1].copy()[::-1] + 0.0, method=LOCAL, gaps="fill"
-    ).measured[22]
-    for system, method in ((FREE, st.Rupture()), (SYSTEM, st.Rupture(loading_rate=1e9))):
-        dip = np.exp(-(((system.interface.x - system.interface.length / 3) / 4e-3) ** 2))
-        strength = labelled(np.where(dip > 0.9, np.nan, 1e6 - 4e5 * dip), system.interface.x)
-        filled = st.read_profile(strength, interface=system.interface, gaps="fill")
-        with pytest.warns(st.AccuracyWarning, match="reaches into a gap"):
-            run = st.simulate_rupture(system, filled, method=method)
-        assert run.in_gap.values
-        np.testing.assert_array_equal(run.measured, dip <= 0.9)
-    plane = st.Problem(
-        solid=FREE.solid, interface=st.Interface(length=(0.1, 0.05), nodes=(64, 32)),
-        friction=FREE.friction,
-    )  # fmt: skip
-    at = plane.interface.coordinates
-    tilt = 1e6 + 2e6 * at["x"][:, None] - 1e6 * at["y"]
-    hole = np.zeros(tilt.shape, dtype=bool)
-    hole[20:25, 10:13] = hole[40, 20] = True
-    with pytest.warns(st.AccuracyWarning, match="triangles"):
-        filled = st.read_profile(
-            np.where(hole, np.nan, tilt), interface=plane.interface, gaps="fill"
-        )
-    np.testing.assert_allclose(filled, tilt, rtol=1e-12)
-    corner = np.zeros(tilt.shape, dtype=bool)
-    corner[[0, -1]], corner[:, 0] = True, True
-    wave = 1e6 + 1e5 * np.cos(2.0 * np.pi * at["x"] / 0.1)[:, None] + 0.0 * at["y"]
-    filled = st.read_profile(
-        np.where(corner, np.nan, wave), interface=plane.interface, gaps="fill"
-    )
-    assert (
-        np.abs(filled - wave).max() < 2e3
-    )  # half the curvature times the square of two spacings
-    strength = tilt - 4e5 * (
-        (np.abs(at["x"][:, None] - 0.034) < 0.006) & (np.abs(at["y"] - 0.018) < 0.006)
-    )
-    result = st.onset(plane, np.where(hole, np.nan, strength), method=LOCAL, gaps="fill")
-    assert result.in_gap.dims == ("sample",)
-    assert result.in_gap.values.tolist() == [True]
-    assert result.measured.dims == ("x", "y")
+    refuses("assign_coords", lambda: st.read_profile(scan, interface=FREE.interface))
+    given = st.read_profile(scan.assign_coords(x=scan.x - 12.3e-3), interface=FREE.interface)
+    np.testing.assert_allclose(given, values, rtol=1e-14)
+    holes = values.copy()
+    holes[20:25] = np.nan
+    for call in (
+        lambda: st.onset(FREE, holes, method=LOCAL),
+        lambda: st.onset(FREE, labelled(holes, x), method=LOCAL),
+        lambda: st.read_profile(labelled(holes, x), interface=FREE.interface),
+        lambda: st.simulate_rupture(FREE, holes, method=st.Rupture()),
+    ):
+        refuses("missing (NaN) at 5 of 64 nodes ... given(profile)", call)

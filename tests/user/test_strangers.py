@@ -28,7 +28,7 @@ from stiction.base.files import private_folder
 from stiction.base.netcdf import read_netcdf
 from stiction.ensemble import batches, store
 from stiction.methods.dynamics.save import open_rupture
-from stiction.problem.profiles.files import IMAGES, NETCDF, TEXT
+from stiction.problem.profiles.files import NETCDF, TEXT
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has other means")
 SOURCES = Path(__file__).parents[2] / "src"
@@ -116,7 +116,7 @@ def test_the_current_folder_chooses_no_folder_of_kernels(tmp_path, monkeypatch):
 
 STUDY = small_study(64)
 READERS = {
-    **{f"p{ending}": st.read_profile for ending in (*TEXT, *NETCDF, *IMAGES, ".xlsx", ".npy")},
+    **{f"p{ending}": st.read_profile for ending in (*TEXT, *NETCDF, ".xlsx", ".npy")},
     "peaks.csv": st.read_peaks,
     "study.toml": st.Study.from_toml,
     "study.json": lambda path: st.open_run(path.parent),

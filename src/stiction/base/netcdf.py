@@ -58,7 +58,9 @@ def read_netcdf(content: bytes, unwanted: Collection[str] = ()) -> xr.Dataset:
         with xr.open_dataset(
             io.BytesIO(content), decode_times=False, decode_timedelta=False, **options
         ) as opened:
-            texts = [name for name, array in opened.items() if array.dtype.kind not in "fiubOUT"]
+            texts = [
+                name for name, array in opened.items() if array.dtype.kind not in "fiubOUT"
+            ]
             return opened.drop_vars(texts).load()
 
 

@@ -13,8 +13,7 @@ Steps:
 
 1. Find the spacing of the points: a common divisor of the distances
    between neighbours, which the printed digits may have rounded.
-2. Place the values on a regular grid. Missing points, and values that
-   were filled, are NaN.
+2. Place the values on a regular grid. Missing points are NaN.
 3. Refuse short, constant and infinite records. Warn about outliers,
    which are far from the median, and about dropouts, which are far from
    both neighbours.
@@ -91,8 +90,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     values = simplified(source, quantity)
     places: dict[str, Array] = {}
     if is_labelled(values):
-        values, places, measured = points_of(labelled(values, quantity))
-        values = np.where(measured, values, np.nan)  # filled values were not measured
+        values, places = points_of(labelled(values, quantity))
     if not places:
         return _of_array(values, interface)
     # 1. and 2. Points in any order, and missing points, find their
@@ -144,7 +142,7 @@ def _spacing(x: Array, name: str) -> float:
     if uneven or np.diff(np.round(place)).min() < 1:
         raise InputError(
             f"{name} is not equally spaced at {x[off.argmax()]:.6g} m. First interpolate, as in"
-            " st.read_profile(..., interface=..., interpolate=True, gaps='skip')"
+            " profile.interp(x=np.linspace(...))"
         )
     return spacing
 

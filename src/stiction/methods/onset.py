@@ -10,7 +10,7 @@ returns a warning.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from stiction.methods.protocol import (
     seconds_per_sample,
 )
 from stiction.problem.problem import Problem, refusals
-from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import study_attributes
 from stiction.problem.sample import Sample
 from stiction.problem.unit_doubts import doubt_sample
@@ -88,7 +87,6 @@ def onset(
     profiles: Any,
     *,
     method: MethodObject,
-    gaps: Literal["refuse", "fill"] = "refuse",
     progress: Progress = True,
 ) -> xr.Dataset:
     """Compute the load and position at which interfaces with a given strength begin to slide.
@@ -110,9 +108,6 @@ def onset(
         are multiplied by the normal pressure.
     method : LocalCriterion, Equilibrium or Rupture
         The method that computes the onset. There is no default.
-    gaps : {"refuse", "fill"}
-        Whether to refuse missing values (NaN), or to fill them as
-        `stiction.read_profile` does.
     progress : bool or callable
         True shows progress on standard error after a second. A callable
         receives (done, total).
@@ -126,9 +121,7 @@ def onset(
         the result includes `friction_coefficient`. If a thickness,
         width or area is known, it includes `critical_force` and
         `first_instability_force` (N). Every variable has `units` and
-        `long_name`. If gaps were filled, `in_gap` states whether the
-        critical patch reaches into a gap, and the coordinate `measured`
-        marks the nodes with measured values.
+        `long_name`.
 
     Raises
     ------
@@ -138,10 +131,9 @@ def onset(
     Warns
     -----
     AccuracyWarning
-        If gaps are filled, or if the onset lies in a gap. Also if the
-        error of the local criterion exceeds 1 % in the first samples.
-        These are checked only if a quick test leaves a doubt: as many
-        as `Equilibrium` solves in two seconds, but at most 32.
+        If the error of the local criterion exceeds 1 % in the first
+        samples. These are checked only if a quick test leaves a doubt:
+        as many as `Equilibrium` solves in two seconds, but at most 32.
     UnitWarning
         If a value is so unusual for a solid that its unit is in doubt.
 
@@ -163,7 +155,7 @@ def onset(
         raise InputError(refused)
     attributes = study_attributes(problem=problem, method=method)
     # Profiles pass the checks for users' data here, and nowhere else.
-    sample, measured = problem.placed_sample(profiles, optional_member(method, "accepts"), gaps)
+    sample = problem.sample(profiles, accept=optional_member(method, "accepts"))
     doubt_sample(problem, sample)
     # Batches keep arrays small, and let the progress move.
     solver, parts, size = prepared(problem, method), [], batch_size(problem, method)
@@ -179,8 +171,7 @@ def onset(
             meter.advance(part.samples)
     values = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     _compare(problem, method, sample, values["critical_stress"])
-    result = label(problem, method, values, np.arange(sample.samples), attributes)
-    return with_gaps(problem, result, measured)
+    return label(problem, method, values, np.arange(sample.samples), attributes)
 
 
 def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) -> None:

@@ -25,11 +25,10 @@ from stiction.plot.axes import (
     problem_of,
     with_unit,
 )
-from stiction.plot.style import INK, PAGE, PALE, QUIET, color, series
+from stiction.plot.style import INK, PAGE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.labels import is_coefficient
-from stiction.problem.profiles.placing import IN_GAP, MEASURED
 from stiction.problem.profiles.reading import at_nodes
 from stiction.random.fields import RandomField
 
@@ -122,7 +121,7 @@ def field(
 def rows_of(interface: Interface, profile: Any, quantity: str = "strength") -> Array:
     """Return a profile as (samples, *shape) in SI, with NaN in gaps, or raise an `InputError`."""
     shape = interface.shape
-    given, _ = at_nodes(quantity, profile, interface, "skip")
+    given = at_nodes(quantity, profile, interface, missing=True)
     with prefixed("profile"):
         values = as_numbers(given)
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:
@@ -261,15 +260,7 @@ def _draw_line(
     interface = problem.interface
     x = interface.x * unit_for("m", interface.lengths)[0]
     factor, unit = unit_for("Pa", tau_p)
-    first = next(iter(results.values()))
     axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-    if MEASURED in first.coords:
-        missing = ~first[MEASURED].values.reshape(-1)
-        beside = np.roll(missing, 1) | np.roll(missing, -1)
-        axes.fill_between(
-            x, 0.0, 1.0, where=missing | beside, transform=axes.get_xaxis_transform(),
-            facecolor=PALE, alpha=0.6, linewidth=0.0, zorder=0.0, label="not measured, filled in",
-        )  # fmt: skip
     with suppress(InputError):  # no single nucleation length: the strength alone is drawn
         averaged = nucleation_stress(problem, tau_p)
         axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
@@ -301,7 +292,6 @@ def _mark(
         if "friction_coefficient" in result:
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
         text += f" at {', '.join(f'{part:.2f}' for part in place)} {length_unit}"
-        text += " (in a gap)" if IN_GAP in result and bool(result[IN_GAP][0]) else ""
         style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
         style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}
         at = place if interface.is_plane else (*place, load * factor)

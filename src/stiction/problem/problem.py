@@ -26,7 +26,7 @@ from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load, LoadShape
 from stiction.problem.profiles.labels import is_coefficient
-from stiction.problem.profiles.placing import Gaps, turned
+from stiction.problem.profiles.placing import turned
 from stiction.problem.profiles.reading import (
     at_nodes,
     check_values,
@@ -219,7 +219,7 @@ class Problem:
             for name, value in vars(owner).items():
                 if is_unplaced(value):
                     try:
-                        at, _ = at_nodes(f"{part}.{name}", value, self.interface)
+                        at = at_nodes(f"{part}.{name}", value, self.interface)
                         value = np.asarray(at)  # of a pandas object too
                     except InputError as error:
                         problems += error.problems
@@ -401,19 +401,11 @@ class Problem:
         strength. An `AccuracyWarning` gives the share of such nodes. It also gives
         the share of nodes whose initial stress is below minus the strength.
         """
-        return self.placed_sample(profiles, accept)[0]
-
-    def placed_sample(
-        self, profiles: Any, accept: Collection[str] = (), gaps: Gaps = "refuse"
-    ) -> tuple[Sample, Any]:
-        """Return a sample made from users' data, and a mask of the measured nodes, or True."""
         if isinstance(profiles, Sample):
-            sample, measured = self.own_sample(self._given_sample(profiles), accept), True
+            sample = self.own_sample(self._given_sample(profiles), accept)
         else:
             given = named_profiles(profiles)
-            rows, measured, mistakes = placed_profiles(
-                given, self.interface, gaps, self.pressing
-            )
+            rows, mistakes = placed_profiles(given, self.interface, self.pressing)
             problems = self.given_twice(given, "profiles") + mistakes
             coefficients = [name for name in STRENGTHS if is_coefficient(given.get(name))]
             if isinstance(self.specimen, Slider):
@@ -439,7 +431,7 @@ class Problem:
                     " not weaken: their strength is constant"
                 )
         check_resolution(self, sample.steepest_weakening_rate)
-        return sample, measured
+        return sample
 
     def constants(self, strength: Any) -> dict[str, Any]:
         """Return, by name, values for profiles that are not given, or None without a value."""

@@ -70,7 +70,6 @@ from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.labels import in_si, unit_of
-from stiction.problem.profiles.placing import MEASURED
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition, layout
 
@@ -125,8 +124,6 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
-        if MEASURED in value.coords:  # leave out values that only fill gaps
-            value = value.where(value[MEASURED].astype(bool))
         axes = (in_si(value[name], name, "m") for name in names)
         rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)

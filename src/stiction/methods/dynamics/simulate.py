@@ -19,7 +19,6 @@ from stiction.methods.dynamics.state import RuptureState
 from stiction.methods.dynamics.summary import arrested_events, rate_spectrum, summary
 from stiction.methods.equilibrium.events import event_table, event_variables
 from stiction.problem.problem import Problem, refusals
-from stiction.problem.profiles.placing import with_gaps
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
 from stiction.problem.unit_doubts import doubt_sample
@@ -121,13 +120,12 @@ def simulate_rupture(
     save = Save() if save is None else save
     if refused := refusals(problem, method):
         raise InputError(refused)
-    rows, measured = problem.placed_sample(profiles, method.accepts)
+    rows = problem.sample(profiles, accept=method.accepts)
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")
     doubt_sample(problem, rows)
     if problem.specimen is not None:
-        result = simulate_event(problem, rows, method, save, event, progress)
-        return with_gaps(problem, result, measured)
+        return simulate_event(problem, rows, method, save, event, progress)
     if event is not None:
         raise InputError("event: only specimens have numbered events. Leave it out")
     stations = save.nodes(problem.interface)
@@ -142,7 +140,7 @@ def simulate_rupture(
     attributes = study_attributes(problem=problem, method=method)
     recorder = Recorder(run, save, attributes | {"stopped": "running"})
     if recorder.begin(state) and save.to is not None:
-        return with_gaps(problem, open_rupture(save.to, fields=()), measured)
+        return open_rupture(save.to, fields=())
     if state.steps == 0:
         recorder.add(state)
     with Meter("rupture", show=progress, unit="steps") as meter:
@@ -157,7 +155,7 @@ def simulate_rupture(
         checks.warn_of_survival(method.stop, [result])
     checks.warn_of_fast_loading([checks.rise_in_crossing(run, result)])
     recorder.finish(result, stopped)
-    return with_gaps(problem, result, measured)
+    return result
 
 
 def _record_to_end(

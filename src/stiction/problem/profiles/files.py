@@ -70,24 +70,24 @@ ABOUT_BYTES = 2**20
 """Unpacked size of the parts beside sheets, texts and images, such as styles."""
 SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
-NETCDF, IMAGES = (".nc", ".nc4"), (".png", ".tif", ".tiff")
+NETCDF = (".nc", ".nc4")
 INSTRUMENTS = (
     ".sur", ".al3d", ".plu", ".plux", ".opd", ".opdx", ".x3p", ".sdf", ".vk3", ".vk4", ".vk6",
     ".vk7", ".gwy", ".os3d", ".lext", ".nms", ".zon", ".datx", ".mnt", ".oir", ".frt", ".spm",
     ".ibw", ".nid",
 )  # fmt: skip
 """Binary files of profilometers and microscopes, which SurfaceTopography reads."""
-HEIGHT, GREY_VALUE = "height", "grey value"
-"""Names of arrays that hold no strengths: surfaces and images."""
+HEIGHT = "height"
+"""Name of the array of a surface, which holds no strengths."""
 
 
 def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
-    """Read a file as variables, as a surface or image over 'x' and 'y', or as an .npy array."""
+    """Read a file as variables, as a surface over 'x' and 'y', or as an .npy array."""
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
         return read_table(path, options)
     readers: dict[str, Any] = {".npy": _read_npy} | dict.fromkeys(NETCDF, _read_netcdf)
-    readers |= dict.fromkeys(IMAGES, _read_image) | dict.fromkeys(INSTRUMENTS, _read_instrument)
+    readers |= dict.fromkeys(INSTRUMENTS, _read_instrument)
     if ending not in readers:
         endings = ", ".join((*TEXT, EXCEL, *readers))
         raise InputError(
@@ -295,7 +295,7 @@ def _cells_of(sheet: Any, size: int) -> list[Row]:
     return [Row(row.number, row.cells + [""] * (width - len(row.cells))) for row in rows]
 
 
-# -- arrays, images and surfaces -----------------------------------------------------------------
+# -- arrays and surfaces -------------------------------------------------------------------------
 
 
 def _read_npy(content: bytes) -> Array:
@@ -315,22 +315,6 @@ def _read_netcdf(content: bytes) -> xr.Dataset:
         given = variable.attrs
         variable.attrs = {key: given[key] for key in ("unit", "units") if key in given}
     return data
-
-
-def _read_image(content: bytes) -> xr.DataArray:
-    """Return the grey values (nx, ny) of an image. The first line is at y = 0."""
-    import xarray as xr
-    from PIL import Image
-
-    with (
-        refuse_damage("an image"),
-        Image.open(io.BytesIO(content), formats=("PNG", "TIFF")) as image,
-    ):
-        check_unpacked(image.width * image.height, content, MAX_CELLS, 1)
-        grey = np.asarray(image)
-    if grey.ndim != 2 or grey.dtype.kind not in "fiu":
-        raise InputError(f"must be a grey image, got shape {grey.shape} of {grey.dtype}")
-    return xr.DataArray(grey.T.astype(np.float64), dims=("x", "y"), name=GREY_VALUE)
 
 
 def _read_instrument(content: bytes) -> xr.DataArray:

@@ -6,8 +6,7 @@ names and units follow no standard. A wrong choice would give a wrong
 number, so an ambiguous choice is refused. `labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
-2. Take a table without headings for a map if its comments, `rows` or
-   `spacing` say so.
+2. Take a table without headings for a map if its comments say so.
 3. Choose the variable and its coordinates by the argument. Without an
    argument, choose by the name, and then by the unit.
 4. Name the dimensions 'x' and 'y', or 'row' for a list of points. The
@@ -36,8 +35,8 @@ from stiction.base.errors import (
 from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
-from stiction.problem.profiles.files import GREY_VALUE, HEIGHT, heights_of, load
-from stiction.problem.profiles.placing import MEASURED, OF_A_PLANE
+from stiction.problem.profiles.files import HEIGHT, heights_of, load
+from stiction.problem.profiles.placing import OF_A_PLANE
 from stiction.problem.profiles.tables import Options, name_and_unit, sizes_of, table_of_frame
 
 NAMES = {
@@ -198,8 +197,6 @@ def labelled(
     unit: str | None = None,
     x_unit: str | None = None,
     options: Options = Options(),  # noqa: B008
-    rows: str | None = None,
-    spacing: Any = None,
 ) -> Any:
     """Return a quantity from `source` in SI, along `dims` or the directions of the source.
 
@@ -212,17 +209,13 @@ def labelled(
     if not is_labelled(data):
         data = _of_array(data, source)
     name = getattr(data, "name", None)
-    if name in (HEIGHT, GREY_VALUE) and quantity != "height":
+    if name == HEIGHT and quantity != "height":
         raise InputError(
-            f"holds {name}s. Pass strength=, a function that maps them to strengths (Pa), or keep"
+            "holds heights. Pass strength=, a function that maps them to strengths (Pa), or keep"
             " them with quantity='height'"
         )
-    if name == GREY_VALUE:
-        unit = unit or "m"  # a map to strengths takes grey values as they are
     # 2. A table without headings may be a map.
-    data = _as_map(data, dims, rows, spacing, value)
-    if spacing is not None:
-        data = _spaced(data, spacing)
+    data = _as_map(data, dims, value)
     if not hasattr(data, "data_vars"):
         if value not in (None, data.name):
             raise InputError(
@@ -239,7 +232,7 @@ def labelled(
     array = data[chosen]
     at = {dim: data[name].variable for dim, name in places.items()}
     at = {dim: along for dim, along in at.items() if {*along.dims} <= {*array.dims}}
-    dropped = [name for name in array.coords if name not in (MEASURED, *array.dims)]
+    dropped = [name for name in array.coords if name not in array.dims]
     array = _directed(array.drop_vars(dropped).assign_coords(at), dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
@@ -280,7 +273,7 @@ def _of_array(values: Any, source: Any) -> Any:
 # -- step 2: maps --------------------------------------------------------------------------------
 
 
-def _as_map(data: Any, dims: Any, rows: str | None, spacing: Any, value: Column) -> Any:
+def _as_map(data: Any, dims: Any, value: Column) -> Any:
     """Return a matrix from a text file as a map. Return other data unchanged.
 
     Comments may state the width, the height and the unit of a map, as
@@ -293,34 +286,21 @@ def _as_map(data: Any, dims: Any, rows: str | None, spacing: Any, value: Column)
     if data.attrs.get("headed") or len(data.data_vars) < 2:
         return data
     sizes = sizes_of(data.attrs["comments"])
-    if rows is None and not {"width", "height"} <= sizes.keys():
-        is_map = value is None and (
-            spacing is not None or (dims is not None and len(dims) == 2)
-        )
-        if is_map and len(data.data_vars) != 3:
+    if not {"width", "height"} <= sizes.keys():
+        if value is None and dims is not None and len(dims) == 2 and len(data.data_vars) != 3:
             raise InputError(
-                f"holds {len(data.data_vars)} columns without names. Pass rows='x' if each line of"
-                " the file has a single x, rows='y' if it has a single y"
+                f"holds {len(data.data_vars)} columns without names. Pass a map as columns x, y and"
+                " value, or as an array: np.loadtxt(path).T if each line has a single y"
             )
         return data
-    values = np.stack([column.values for column in data.values()])  # (columns, lines)
-    array = xr.DataArray(values if rows != "x" else values.T, dims=("x", "y"))
+    # Each line of the file has a single y.
+    array = xr.DataArray(np.stack([column.values for column in data.values()]), dims=("x", "y"))
     for dim, name in (("x", "width"), ("y", "height")):
-        if name in sizes:
-            length, unit = sizes[name]
-            x = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
-            array = array.assign_coords({dim: (dim, x, {"units": unit or "m"})})
+        length, unit = sizes[name]
+        x = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
+        array = array.assign_coords({dim: (dim, x, {"units": unit or "m"})})
     array.attrs["units"] = sizes.get("value units", (1.0, ""))[1]
     return array
-
-
-def _spaced(data: Any, spacing: Any) -> Any:
-    """Return an array with coordinates at equal distances, m."""
-    dims = [dim for dim in ("x", "y") if dim in data.dims]
-    if not dims or any(dim in data.coords for dim in dims):
-        raise InputError("spacing: the source has its own coordinates. Leave spacing out")
-    steps = zip(dims, np.broadcast_to(spacing, len(dims)), strict=True)
-    return data.assign_coords({dim: (dim, h * np.arange(data.sizes[dim])) for dim, h in steps})
 
 
 def _is_map(data: Any) -> bool:
@@ -484,7 +464,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
             f"which dimensions run along the interface is not clear from ({', '.join(names)}). Call"
             f" them 'x', 'y' (across slip) and 'sample'{OF_A_PLANE * (len(dims) == 1)}"
         )
-    array = array.drop_vars([name for name in array.coords if name not in (MEASURED, *dims)])
+    array = array.drop_vars([name for name in array.coords if name not in dims])
     return array.transpose(*samples, *along)
 
 

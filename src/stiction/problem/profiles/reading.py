@@ -4,12 +4,11 @@ A profile enters in three ways: through `read_profile`, as an argument
 of a call or an object (`at_nodes`), or by its name in a study file
 (`profile_in_file`). The profiles of samples enter together
 (`placed_profiles`). `read_profile`, which study files also use, takes
-these steps. `at_nodes` takes steps 1 and 4:
+these steps. `at_nodes` takes steps 1 and 3:
 
 1. Find the quantity in the source, in SI (`labels.py`).
-2. Turn heights or grey values into strengths, if the caller gives a map.
-3. Move the coordinates by an offset, or to the centre of the interface.
-4. Put the values on the nodes (`placing.py`), or sort them if there is
+2. Turn heights into strengths, if the caller gives a map.
+3. Put the values on the nodes (`placing.py`), or sort them if there is
    no interface.
 """
 
@@ -17,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -27,10 +25,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.base.model import (
     FilePath,
-    Flag,
     Number,
-    Positive,
-    Real,
     as_numbers,
     check,
     checked,
@@ -48,11 +43,9 @@ from stiction.problem.profiles.labels import (
     simplified,
 )
 from stiction.problem.profiles.placing import (
-    MEASURED,
     OF_A_PLANE,
-    Gaps,
-    close_gaps,
     place,
+    refuse_missing,
     turned,
 )
 from stiction.problem.profiles.tables import Options
@@ -65,8 +58,6 @@ FRICTION = (1e-3, 10.0), (1e-4, 100.0)
 LARGEST = 1e100
 """Of a profile, in SI units; sums and products of larger numbers overflow."""
 
-Spacing = Positive | tuple[Positive, Positive]
-Offset = Real | tuple[Real, Real]
 Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
 ]
@@ -86,13 +77,7 @@ def read_profile(
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,
     sheet: Number | str = 0,
-    record: Number | None = None,
-    spacing: Spacing | None = None,
-    rows: Literal["x", "y"] | None = None,
     interface: Interface | None = None,
-    offset: Offset | Literal["centre"] = 0.0,
-    interpolate: Flag = False,
-    gaps: Gaps = "refuse",
 ) -> xr.DataArray:
     """Read a profile along the interface from a file or a labelled array, in SI units.
 
@@ -106,8 +91,8 @@ def read_profile(
         names such as ``x (mm), strength (MPa)``. A ``.nc`` file
         has variables with `units`, and x as a coordinate. A map
         over 'x' and 'y' is a table with both as columns, a matrix
-        without headings, a grey image (``.png``, ``.tif``), or a
-        binary file or object that SurfaceTopography reads.
+        below comments that state its width and height (Gwyddion), or
+        a binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
         Name, heading or number (from 0) of the column, coordinate or
         variable. By default, columns are recognised by a name such as
@@ -123,9 +108,8 @@ def read_profile(
         'weakening_rate' (Pa/m), 'load_profile' or
         'friction_coefficient' (1).
     strength : callable, optional
-        Map from heights (m, an array), or from the grey values of an
-        image, to strengths (Pa): ``strength=lambda h: 1e6 + 5e11 * h``.
-        Heights are then read.
+        Map from heights (m, an array) to strengths (Pa):
+        ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
     missing : float, str or sequence of them, optional
         Numbers and words that stand for a missing value, such as
         ``-9999`` or ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``,
@@ -137,38 +121,18 @@ def read_profile(
         Number of lines, or rows of a sheet, to pass over before the headings.
     sheet : int or str
         Number (from 0) or name of the sheet of a workbook.
-    record : int, optional
-        Number (from 0) of the record, if empty lines or repeated
-        headings separate several.
-    spacing : float or (float, float), optional
-        Distance between the points of an array, a matrix or an image
-        along x, and along y, m.
-    rows : {"x", "y"}, optional
-        Direction in which the lines of a matrix in a text file follow
-        each other. The default is y if comments state the width and
-        height of the map, as in files of Gwyddion.
     interface : Interface, optional
         Map the profile to the nodes x_i = i L/n, modulo L. Points may
-        have any order.
-    offset : float, (float, float) or "centre"
-        Offset that is added to the coordinates, m. With "centre", the
-        centre of the record moves to the centre of the interface.
-    interpolate : bool
-        Interpolate linearly if the points of a line do not coincide
-        with the nodes.
-    gaps : {"refuse", "fill", "skip"}
-        "refuse" raises an error for missing values (NaN, empty cells,
-        missing points). "fill" interpolates linearly (on planes within
-        triangles). "skip" leaves NaN, for `stiction.fit_field` or for
-        `RandomField.given`, which draws equally likely values. Without
-        an interface, missing values always stay.
+        have any order, and no point may be missing. Without an
+        interface, missing values (NaN, empty cells) stay, for
+        `stiction.fit_field` or for `RandomField.given`, which draws
+        equally likely values.
 
     Returns
     -------
     xarray.DataArray
         Profile over 'x' (m), or over 'x' and 'y' on a plane, with
-        `units`. If there are gaps, the coordinate 'measured' is False
-        in a gap. Results have the same coordinate.
+        `units`.
 
     Raises
     ------
@@ -180,7 +144,7 @@ def read_profile(
     Warns
     -----
     AccuracyWarning
-        If values are interpolated or filled in, or x lies between the nodes.
+        If x lies between the nodes.
     UnitWarning
         If heights without a unit range over more than 1 mm.
 
@@ -202,44 +166,31 @@ def read_profile(
 
     if quantity not in QUANTITIES:
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
-    if interface is None and (interpolate or gaps == "fill"):
-        raise InputError("interface: needed to interpolate, or to fill gaps")
-    if interpolate and interface is not None and interface.is_plane:
-        raise InputError("interpolate: applies to profiles of a line only. Leave it out")
     if strength is not None and quantity != "strength":
         raise InputError("strength: maps heights to strengths. Leave quantity='strength'")
-    if offset == "centre" and interface is None:
-        raise InputError("offset: 'centre' needs an interface")
-    options = Options(skip, sheet, missing, decimal, record)
+    options = Options(skip, sheet, missing, decimal)
     dims = None if interface is None else interface.dims
     with prefixed(str(source) if isinstance(source, str | Path) else "source"):
         # 1. Find the quantity.
         array = labelled(
             source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
-            x_unit=x_unit, options=options, rows=rows, spacing=spacing,
+            x_unit=x_unit, options=options,
         )  # fmt: skip
-        # 2. Map heights or grey values.
+        # 2. Map heights.
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
-        # 3. Move the coordinates.
-        if offset != 0.0:
-            array = _moved(array, offset, interface)
         single = [dim for dim in {*array.dims} - {"x", "y", "row"} if array.sizes[dim] == 1]
         array = array.squeeze(single)
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold a single profile, got shape {array.shape}")
-        # 4. Place or sort the values.
+        # 3. Place or sort the values.
         if interface is None:
             array = _in_order(array)
         else:
-            values, measured = place(array, interface, interpolate, gaps)
+            values = refuse_missing(place(array, interface), interface)
             array = xr.DataArray(values, interface.coordinates, interface.dims)
-            if not np.all(measured):
-                array[MEASURED] = (interface.dims, measured)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
-    if MEASURED in array.coords:
-        array[MEASURED].attrs["long_name"] = "measured, not filled in"
     array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
     return array.rename(quantity)
 
@@ -255,25 +206,8 @@ def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
     return values
 
 
-def _moved(array: Any, offset: Any, interface: Interface | None) -> Any:
-    """Return a profile whose coordinates are moved by an offset, m, or to the centre (step 3)."""
-    dims = [dim for dim in ("x", "y") if dim in array.coords]
-    if not dims:
-        raise InputError(
-            "offset: the source has no coordinates, so its points are the nodes. Leave offset out"
-        )
-    if offset == "centre":
-        assert interface is not None
-        axes = zip(interface.shape, interface.spacings, strict=True)
-        middle = [(interface.first + 0.5 * (n - 1)) * h for n, h in axes]
-        centres = [0.5 * float(array[dim].min() + array[dim].max()) for dim in dims]
-        offset = np.subtract(middle, centres)
-    offsets = zip(dims, np.broadcast_to(offset, len(dims)), strict=True)
-    return array.assign_coords({d: (array[d].dims, array[d].values + a) for d, a in offsets})
-
-
 def _in_order(array: Any) -> Any:
-    """Return a profile with rising coordinates, and points on a plane as a map (step 4)."""
+    """Return a profile with rising coordinates, and points on a plane as a map (step 3)."""
     if "row" in array.dims:
         array = array.set_index(row=["x", "y"])
     for index in array.indexes.values():
@@ -281,7 +215,7 @@ def _in_order(array: Any) -> Any:
             twin = index[index.duplicated()]
             raise InputError(
                 f"x repeats: there are two values at {twin[0]} m ({twin.size} such places). Keep"
-                f" either. If empty lines separate records, pass record=0 for the first{OF_A_PLANE}"
+                f" either, or pass skip= with the lines above the last record{OF_A_PLANE}"
             )
     array = array.unstack()
     return array.sortby([dim for dim in array.dims if dim in array.coords])
@@ -290,14 +224,11 @@ def _in_order(array: Any) -> Any:
 # -- profiles as arguments and in study files ----------------------------------------------------
 
 
-def at_nodes(
-    name: str, value: Any, interface: Interface, gaps: Gaps = "refuse"
-) -> tuple[Any, Any]:
-    """Return the values of a quantity at the nodes, and a mask of the measured nodes.
+def at_nodes(name: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
+    """Return the values of a quantity at the nodes. With `missing`, some may be NaN.
 
     `name` may be a dotted key. Numbers, and arrays with a different
-    shape, are returned unchanged, because the caller checks them. The
-    mask is True if all values are there.
+    shape, are returned unchanged, because the caller checks them.
     """
     quantity = quantity_of(name)
     with prefixed(name):
@@ -311,13 +242,14 @@ def at_nodes(
                     raise InputError(
                         "has no dimension along the interface. Name this dimension 'x'"
                     )
-                return array.values[:, np.newaxis], True
-            return place(array, interface, gaps=gaps)
+                return array.values[:, np.newaxis]
+            array = place(array, interface)
+            return array if missing else refuse_missing(array, interface)
         with suppress(TypeError):  # values that are no numbers are refused with other mistakes
             array = real_array(value)
             if array.shape[-len(interface.shape) :] == interface.shape:
-                return close_gaps(array, True, interface, gaps)
-    return value, True
+                return array if missing else refuse_missing(array, interface)
+    return value
 
 
 class ProfileFile(NamedTuple):
@@ -380,20 +312,18 @@ def named_profiles(given: Any) -> dict[str, Any]:
 
 
 def placed_profiles(
-    given: Mapping[str, Any], interface: Interface, gaps: Gaps, pressing: Any
-) -> tuple[dict[str, Array], Any, list[str]]:
-    """Return users' profiles by name as (samples, *shape), a mask, and the mistakes in them.
+    given: Mapping[str, Any], interface: Interface, pressing: Any
+) -> tuple[dict[str, Array], list[str]]:
+    """Return users' profiles by name as (samples, *shape), and the mistakes in them.
 
-    The mask marks the nodes at which all profiles were
-    measured. A profile with a mistake is missing in the
-    result. A pressure without values along the interface
-    is a mean, which is multiplied by `pressing`.
+    A profile with a mistake is missing in the result. A pressure
+    without values along the interface is a mean, which is multiplied by
+    `pressing`.
     """
     first = "strength" if "strength" in given else "friction_coefficient"
     if first not in given:
         raise InputError("strength: missing among the profiles")
     rows: dict[str, Array] = {}
-    masks = [np.ones((1, *interface.shape), dtype=bool)]
     scales = [name for name in SCALES if name in given]
     problems = [f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}"] * (
         len(scales) > 1
@@ -403,18 +333,16 @@ def placed_profiles(
         try:
             of_friction = name == "residual_strength" and is_coefficient(given[name])
             quantity = "friction_coefficient" if of_friction else name
-            value, known = at_nodes(quantity, given[name], interface, gaps)
+            value = at_nodes(quantity, given[name], interface)
             with prefixed(name):
                 rows[name] = rows_of(quantity, value, interface, samples)
             if name == "normal_pressure" and np.shape(value) in ((), (samples, 1)):
                 rows[name] = rows[name] * pressing
-            if not np.all(known):
-                masks.append(known.reshape(-1, *interface.shape))
         except InputError as error:
             problems += error.problems
         if name == first:
             samples = len(rows[first]) if first in rows else 1
-    return rows, reduce(np.logical_and, masks), problems
+    return rows, problems
 
 
 def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:

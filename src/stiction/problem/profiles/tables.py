@@ -62,7 +62,6 @@ class Options(NamedTuple):
     sheet: int | str = 0
     missing: Any = None  # a number, a word, or a sequence of them
     decimal: str | None = None
-    record: int | None = None
 
     @property
     def stated(self) -> tuple[float | str, ...]:
@@ -106,11 +105,6 @@ def dataset_of(grid: Grid, table: Table, options: Options) -> xr.Dataset:
     """Return the columns of a table as variables along 'row'. See `files.read_table`."""
     columns, lines = table.columns, table.lines
     blocks = np.cumsum(np.diff(lines, prepend=lines[0]) > 1)
-    if options.record is not None:
-        if not 0 <= options.record <= blocks[-1]:
-            raise InputError(f"record: must be 0 to {blocks[-1]}, got {options.record}")
-        chosen = blocks == options.record
-        columns, lines, blocks = columns[:, chosen], lines[chosen], blocks[chosen]
     # 4. Split headings into names and units.
     headed = any({*row.cells} - {"", "-"} for row in table.header)
     headings = _headings(table.header, len(columns))
