@@ -26,7 +26,11 @@ Steps:
    other field. Exchange them for parameters whose estimates fall with
    the correlation length.
 6. Limit the intervals: bounds of the marginal lie outside the values,
-   and other parameters lie within their ranges.
+   and other parameters lie within their ranges. If estimates of
+   repetitions reach a limit of a shape, their errors beyond the limit
+   are unknown, and steps 4 and 5 give too short an interval. Also
+   include the quantiles of the repetitions themselves (Efron's
+   percentiles; Davison and Hinkley, section 5.3).
 7. A likely field is the estimate minus the error of one repetition
    times the width.
 
@@ -46,7 +50,7 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import in_threads
 from stiction.inference.estimate import NAMES, BestFit, estimate
-from stiction.inference.marginal_fit import Family, beta_of
+from stiction.inference.marginal_fit import LEAST_SHAPE, WIDEST, Family, beta_of
 from stiction.inference.whittle import RANGES, offset
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField
@@ -59,6 +63,9 @@ SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 MIN_WIDTH = 1e-3
 """Least width of an interval, over its upper end. A narrower one is replaced by the whole range."""
+
+HELD_RTOL = 1e-6
+"""Distance of a shape from its limit, over the limit, within which it is held there."""
 
 
 class Refits(NamedTuple):
@@ -199,7 +206,7 @@ def intervals(
     """Return the interval of each parameter (steps 2 to 6). `values` are measured, with noise."""
     around, *moved = repeated
     fitted, estimated = around.truth, around.truth.parameters
-    tail = 0.5 * (1.0 - confidence)
+    tail, shapes = 0.5 * (1.0 - confidence), fitted.setting.marginal.limited_shapes
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
@@ -218,10 +225,26 @@ def intervals(
         if name == "noise" and high <= 0.0:
             high -= fitted.noise[0]
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
+        # 6.
+        if name in shapes and any(held(one, shapes) for one in (fitted, *around.fits)):
+            pairs = (shorter, tail), (longer, 1.0 - tail)
+            least, most = (
+                float(np.quantile([one.parameters[name] for one in repetitions.fits], share))
+                for repetitions, share in pairs
+            )
+            first, last = min(first, least), max(last, most)
         result[name] = first, last
-    # 6.
     noise = result["noise"][1] if "noise" in result else fitted.model.noise
     limits = limits_of(fitted, values, noise)
+    # The removed trend is added to a field, which may take a shape below its limit.
+    limits |= {name: (min(LEAST_SHAPE, estimated[name]), math.inf) for name in shapes}
+    # Free bounds are searched up to this distance from the values.
+    farthest = values.min() - WIDEST * np.ptp(values), values.max() + WIDEST * np.ptp(values)
+    limits["marginal.low"] = (
+        max(limits["marginal.low"][0], farthest[0]),
+        limits["marginal.low"][1],
+    )
+    limits["marginal.high"] = limits["marginal.high"][0], farthest[1]
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
@@ -232,6 +255,11 @@ def intervals(
             low, high = (end if math.isfinite(end) else estimated[name] for end in ends)
         result[name] = low, high
     return result
+
+
+def held(fit: BestFit, shapes: Sequence[str]) -> bool:
+    """Return whether a shape of a fit lies at its limit."""
+    return any(fit.parameters[name] <= LEAST_SHAPE * (1.0 + HELD_RTOL) for name in shapes)
 
 
 def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[float, float]]:

@@ -133,8 +133,10 @@ class FieldFit(Result):
     interval : dict of str to (float, float)
         Bootstrap interval for each parameter. The interval for the
         noise may begin at zero. Intervals for bounds of the marginal
-        end outside the values. Intervals for exponent (0.65 to 16) and
-        anisotropy (0.05 to 20) end at the searched ranges. With
+        end outside the values. An interval that ends at an end of the
+        searched range has no known end: 10 ranges of the values for
+        bounds of the marginal, a shape of 1 of 'beta' at a free bound,
+        0.65 to 16 for the exponent, 0.05 to 20 for the anisotropy. With
         `between`, the intervals for ``mean`` and ``between`` come from
         the posterior given the levels of the records.
     confidence : float
@@ -509,9 +511,11 @@ def fit_field(
                 f"{error}: the family is left out, because such records are far from it"
             )
     # 4. and 5.
+    field = estimates[0].field(quantity)
+    object.__setattr__(field, "specimens_of_fit", len(levels) if between else 0)
     fit = FieldFit(
         **_judged(repeated, rows, levels, confidence, bootstrap, between, factor_prior),
-        field=estimates[0].field(quantity),
+        field=field,
         confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
         families=families,

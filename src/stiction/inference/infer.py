@@ -72,7 +72,7 @@ from stiction.methods.protocol import MethodObject
 from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.problem.unit_doubts import doubt_strengths
-from stiction.random.equally_likely import AnyRandom, Source, as_random
+from stiction.random.equally_likely import AnyRandom, Source, as_random, specimens_of_fit
 from stiction.random.stresses import mean_in_stress
 
 LIKELY_FIELDS = 60
@@ -417,9 +417,9 @@ def _of_specimens(
     """Return the posterior of mean and scatter between specimens, from profiles and peaks."""
     tables = tables_of(problem, profiles, simulation, measured, error)
     known = profiles.levels.size > 0
-    if known:
-        mean = float(profiles.levels.mean() / profiles.reference)
-        measured.refuse_far([k.area * mean * k.ratios[:, 0].ravel() for k in tables.onsets])
+    # Without profiles the fields have the mean that the user stated.
+    mean = float(profiles.levels.mean() / profiles.reference) if known else 1.0
+    measured.refuse_far([k.area * mean * k.ratios[:, 0].ravel() for k in tables.onsets])
     by_profiles, grid = grid_of_profiles(profiles, tables)
     tests, onsets = sum(map(np.size, measured.values)), tables.onsets[0].ratios[:, 0].size
     common: dict[str, Any] = {
@@ -468,6 +468,11 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
             " the fit itself, or, for the fields within alone, [one.strength for one in random]"
         )
     refuse_conditioned(likely.members)
+    if specimens_of_fit(likely) is not None:
+        warn_accuracy(
+            "random: is the field of a fit, whose profiles then have no effect on the mean and the"
+            " scatter. Pass the fit itself to combine profiles and peaks"
+        )
     return Profiles.of_interfaces(likely.members, **more)
 
 

@@ -51,6 +51,8 @@ LEAST = 1e-12
 MARGINAL_STEP = 1e-5
 WIDEST = 10.0
 """Largest distance of free bounds from the values, in ranges of the values."""
+LEAST_SHAPE = 1.0
+"""Least shape of 'beta' at a free bound."""
 NEGLIGIBLE_NOISE = 1e-4
 """Share of noise in the variance that does not change a marginal."""
 BOUND_MARGIN = 1e-2
@@ -210,6 +212,13 @@ class Family:
         )
 
     @property
+    def limited_shapes(self) -> tuple[str, ...]:
+        """Keys of the shapes that are at least `LEAST_SHAPE`, because their bounds are free."""
+        shapes = {"low": "marginal.alpha", "high": "marginal.beta"}
+        free = shapes.keys() - self.fixed.keys() if self.name == "beta" else ()
+        return tuple(shapes[bound] for bound in sorted(free, reverse=True))
+
+    @property
     def bounds(self) -> tuple[float, float]:
         """Support of the family with its fixed parameters, before any fit."""
         return self.fixed.get("low", -math.inf), self.fixed.get("high", math.inf)
@@ -304,7 +313,8 @@ def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any)
         start = beta_of(float(quiet.mean()), float(quiet.std()), **ends)
     # A free bound needs a shape of at least 1, because the likelihood
     # would grow without limit as the bound approaches a value.
-    limits = [(math.log(0.05) if end in fixed else 0.0, 12.0) for end in ("low", "high")]
+    least_free = math.log(LEAST_SHAPE)
+    limits = [(math.log(0.05) if end in fixed else least_free, 12.0) for end in ("low", "high")]
     first = [start.alpha, start.beta]
     for name, side in sides.items():
         first.append(max(side * (getattr(start, name) - mean) / unit, 1e-3))

@@ -259,7 +259,13 @@ def form_of(field: RandomField) -> Any:
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     """Return a mixture that holds `count` interfaces from a source."""
-    return EquallyLikely(tuple(source.interfaces(count, seed)), source=source)
+    return EquallyLikely(tuple(_known(list(source.interfaces(count, seed)))), source=source)
+
+
+def specimens_of_fit(random: Any) -> int | None:
+    """Return `specimens` of the fit if the strength is its `field` alone, otherwise `None`."""
+    alone = isinstance(random, RandomInterface) and not random.between
+    return getattr(random.strength, "specimens_of_fit", None) if alone else None
 
 
 def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:

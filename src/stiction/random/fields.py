@@ -23,7 +23,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property, reduce
 from itertools import chain
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +114,8 @@ class RandomField:
     anisotropy: Positive | None = None
     of: Literal["friction_coefficient"] | None = None
     conditions: Annotated[Conditions | None, Field(alias="given")] = None
+    specimens_of_fit: ClassVar[int | None] = None
+    """Set for `FieldFit.field`: `specimens` of its fit, so that a call can ask for the fit."""
 
     @property
     def mean(self) -> float:

@@ -36,7 +36,7 @@ from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.problem.problem import Problem
-from stiction.random.equally_likely import MAX_MEMBERS
+from stiction.random.equally_likely import MAX_MEMBERS, specimens_of_fit
 from stiction.reliability.counting import CONFIDENCE
 from stiction.reliability.tail import TailPoint, guide_of
 
@@ -493,6 +493,7 @@ def answered(
 ) -> Answer:
     """Return an answer, and its warnings, from as many members as the target needs."""
     with Meter(name, show=progress) as meter, merge_warnings() as warned:
+        warn_of_field(experiment)
         experiment, answer = with_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
@@ -503,6 +504,15 @@ def answered(
         doubts=(*getattr(source, "doubts", ()), *getattr(source, "notes", ())),
         specimens=getattr(source, "specimens", 0),
     )
+
+
+def warn_of_field(experiment: Experiment) -> None:
+    """Warn about the field of a fit in place of a fit with scatter between specimens."""
+    if specimens_of_fit(experiment.random):
+        warn_accuracy(
+            "random: is the field of a fit, without the scatter between specimens, so that failures"
+            " are too rare. Pass the fit itself"
+        )
 
 
 def with_enough_members(

@@ -42,6 +42,7 @@ from stiction.reliability.answer import (
     few_members,
     prepare,
     sampling_target,
+    warn_of_field,
     with_enough_members,
 )
 from stiction.reliability.tail import Goal, Tail, TailPoint, lognormal_interval, sample_curve
@@ -152,6 +153,7 @@ def failure_curve(
         )
 
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
+        warn_of_field(experiment)
         # 1.
         _, end = with_enough_members(experiment, target_cv, meter, warned, solve)
         # 2.

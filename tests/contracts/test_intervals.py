@@ -1,0 +1,181 @@
+"""Laws of intervals and budgets: they hold the estimate, widen with an error, and end in time."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from joint import FIELD, GIVEN, PROBLEM, RANDOM
+from refusals import refuses, warning_texts
+from scipy.stats import binom
+from setups import EXACT, LOCAL, make_problem
+
+import stiction as st
+
+QUIET = {"progress": False}
+RECORDS = st.Interface(0.12, 512)
+ROUGH = st.PowerLawSpectrum(2e-3, exponent=1.5, power_kept=0.99)
+FIXED = {"type": "power_law", "exponent": 1.5, "power_kept": 0.99}
+TRUTHS = {
+    "beta": st.Beta(alpha=1.5, beta=3.0, low=0.6e6, high=1.66e6),
+    "lognormal": st.Lognormal(mean=1e6, cv=0.2),
+    "gamma": st.Gamma(mean=1e6, cv=0.2),
+    "weibull": st.Weibull(mean=1e6, cv=0.2),
+    "normal": st.TruncatedNormal(mean=1e6, cv=0.2, low=5e5, high=1.5e6),
+}
+LIST = [
+    dataclasses.replace(
+        RANDOM, strength=dataclasses.replace(FIELD, marginal=st.Gamma(mean=mean, cv=0.15))
+    )
+    for mean in (0.19, 0.2, 0.21)
+]
+
+
+def fitted(marginal, noise, seed=0, of=None, **more):
+    """A fit to two records with noise of 8 kPa, and the values."""
+    truth = st.RandomField(TRUTHS[marginal] if of is None else of, ROUGH)
+    values = truth.sample(RECORDS, samples=2, seed=seed)
+    values = values + 8e3 * np.random.default_rng(seed).standard_normal(values.shape)
+    given = {"marginal": marginal, "spectrum": FIXED, "bootstrap": 20} | QUIET | more
+    return st.fit_field(values, RECORDS, noise=noise, **given), values
+
+
+@pytest.mark.parametrize("noise", [True, False, 8e3])
+@pytest.mark.parametrize("marginal", TRUTHS)
+def test_intervals_of_a_fit_hold_its_estimates(marginal, noise):
+    """Whether the noise of the records is fitted, left out or known."""
+    fit, values = fitted(marginal, noise)
+    for name, estimate in fit.parameters.items():
+        low, high = fit.interval[name]
+        assert low <= estimate <= high, name
+        if name in ("marginal.low", "marginal.high"):  # within ten ranges of the values
+            assert abs(np.array([low, high]) - values.mean()).max() < 11.0 * np.ptp(values)
+
+
+def test_ends_of_an_interval_are_admissible_with_ends_of_another():
+    """With more noise, a bound may lie further inside the values: its interval says so."""
+    inside = []
+    for seed in range(2):
+        fit, values = fitted("beta", True, seed)
+        family = fit._estimate.setting.marginal
+        limits = [
+            family.quiet(values, noise).min()
+            for noise in (fit.parameters["noise"], fit.interval["noise"][1])
+        ]
+        end = fit.interval["marginal.low"][1]
+        assert end <= limits[1] * (1.0 + 1e-12)
+        inside.append(end > limits[0])
+    assert any(inside)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "noise", "count"),
+    [
+        (1.1, False, 4),
+        pytest.param(1.1, False, 40, marks=pytest.mark.slow),
+        pytest.param(1.5, 8e3, 40, marks=pytest.mark.slow),
+    ],
+)
+def test_shapes_near_their_limit_are_covered(alpha, noise, count):
+    """A shape at a free bound is at least 1; the interval respects this, and is no shorter."""
+    hits = {"marginal.alpha": 0, "marginal.beta": 0}
+    truth = {"marginal.alpha": alpha, "marginal.beta": 3.0}
+    of = dataclasses.replace(TRUTHS["beta"], alpha=alpha)
+    for seed in range(count):
+        fit, _ = fitted("beta", noise, 100 + seed, of, bootstrap=40 if count > 4 else 20)
+        for name, right in truth.items():
+            low, high = fit.interval[name]
+            assert low >= min(1.0, fit.parameters[name]), name
+            hits[name] += low <= right <= high
+    # 40 repetitions determine the tails of errors to two or three percent.
+    assert min(hits.values()) >= binom.ppf(1e-3, count, 0.85)
+
+
+def answers():
+    """Calls whose answer rests on a list of equally likely interfaces."""
+    given = GIVEN | {"seed": 4}
+    demand = st.failure_probability(PROBLEM, LIST, 0.7e6, **given)
+    yield demand.interval, demand.probability, demand.cv, demand.members_cv
+    curve = st.failure_curve(PROBLEM, LIST, smallest=0.02, **given)
+    names = ("probability_low", "probability_high", "probability", "cv", "members_cv")
+    for low, high, *rest in np.transpose([curve[name].values for name in names]):
+        yield (low, high), *rest
+
+
+def test_the_list_widens_an_interval_beyond_sampling():
+    for (low, high), estimate, cv, by_list in answers():
+        assert low <= estimate <= high
+        assert by_list < cv
+        # A log-normal interval by sampling alone, with normal quantiles, is shorter.
+        sampling = math.sqrt(math.log1p(cv**2 - by_list**2))
+        assert math.log(high / low) > 2.0 * 1.95 * sampling or high == 1.0
+
+
+@pytest.mark.parametrize("more", [{}, {"problem.friction.weakening_rate": (2e11, 4e11)}])
+def test_intervals_of_a_posterior_hold_its_mean(more):
+    problem = make_problem(64, 0.05)
+    field = st.RandomField(TRUTHS["beta"], st.PowerLawSpectrum(4e-3))
+    peaks, prior = [5.9e5, 6.2e5, 6.6e5, 7.1e5], {"marginal.low": (5.6e5, 7.2e5)}
+    posterior = st.infer(
+        problem, field, peaks, prior=prior | more, method=LOCAL, samples=300, **QUIET
+    )
+    for name in posterior.names:
+        low, high = posterior.interval(name)
+        assert low <= posterior.mean(name) <= high, name
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5])
+@pytest.mark.parametrize("algorithm", ["auto", "plain", "subset", "two_level"])
+@pytest.mark.parametrize("most", [300, 1000])
+def test_no_answer_takes_more_evaluations_than_allowed(algorithm, most, share):
+    """With rough fields, which the guide ranks poorly, and with smooth ones."""
+    problem = make_problem(96, 0.0144)
+    marginal = st.Lognormal(mean=1e6, cv=0.4)
+    field = st.RandomField(marginal, st.PowerLawSpectrum(share * 3.4e-3), True)
+    answer = st.failure_probability(
+        problem, field, 4.5e5, method=EXACT, algorithm=algorithm, max_evaluations=most,
+        seed=1, workers=1, target_cv=0.5, **QUIET,
+    )  # fmt: skip
+    assert 0 < answer.evaluations <= most
+
+
+REFUSED = {  # values in another unit, at every call that takes peaks
+    "infer": lambda peaks: st.infer(PROBLEM, FIELD, peaks, method=LOCAL, samples=100, **QUIET),
+    "infer with a prior": lambda peaks: st.infer(
+        PROBLEM, FIELD, peaks, prior={"correlation_length": (2e-3, 6e-3)}, method=LOCAL,
+        samples=100, **QUIET,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("factor", [1e-6, 1e-5, 1e3])
+def test_peaks_in_another_unit_are_refused(name, factor):
+    """Such as MPa, kN or mPa taken for Pa."""
+    peaks = factor * np.array([8.31e5, 7.64e5, 8.02e5, 7.9e5])
+    refuses("peaks ... unit", lambda: REFUSED[name](peaks))
+
+
+def test_the_field_of_a_fit_is_not_taken_for_the_fit():
+    """Where the fit says more than its field, a call with the field says so."""
+    records = [
+        FIELD.sample(PROBLEM.interface, seed=seed)[0] * factor
+        for seed, factor in enumerate((1.0, 0.9, 1.1))
+    ]
+    given = {"marginal": "gamma", "noise": False, "bootstrap": 20, "progress": False}
+    given["quantity"] = "friction_coefficient"
+    fit = st.fit_field(records, PROBLEM.interface, between=True, **given)
+    stress = 0.55e6
+    calls = (
+        lambda: st.infer(
+            PROBLEM, fit.field, [0.9e6, 1e6, 1.1e6], method=LOCAL, samples=100, **QUIET
+        ),
+        lambda: st.failure_probability(PROBLEM, fit.field, stress, **GIVEN),
+        lambda: st.design_stress(PROBLEM, fit.field, probability=0.1, **GIVEN),
+        lambda: st.failure_curve(PROBLEM, fit.field, smallest=0.1, **GIVEN),
+    )
+    for call in calls:
+        assert any("is the field of a fit" in text for text in warning_texts(call))
+    mended = st.RandomInterface(strength=fit.field, between=RANDOM.between)
+    texts = warning_texts(lambda: st.failure_probability(PROBLEM, mended, stress, **GIVEN))
+    assert not any("is the field of a fit" in text for text in texts)
