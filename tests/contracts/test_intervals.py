@@ -179,3 +179,19 @@ def test_the_field_of_a_fit_is_not_taken_for_the_fit():
     mended = st.RandomInterface(strength=fit.field, between=RANDOM.between)
     texts = warning_texts(lambda: st.failure_probability(PROBLEM, mended, stress, **GIVEN))
     assert not any("is the field of a fit" in text for text in texts)
+
+
+class OfFields:
+    """A source whose members are fields, not interfaces."""
+
+    def interfaces(self, count, seed=0):
+        return [FIELD] * count
+
+
+@pytest.mark.parametrize("ask", [st.failure_probability, st.design_stress])
+def test_a_source_of_fields_is_taken_as_a_list_of_fields(ask):
+    """By every call that takes a source; at most 300 samples, all of the same field."""
+    number = {"stress": 0.9e6} if ask is st.failure_probability else {"probability": 0.4}
+    answer = ask(PROBLEM, OfFields(), max_evaluations=300, **number, **GIVEN)
+    assert answer.interval[0] < answer.interval[1]
+    assert answer.members.size == 1000
