@@ -347,18 +347,21 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
 
 
 DRIVING = {
-    "uniform": st.Load(),
-    "gradient": st.Load(profile=st.GradientLoad(amplitude=0.9, centre=0.5)),
-    "edge": st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.1 * setting.L, edge=0.5)),
+    "uniform": np.ones_like,
+    "gradient": lambda away: 1.0 + 0.9 * (1.0 - 4.0 * away),
+    "edge": lambda away: 1.0 + 4.0 * np.exp(-away / 0.1),
 }
-"""Loads of the study of non-uniform driving; tau_0 is the mean of each."""
+"""Load profiles over the distance from the middle, as a share of the length."""
 
 
 def driven(case: str):
     """Return the problem under one of these loads, with a residual strength of 0.6 tau_p,min."""
     problem = setting.grid(PROBLEM, nodes=0.5)
     friction = dataclasses.replace(problem.friction, residual_strength=0.6 * setting.LOW)
-    return dataclasses.replace(problem, friction=friction, load=DRIVING[case])
+    x = problem.interface.x / problem.interface.length
+    profile = DRIVING[case](np.abs(x - 0.5))
+    load = st.Load(profile=profile / profile.mean())  # tau_0 is the mean
+    return dataclasses.replace(problem, friction=friction, load=load)
 
 
 def driving(run: Runner) -> xr.Dataset:

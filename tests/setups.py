@@ -38,6 +38,33 @@ def make_problem(
     return st.Problem(solid, interface, law, load or st.Load(), mode)
 
 
+def load_of(interface: st.Interface, place: float, shape: Any, **more: Any) -> st.Load:
+    """A profile of mean 1, a function of the distance (m) from a share of the length along x."""
+    length = interface.lengths[0]
+    x = np.arange(interface.shape[0]) * length / interface.shape[0]
+    away = np.abs(np.mod(x - place * length + 0.5 * length, length) - 0.5 * length)
+    profile = shape(away.reshape(-1, *(1 for _ in interface.shape[1:])))
+    profile = np.broadcast_to(profile / profile.mean(), interface.shape)
+    return st.Load(profile=profile, **more)
+
+
+def edge_load(
+    interface: st.Interface, excess: float, decay: float, place: float = 0.0
+) -> st.Load:
+    """Higher near an edge, by a share of the load far away."""
+    return load_of(interface, place, lambda away: 1.0 + excess * np.exp(-away / decay))
+
+
+def gradient_load(
+    interface: st.Interface, amplitude: float, place: float = 0.0, **more: Any
+) -> st.Load:
+    """From 1 + amplitude down to 1 - amplitude, half a period away."""
+    length = interface.lengths[0]
+    return load_of(
+        interface, place, lambda away: 1.0 + amplitude * (1.0 - 4.0 * away / length), **more
+    )
+
+
 def without(problem: st.Problem, *keys: str) -> st.Problem:
     """The problem without values, such as 'load.initial_stress', that profiles give instead."""
     for key in keys:

@@ -3,7 +3,6 @@
 ROWS = """
     Problem Solid Interface Load LinearWeakening
     LinearWeakening ExponentialWeakening PiecewiseWeakening
-    Load EdgeLoad GradientLoad
     RandomField RandomInterface read_profile fit_field plot.field
     Beta Lognormal Weibull Gamma TruncatedNormal
     PowerLawSpectrum SquaredExponentialSpectrum ExponentialSpectrum CustomSpectrum

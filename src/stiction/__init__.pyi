@@ -29,8 +29,6 @@ from stiction.problem.friction import LinearWeakening as LinearWeakening
 from stiction.problem.friction import PiecewiseWeakening as PiecewiseWeakening
 from stiction.problem.interface import Ellipse as Ellipse
 from stiction.problem.interface import Interface as Interface
-from stiction.problem.load import EdgeLoad as EdgeLoad
-from stiction.problem.load import GradientLoad as GradientLoad
 from stiction.problem.load import Load as Load
 from stiction.problem.problem import Problem as Problem
 from stiction.problem.profiles.reading import read_profile as read_profile

@@ -1,4 +1,4 @@
-"""Names for your own packages that add a method, law, load, marginal or spectrum.
+"""Names for your own packages that add a method, law, marginal or spectrum.
 
 `docs/plug-ins.md` shows an example of each. Import these names from
 this module, because the modules that define them may move.
@@ -9,7 +9,6 @@ from stiction.base.model import Positive, Real, model
 from stiction.base.variables import Variable
 from stiction.methods.protocol import Method, Solver
 from stiction.problem.friction import FrictionLaw
-from stiction.problem.load import LoadShape, distance
 from stiction.problem.results import onset_variables
 from stiction.problem.sample import Sample
 from stiction.random.marginals import Marginal
@@ -17,7 +16,6 @@ from stiction.random.spectra import ScaledSpectrum, SpectralDensity
 
 __all__ = [
     "FrictionLaw",
-    "LoadShape",
     "Marginal",
     "Method",
     "Positive",
@@ -27,7 +25,6 @@ __all__ = [
     "Solver",
     "SpectralDensity",
     "Variable",
-    "distance",
     "model",
     "onset_variables",
     "register",

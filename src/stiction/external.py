@@ -7,14 +7,22 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Names, Number, RealArray, check, checked, describe
+from stiction.base.model import (
+    Count,
+    Names,
+    NotNegative,
+    Number,
+    RealArray,
+    check,
+    checked,
+    describe,
+)
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import limit_state
 from stiction.inference.likelihood import Simulation, simulate
 from stiction.inference.prior import with_parameters
 from stiction.methods.dynamics.scec import write_scec
 from stiction.methods.protocol import MethodObject
-from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.study.run import event_table

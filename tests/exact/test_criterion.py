@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from setups import ROUND_OFF, local_onset, make_problem, turns
+from setups import ROUND_OFF, edge_load, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.protocol import SMALLEST_EIGENVALUE
@@ -206,7 +206,7 @@ def test_uniform_load_and_initial_stress_scale(problem, make_strength):
 PROBLEM = st.paper.problem(nodes=1024)
 EDGE = {
     "friction": st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
-    "load": st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+    "load": edge_load(PROBLEM.interface, 4.0, 0.01, 0.5),
 }
 LENGTH, MODULUS = PROBLEM.interface.length, PROBLEM.effective_modulus
 
@@ -247,7 +247,7 @@ def test_a_release_rate_that_peaks_within_a_few_nodes_is_seen():
         st.Solid(3e9, 0.21, 2000.0),
         st.Interface(1.0, 2048),
         st.LinearWeakening(weakening_rate=2e12, residual_strength=4e5),
-        st.Load(profile=st.EdgeLoad(excess=60.0, decay=4e-4)),
+        edge_load(st.Interface(1.0, 2048), 60.0, 4e-4),
     )
     lengths = np.geomspace(1e-5, 0.1, 1000)
     above = energy_release_rate(problem, 1.5e5, lengths).min(axis=1) > 1.5

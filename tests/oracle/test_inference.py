@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import scipy.stats
 from checks import standard_error
-from setups import EXACT, LOCAL, QUARTER, ensemble, turns
+from setups import EXACT, LOCAL, QUARTER, ensemble, gradient_load, turns
 from specimens import crooked
 
 import stiction as st
 
 WAVE = 1.0 + 0.6 * np.cos(turns(128))
+GRADIENT = gradient_load(st.Interface(0.1, 128), 0.6).profile
 SLOW = pytest.mark.slow
 
 
@@ -42,7 +43,7 @@ CASES = {
         problem(normal_pressure=3e6 * WAVE), coefficient, LOCAL, *SMALL, 30,
     ),
     "gradient load": (
-        problem(profile=st.GradientLoad(amplitude=0.6)), beta, LOCAL, *LARGE, 30,
+        problem(profile=GRADIENT), beta, LOCAL, *LARGE, 30,
     ),
     "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
     "lap joint in which nodes stop": (

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from crooked import LINE, TWO, of_width, uneven
 from recording import Calls, compared
-from setups import EXACT, LOCAL, make_problem, without
+from setups import EXACT, LOCAL, edge_load, gradient_load, make_problem, without
 
 import stiction as st
 from stiction.problem.resolution import nodes_in_nucleation_length
@@ -118,10 +118,10 @@ def a_path_through_an_arrested_event():
 def loads_with_an_edge_and_a_gradient():
     found = {}
     for name, shape in {
-        "edge": st.EdgeLoad(excess=1.7, decay=0.0031, edge=0.23),
-        "gradient": st.GradientLoad(amplitude=0.41, centre=0.37),
+        "edge": edge_load(LINE.interface, 1.7, 0.0031, 0.23),
+        "gradient": gradient_load(LINE.interface, 0.41, 0.37),
     }.items():
-        load = dataclasses.replace(LINE.load, profile=shape)
+        load = dataclasses.replace(LINE.load, profile=shape.profile)
         problem = dataclasses.replace(LINE, load=load)
         found[name] = st.onset(problem, TWO, method=EXACT)
     return found

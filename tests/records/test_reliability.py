@@ -8,7 +8,7 @@ import scipy.stats
 import xarray as xr
 from crooked import LINE, of_width
 from recording import Calls, compared
-from setups import EXACT, LOCAL, beta_strength, make_problem, turns, without
+from setups import EXACT, LOCAL, beta_strength, gradient_load, make_problem, turns, without
 from specimens import crooked
 from stand_ins import BoundedStandIn
 
@@ -18,8 +18,9 @@ from stiction.random.stresses import share_below_residual
 calls = Calls()
 COUNTED = "counting of many samples, tests/oracle/test_reliability.py"
 BOUNDED = beta_strength(2.3e-3, truncation=2.5)
-SHAPE = st.GradientLoad(amplitude=0.2, centre=0.3)
-LOAD = st.Load(profile=SHAPE, initial_stress=4e4, normal_pressure=2.3e6)
+LOAD = gradient_load(
+    st.Interface(0.031, 96), 0.2, 0.3, initial_stress=4e4, normal_pressure=2.3e6
+)
 SMALL = make_problem(96, 0.031, weakening_rate=0.42e12, residual_strength=1.3e5, load=LOAD)
 WIDE = of_width(SMALL, 0.0117)
 EXPONENTIAL = st.ExponentialSpectrum(3e-3, power_kept=0.95)

@@ -7,13 +7,14 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import scipy.stats
 from checks import python
 from refusals import refuses
 
 import stiction as st
 from stiction.base.kinds import register
 from stiction.base.model import model
-from stiction.problem.load import LoadShape
+from stiction.random.marginals import Marginal
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "stiction"
@@ -54,7 +55,7 @@ command("run", "study.toml", "--out", "found", "--workers", "1")
 found = st.open_run("found")
 assert found.study == st.Study.from_toml("study.toml") == st.Study.from_dict(found.study.to_dict())
 names = [type(one).__name__ for one in (
-    found.study.problem.friction, found.study.problem.load.profile, found.study.method,
+    found.study.problem.friction, found.study.method,
     found.study.random.strength.marginal, found.study.random.strength.spectrum)]
 assert "my_package" in sys.modules and found.dataset().sizes == {"sample": 8}, names
 own = sys.modules["my_package"]
@@ -80,7 +81,7 @@ def test_a_package_adds_one_of_each_kind_as_the_page_shows(tmp_path):
     places = {"cwd": tmp_path, "MPLBACKEND": "Agg"}
     places["PYTHONPATH"] = os.pathsep.join(map(str, (tmp_path, SOURCES.parent)))
     said = python("-c", READ, **places)
-    assert "\nSquareWeakening BumpLoad WeakestNode Triangular BandSpectrum\n" in said
+    assert "\nSquareWeakening WeakestNode Triangular BandSpectrum\n" in said
     # What cannot be imported is an error where it is named.
     words = "'torn' of the package my-package (entry point of stiction.laws) cannot be used"
     assert words in said.splitlines()[-1]
@@ -101,16 +102,17 @@ def write_package(folder: Path, entry_points: dict[str, dict[str, str]]) -> None
 
 def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     @model
-    class Unregistered(LoadShape):
+    class Unregistered(Marginal):
         type: str = "unregistered"
 
-        def values(self, interface):
-            return 1.0 + 0.1 * interface.x / interface.lengths[0]
+        @property
+        def distribution(self):
+            return scipy.stats.uniform(1e6, 2e5)
 
-    base = st.paper.problem(nodes=256)
-    problem = dataclasses.replace(base, load=st.Load(profile=Unregistered()))
+    problem = st.paper.problem(nodes=256)
+    field = st.paper.strength(problem, correlation_ratio=2.0)
     study = st.Study(
-        problem=problem, random=st.paper.strength(base, correlation_ratio=2.0),
+        problem=problem, random=dataclasses.replace(field, marginal=Unregistered()),
         method=st.LocalCriterion(), ensemble=st.Ensemble(samples=2),
     )  # fmt: skip
     words = "Unregistered is a class of your own that study files cannot name"
@@ -121,16 +123,16 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     register(Unregistered)
     assert st.Study.from_dict(study.to_dict()) == study
     wrong = {"type": "unregistered", "width": 0.0}
-    refuses("profile: unknown 'width' (valid: type)", lambda: st.Load(profile=wrong))
+    refuses(
+        "marginal: unknown 'width' (valid: type)",
+        lambda: st.RandomField(marginal=wrong, spectrum=field.spectrum),
+    )
 
     @model
     class Another(Unregistered):
         pass
 
     refuses("Another: the type 'unregistered' belongs to", lambda: register(Another))
-    refuses("needs a field such as type", lambda: register(LoadShape))
-    for least in (-0.01, 0.0):  # zero is not positive
-        Another.values = lambda self, interface, least=least: interface.x + least
-        refuses("Another must be positive everywhere", lambda: Another().on(base.interface))
-    Another.__abstractmethods__ = frozenset({"values"})
-    refuses("Another: lacks values", lambda: register(Another))
+    refuses("needs a field such as type", lambda: register(Marginal))
+    Another.__abstractmethods__ = frozenset({"distribution"})
+    refuses("Another: lacks distribution", lambda: register(Another))

@@ -115,13 +115,6 @@ class Unlisted(Broken):
         return "it does not take lines"
 
 
-class ShortLoad(extensions.LoadShape):
-    type = "short"
-
-    def values(self, interface):
-        return np.ones(3)
-
-
 class FromScipy(extensions.Marginal):
     type = "from_scipy"
 
@@ -149,10 +142,6 @@ def test_a_class_whose_members_return_the_wrong_thing_is_refused():
         (
             "supports must return a list of reasons, got 'it does",
             lambda: st.onset(problem, np.full(256, 1e6), method=Unlisted({})),
-        ),
-        (
-            "ShortLoad.values must have the shape (256,) ... got (3,)",
-            lambda: ShortLoad().on(problem.interface),
         ),
         ("from_scipy: its distribution must be frozen", lambda: field_of(scipy.stats.norm)),
         (

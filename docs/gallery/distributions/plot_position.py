@@ -7,10 +7,13 @@ Critical positions under a load that decreases along the interface.
 
 import dataclasses
 
+import numpy as np
+
 import stiction as st
 
 problem = st.paper.problem(nodes=512)
-gradient = st.Load(profile=st.GradientLoad(amplitude=0.2, centre=0.5))
+x = problem.interface.x / problem.interface.length
+gradient = st.Load(profile=1.0 + 0.2 * (1.0 - 4.0 * np.abs(x - 0.5)))
 onsets = {
     name: st.monte_carlo(
         dataclasses.replace(problem, load=load),

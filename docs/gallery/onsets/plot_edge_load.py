@@ -12,10 +12,12 @@ import numpy as np
 import stiction as st
 
 plain = st.paper.problem(nodes=512)
+x = plain.interface.x
+profile = 1.0 + 4.0 * np.exp(-np.abs(x - 0.05) / 0.01)
 problem = dataclasses.replace(
     plain,
     friction=st.LinearWeakening(weakening_rate=0.5e12, residual_ratio=0.3),
-    load=st.Load(profile=st.EdgeLoad(excess=4.0, decay=0.01, edge=0.5)),
+    load=st.Load(profile=profile / profile.mean()),
 )
 tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
 onset = st.onset(problem, tau_p, method=st.Equilibrium())

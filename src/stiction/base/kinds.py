@@ -1,4 +1,4 @@
-"""Kinds of methods, laws, loads, marginals and spectra, distinguished by `type` in a study file."""
+"""Kinds of methods, laws, marginals and spectra, distinguished by `type` in a study file."""
 
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -20,13 +20,12 @@ _registered: dict[str, dict[str, Any]] = {}
 def register(kind: T) -> T:
     """Class decorator: let study files name a class by its `type`.
 
-    The class is a method, or derives from `FrictionLaw`, `LoadShape`,
-    `Marginal` or `SpectralDensity`. Its `type` is a field such as
-    ``type: Literal["band"] = "band"``. Files that name this type can be
-    read when the module of the class is imported. No import is needed
+    The class is a method, or derives from `FrictionLaw`, `Marginal` or
+    `SpectralDensity`. Its `type` is a field such as ``type:
+    Literal["band"] = "band"``. Files that name this type can be read
+    when the module of the class is imported. No import is needed
     if the package has an entry point of the same name in the group
-    ``stiction.methods``, ``.laws``, ``.loads``, ``.marginals`` or
-    ``.spectra``.
+    ``stiction.methods``, ``.laws``, ``.marginals`` or ``.spectra``.
     """
     name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
     if not isinstance(name, str):
@@ -99,13 +98,11 @@ class OneOf:
     `kinds` are the classes by `type`, and `default` is the type of a
     table without a `type`. `convert` maps a value to such an object. If
     it returns NotImplemented, a table goes to its class and any other
-    value to the annotated type. With `untyped`, a table without a type
-    also goes to the annotated type.
+    value to the annotated type.
     """
 
     kinds: Kinds
     convert: Callable[[Any], Any]
-    untyped: bool = False
     default: str | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
@@ -113,7 +110,7 @@ class OneOf:
             converted = self.convert(value)
             if converted is not NotImplemented:
                 return converted
-            if not isinstance(value, Mapping) or (self.untyped and "type" not in value):
+            if not isinstance(value, Mapping):
                 return inner(value)
             table = {"type": self.default, **value} if self.default else value
             return self.convert(from_table(self.kinds, table, info.context))

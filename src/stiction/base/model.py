@@ -199,6 +199,7 @@ Number: TypeAlias = Annotated[int, Field(ge=0), BeforeValidator(as_count)]
 Count: TypeAlias = Annotated[Number, Field(ge=1)]
 Real: TypeAlias = Annotated[float, BeforeValidator(_real), Field(allow_inf_nan=False)]
 Positive: TypeAlias = Annotated[Real, Field(gt=0)]
+NotNegative: TypeAlias = Annotated[Real, Field(ge=0)]
 RealArray: TypeAlias = Annotated[Any, BeforeValidator(as_numbers), "array"]
 """Real numbers of any shape, as a float64 array."""
 Held = TypeVar("Held", covariant=True)

@@ -46,12 +46,11 @@ from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Count, Number, checked
+from stiction.base.model import Count, NotNegative, Number, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.inference.curves import Curves, summary_of
 from stiction.inference.peaks import Peaks, factor_of, make_peaks
 from stiction.inference.posterior import Posterior
-from stiction.problem.load import NotNegative
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
 """Draws that represent a posterior, and number of values in the table of a distribution."""

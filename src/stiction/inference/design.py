@@ -52,7 +52,16 @@ from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, unknown_name
-from stiction.base.model import Count, Names, Number, Progress, check, checked, is_whole
+from stiction.base.model import (
+    Count,
+    Names,
+    NotNegative,
+    Number,
+    Progress,
+    check,
+    checked,
+    is_whole,
+)
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.inference.grid import grid_of
@@ -71,7 +80,6 @@ from stiction.inference.specimens import (
     tables_of,
 )
 from stiction.methods.protocol import MethodObject
-from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.problem.results import to_dataset
 from stiction.random.spectra import Share

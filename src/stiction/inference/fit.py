@@ -42,7 +42,7 @@ from scipy.stats import t as student
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.base.model import Count, Flag, Number, Positive, Progress, checked
+from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Progress, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
 from stiction.inference.between import chance_of_scatter
@@ -70,7 +70,6 @@ from stiction.inference.specimens import (
 from stiction.inference.whittle import SpectrumFamily, spectrum_family
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
-from stiction.problem.load import NotNegative
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 

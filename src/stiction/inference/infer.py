@@ -38,7 +38,7 @@ from scipy.stats import entropy
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Count, Number, Progress, checked
+from stiction.base.model import Count, NotNegative, Number, Progress, checked
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
@@ -69,7 +69,6 @@ from stiction.inference.specimens import (
 )
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import MethodObject
-from stiction.problem.load import NotNegative
 from stiction.problem.problem import Problem
 from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import AnyRandom, Source, as_random, specimens_of_fit

@@ -24,7 +24,7 @@ from stiction.base.variables import PROFILES
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import SCALES, Friction, contradictions
 from stiction.problem.interface import Interface
-from stiction.problem.load import Load, LoadShape
+from stiction.problem.load import Load
 from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import turned
 from stiction.problem.profiles.reading import (
@@ -121,8 +121,6 @@ class Problem:
     def _consistent(self) -> Problem:
         problems = self._of_specimen()
         problems += self._place_profiles()
-        if isinstance(self.load.profile, LoadShape):
-            self.load.profile.on(self.interface)  # refuses one that is not positive
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
                 "solid.plane: solids beside a plane interface are three-dimensional. Leave 'strain'"
@@ -330,8 +328,7 @@ class Problem:
             return self.rig.T[: self.interface.size] * self.interface.size
         if self.specimen is not None:
             return self.blocks.shear
-        profile = self.load.profile
-        return profile.on(self.interface) if isinstance(profile, LoadShape) else profile
+        return self.load.profile
 
     @property
     def effective_modulus(self) -> float:

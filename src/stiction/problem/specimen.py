@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf
-from stiction.base.model import Mode, Positive, Real, as_number, model
+from stiction.base.model import Mode, NotNegative, Positive, Real, as_number, model
 from stiction.problem.solid import Solid
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ Stiffness = Annotated[
 Quality = Annotated[
     float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.01)
 ]
-NotNegative = Annotated[Real, Field(ge=0.0)]
 MIN_PRESSURE = 1e-6
 """Smallest local pressure over its mean with which a critical slip gives a weakening rate."""
 MAX_POSITIVE = 1e-2
