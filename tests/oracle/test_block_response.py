@@ -6,6 +6,7 @@ ends at the interface, 2e-4 in q, since its step makes their stress oscillate.
 """
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from numpy.polynomial import legendre
 from scipy.sparse.linalg import splu
 
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
+from stiction.elasticity.columns import Material
+from stiction.elasticity.rig import Body, contact_rig
 
 
 class Axis:
@@ -59,9 +62,9 @@ class Axis:
 class Elements:
     """One block, G = 1; fields are u and then v, x by x."""
 
-    def __init__(self, length, height, kappa, breaks=(), degree=7):
-        size = 0.5 * min(length, height)
-        self.across = Axis([0.0, length], size, degree)
+    def __init__(self, length, height, kappa, breaks=(), degree=7, ends=(), size=math.inf):
+        size = min(size, 0.5 * min(length, height))
+        self.across = Axis(sorted({0.0, length, *ends}), size, degree)
         self.up = Axis(sorted({0.0, height, *breaks}), size, degree)
         x, y, lame = self.across, self.up, (3.0 - kappa) / (kappa - 1.0)
         uu = (lame + 2.0) * sparse.kron(x.stiff, y.mass) + sparse.kron(x.mass, y.stiff)
@@ -189,3 +192,53 @@ def test_a_glued_top(height, nu, plane):
     added += 0.25 * LENGTH * shear.mean() * (response.shear @ slip / nodes) ** 2
     assert added == pytest.approx(energies[0] - energies[1], rel=2e-5)  # falls as 1/nodes²
     assert response.error < 1e-9
+
+
+def test_a_slider_on_a_longer_base():
+    """C and the tractions of a bonded slider, by columns, with a stiffer base of another nu."""
+    height, low, high, behind, ahead, n = 0.5, 0.1, 0.2, 0.3, 0.4, 128
+    kappa, below, stiffer = kolosov(0.35, "stress"), kolosov(0.2, "stress"), 3.0
+    ends = (behind, behind + 1.0)
+    top = Elements(1.0, height, kappa, (low, high), degree=6, size=0.15)
+    base = Elements(behind + 1.0 + ahead, 0.3, below, degree=6, ends=ends, size=0.15)
+    x = base.across.x
+    under = (x > behind - 1e-9) & (x < behind + 1.0 + 1e-9)
+    np.testing.assert_allclose(x[under] - behind, top.across.x, atol=1e-12)
+    # The depth of the base counts downwards. Points in contact have the same displacement.
+    size = top.matrix.shape[0]
+    place = size + np.arange(base.matrix.shape[0])
+    sign = np.ones(place.size)
+    sign[place.size // 2 :] = -1.0
+    place[base.interface[:, under]] = top.interface
+    held = base.top.ravel()
+    join = sparse.csr_matrix(
+        (sign, (np.arange(place.size), place)), (place.size, size + place.size)
+    )
+    matrix = join.T @ (stiffer * base.matrix) @ join
+    matrix += sparse.block_diag([top.matrix, sparse.csr_matrix((place.size, place.size))])
+    gauss, weights = legendre.leggauss(8)
+    force = np.zeros(size + place.size)
+    for a, b in itertools.pairwise(top.up.edges):
+        if low < 0.5 * (a + b) < high:
+            values = top.up.at(0.5 * (a + b) + 0.5 * (b - a) * gauss).T @ weights
+            force[top.left] += 0.5 * (b - a) / (high - low) * values
+    used = np.setdiff1d(np.flatnonzero(matrix.diagonal()), place[held])
+    factors = splu(
+        matrix.tocsc()[used][:, used], "MMD_AT_PLUS_A", 0.001, options={"SymmetricMode": True}
+    )
+    u = np.zeros(force.size)
+    u[used] = factors.solve(force[used])
+    bodies = Body(height, Material(1.0, kappa)), Body(0.3, Material(stiffer, below))
+    rig = contact_rig(1.0, n, *bodies, push=(low, high), behind=behind, ahead=ahead)
+    assert rig.C * (force @ u) == pytest.approx(1.0, rel=3e-3)
+    middle = slice(n // 16, -n // 16)
+    pulled = -top.matrix @ u[:size]  # the slider pulls the base
+    mass = splu(top.across.mass.tocsc())
+    for component, T, places in (
+        (0, rig.T[:n], middles(1.0, n)),
+        (1, rig.T[n:], np.arange(n + 1) / n),
+    ):
+        traction = top.across.at(places) @ mass.solve(pulled[top.interface[component]])
+        np.testing.assert_allclose(
+            n * T[middle], traction[middle], atol=0.01 * abs(n * T).max()
+        )
