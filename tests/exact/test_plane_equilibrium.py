@@ -29,8 +29,8 @@ def test_strength_along_one_axis_equals_the_line(mode, across, load):
     plane = make_problem((NODES, across)[::turn], (LENGTH, short)[::turn], load=wide)
     strength = st.paper.strength(line, correlation_ratio=1.0)
     tau_p = strength.sample(line.interface, samples=3, seed=1)
-    exact = exact_onset(line, tau_p, sensitivity=True)
-    options = {"gap": 1e-10, "sensitivity": True, "slip": True}
+    exact = exact_onset(line, tau_p)
+    options = {"gap": 1e-10, "slip": True}
     found = exact_onset(plane, repeated(tau_p, across, axis), **options)
     # 1e-10 is the gap that was asked for, and about that of the line.
     for name in ("first_instability", "critical_load", "critical_stress"):
@@ -38,9 +38,6 @@ def test_strength_along_one_axis_equals_the_line(mode, across, load):
     upper = found["first_instability"] + found["certificate_gap"]
     assert upper.values == pytest.approx(exact["first_instability"].values, rel=1e-9)
     along, still = "xy"[::turn]
-    summed = found["sensitivity"].sum(still).values
-    # The multiplier is that of a load 1e-10 off; its own error goes with the root of the gap.
-    assert summed == pytest.approx(exact["sensitivity"].values, abs=1e-4 * summed.max())
     assert float(found["slip"].std(still).max()) < 1e-6 * float(found["slip"].max())
     # The line's patch is all of a run, the plane's where y is above a tenth of its largest value.
     place = found["critical_position"].sel(direction=along).values

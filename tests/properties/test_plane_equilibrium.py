@@ -37,7 +37,7 @@ def rough_strength(seed):
 
 
 def solve(strength, problem=PLANE, gap=1e-9):
-    return exact_onset(problem, strength, gap=gap, slip=True, sensitivity=True)
+    return exact_onset(problem, strength, gap=gap, slip=True)
 
 
 def first_of(strength, **options):
@@ -65,25 +65,6 @@ def crooked(name):
     return make_problem(NODES, LENGTHS, load=load, friction=law(**options))
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_sensitivity_is_the_gradient_of_the_mean_stress(name):
-    problem, strength = crooked(name), strength_of(3)
-    rough = np.random.default_rng(9).standard_normal((3, *NODES))
-    directions = 10.0 * np.array([smooth(8, 1.0) - 0.3, *rough])
-    found = exact_onset(problem, strength, gap=1e-4, sensitivity=True)  # of wide bounds too
-    assert found["certified"].item() == (name == "straight")
-    gradient = found["sensitivity"].values[0]
-    # Steps of 1e-5 of the strength, since with longer ones other nodes join. Bounds are 1e-10
-    # apart, 1e-4 of a step of the onset at most.
-    ends = np.concatenate((strength + directions, strength - directions))
-    up, down = first_of(ends, problem=problem, gap=1e-10).reshape(2, -1)
-    expected, error = (gradient * directions).sum((1, 2)), 1e-4 * np.linalg.norm(gradient)
-    np.testing.assert_allclose(0.5 * (up - down), expected, rtol=0, atol=error)
-    if name == "straight":
-        weight = problem.load.profile
-        assert (gradient * weight).sum() == pytest.approx(weight.mean(), rel=1e-12)
-
-
 def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
     problem, strength = crooked("residual"), strength_of(3)
     quick = exact_onset(problem, strength)
@@ -93,16 +74,6 @@ def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
     for name in ("first_instability", "critical_load"):
         # Both within the gap of 1e-6.
         assert quick[name].item() == pytest.approx(slow[name].item(), rel=2e-6)
-
-
-def test_no_sensitivity_where_the_turning_point_is_not_found(monkeypatch):
-    monkeypatch.setattr(program, "follow_to_turn", lambda *_: None)
-    for name in ("straight", "both"):
-        problem = crooked(name)
-        with pytest.warns(st.AccuracyWarning, match=r"\(0\), so sensitivity is NaN"):
-            found = exact_onset(problem, strength_of(3), sensitivity=True)
-        assert np.isnan(found["sensitivity"].values).all()
-        assert found["critical_patch_area"].item() > 0.0
 
 
 def test_the_place_of_the_least_average_lies_between_nodes():

@@ -34,8 +34,8 @@ def barred():
 
 
 @calls(ORACLE, close=1e-4)
-def exact_onsets_with_slip_and_sensitivity():
-    method = st.Equilibrium(slip=True, sensitivity=True, gap=1e-9)
+def exact_onsets_with_slip():
+    method = st.Equilibrium(slip=True, gap=1e-9)
     return st.onset(PLANE, TWO, method=method)
 
 
@@ -56,10 +56,10 @@ def a_law_of_two_pieces():
     return st.onset(problem, TWO[1], method=st.Equilibrium())
 
 
-@calls("more than what weakens, and no sensitivity where the residual is reached", close=1e-4)
+@calls("more than what weakens", close=1e-4)
 def strength_that_hardly_weakens():
     near = dataclasses.replace(PLANE.friction, residual_strength=0.97 * PLANE_STRENGTH)
-    method = st.Equilibrium(slip=True, sensitivity=True)
+    method = st.Equilibrium(slip=True)
     held = np.where(uneven(INTERFACE, seed=9) > 0.8, 2e6, 1e5)
     profiles = {"strength": PLANE_STRENGTH, "residual_strength": held}
     return {

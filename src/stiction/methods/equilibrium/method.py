@@ -67,10 +67,9 @@ class Equilibrium:
     ----------
     sensitivity : bool
         Also return d first_instability / d tau_p at every node, at
-        fixed weakening rates. The sensitivity is NaN if a law steepens
-        and a node passes a corner before the first instability, and on
-        planes if the turning point is not found. If a node of a
-        specimen stops before the first instability, the derivatives are
+        fixed weakening rates. Planes have no sensitivity. It is NaN if
+        a law steepens and a node passes a corner before the first
+        instability. If a node of a specimen stops before the first instability, the derivatives are
         difference quotients, which need a path for every node.
     slip : bool
         Also return the slip at the first instability.
@@ -146,11 +145,10 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
-        ends = problem.interface.is_held
-        if self.sensitivity and ends and problem.interface.is_plane:
+        if self.sensitivity and problem.interface.is_plane:
             reasons.append(
-                "sensitivity: is not known on planes that end. Leave it out, and take differences"
-                " of st.onset with the strength of a few nodes raised"
+                "sensitivity: applies to lines only. Leave it out, and take differences of st.onset"
+                " with the strength of a few nodes raised"
             )
         if not problem.interface.is_plane and self.gap != type(self)().gap:
             reasons.append(

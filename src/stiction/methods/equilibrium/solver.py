@@ -322,16 +322,17 @@ class OnsetSolver:
             unknown = np.isnan(values["sensitivity"]).reshape(rows.samples, -1).any(axis=1)
             warn_of_samples(
                 "the first instability has no known derivative in {samples}, so sensitivity is NaN:"
-                " nodes pass a corner beyond which their law falls more steeply, or the turning"
-                " point was not resolved",
+                " nodes pass a corner beyond which their law falls more steeply",
                 np.isfinite(first) & unknown,
             )
 
 
 def _sensitivity(
-    problem: Problem, search: EquilibriumSearch, sample: StaticSample, state: EquilibriumState
+    problem: Problem, search: Any, sample: StaticSample, state: EquilibriumState
 ) -> Array:
     """Return the derivative (n,) of an instability's stress with respect to peak strengths.
+
+    `search` is a `DenseSearch`, because planes have no sensitivity.
 
     The derivative is NaN if a law steepens and a node passed a corner
     before the instability.
@@ -345,7 +346,8 @@ def _sensitivity(
     # slip, which is share tau_p + (1 - share) tau_r. The chain rule
     # gives the derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
-    return search.gradient(sample, state) * np.where(sample.critical > 0.0, share, 1.0)
+    gradient: Array = search.gradient(sample, state)
+    return gradient * np.where(sample.critical > 0.0, share, 1.0)
 
 
 def _quotients(

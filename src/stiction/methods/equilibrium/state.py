@@ -92,13 +92,5 @@ class EquilibriumSearch(Protocol):
     ) -> EquilibriumState | None:
         """Return the equilibrium at a load above a state, or `None` if it is not found."""
 
-    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the derivative (n,) of an instability's stress with respect to the strengths.
-
-        The stress is the mean stress divided by the mean of the load
-        profile. The strengths are the present pieces of the law,
-        continued to zero slip.
-        """
-
     def stress_released(self, state: EquilibriumState) -> Array:
         """Return the stress K d that slip releases, Pa."""

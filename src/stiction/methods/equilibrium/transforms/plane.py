@@ -43,7 +43,7 @@ from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.methods.equilibrium.endings import Outcome, PathStatus
 from stiction.methods.equilibrium.sample import pieces_of
-from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest, multiplier_of
+from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest
 from stiction.methods.equilibrium.strength import StaticSample, all_breakable_slip, exceeds
 from stiction.methods.equilibrium.transforms.bracket import Bracket, TooSmallError, bisect
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
@@ -60,9 +60,6 @@ MIN_COARSE_NODES = 8
 """Least nodes along x and y on a coarse grid. A smaller grid is not faster than the next."""
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
-START_RETREATS = (0.0, 1e-5, 1e-4)
-"""Shares of the load below its lower bound from which a path is followed to its turn: the slip
-that proves the bound may be beyond it."""
 FIRST_LOAD_STEP = 1e-4
 """First step of the load along a path, as a share of the load. Later steps adapt."""
 FIRST_SHARE_OF_ONSET = 0.9
@@ -337,23 +334,6 @@ class PlaneSearch:
             if turn is not None:
                 return turn
         return None
-
-    def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the direction (n,) in which the path turns, or NaN if the turn is not found."""
-        if state.multiplier is not None or state.gap == 0.0:
-            return multiplier_of(sample, state)
-        assert state.gap is not None  # instabilities of planes have a gap
-        operator, load_beyond = self._operator(sample), state.load + 2.0 * state.gap
-        # Without a certificate, the path was followed already, and no
-        # turn was found.
-        slip = state.slip
-        for retreat in START_RETREATS if state.certified else ():
-            load = state.load - retreat * abs(state.load)
-            turn = follow_to_turn(operator, sample, load, load_beyond, slip)
-            if turn is not None and turn.direction is not None:
-                return turn.direction
-            slip = np.zeros(slip.size)  # the slip that proves the bound may be beyond the turn
-        return np.full(slip.size, np.nan)
 
     def jump(
         self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False
