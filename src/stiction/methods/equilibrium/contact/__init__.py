@@ -1,0 +1,1 @@
+"""Equilibria of a slider whose pressure depends on load and slip."""

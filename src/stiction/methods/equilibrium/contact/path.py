@@ -1,0 +1,440 @@
+"""Follow slip and opening of a slider on a base, from event to event.
+
+Problem
+-------
+The interface has n cells, which slip by d >= 0 (m), and n + 1 edges, which open by w >= 0 (m).
+With x = (d, w), stiffness K (Pa), a load that has risen by D (N/m) and its forces T at rest, the
+shear force of a cell is (D T - K x)_a, and the force that presses an edge is P_b = -(D T - K x)_b.
+N_a is the normal force on a cell: half of P at both of its edges, but the whole of P at the
+two ends of the slider. Written N = Q P, the law of a cell is
+
+    strength_a = mu_a N_a - W_a d_a,                                                          (1)
+
+with mu_a = mu_p at first. When the strength meets mu_r N_a, it is mu_r N_a from then on: mu_a is
+mu_r, and W_a is 0. Slip is irreversible, opening is reversible. The overstress o (N/m) of a cell is
+its shear force minus its strength, and the overstress of an edge is -P. Equilibrium is
+
+    o <= 0,   o = 0 where a cell slips or an edge is open.                                    (2)
+
+o changes at the rate do = p dD - M dx. Row a of M is K_a + mu_a (Q K_w)_a with -W_a on the
+diagonal, and p_a = T_a + mu_a (Q T_w)_a. Row b of an edge is K_b, and p_b = T_b. M is not
+symmetric, but its entries off the diagonal are nearly never positive, so that the least
+equilibrium above the present slip is the one which the slider reaches.
+
+A set S of slipping cells and open edges moves at the rate v = M_SS^-1 p_S. If a cell or an edge
+starts whose pivot M_ee - M_eS M_SS^-1 M_Se is not positive, slip jumps at this load.
+
+Algorithm
+---------
+The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E of cells and edges that
+could not start.
+
+1. If E is empty, the load rises and v = M_SS^-1 p_S. A slipping cell whose rate is negative stops.
+   Otherwise the load is held. e, the top of E, moves at the rate 1, and v = -M_SS^-1 M_Se.
+2. Find the nearest kink: a resting cell or a closed edge has lost its margin (a start), e has
+   lost its overstress, a cell meets mu_r N (a corner; a resting cell may meet it while N
+   falls), or an open edge closes. Without a kink the slider slides.
+3. Move to the kink.
+   Start: border the inverse if the pivot is positive. Otherwise push the node on E.
+   e has lost its overstress: take e from E, and start it.
+   Corner: change one row of M, and the inverse by an update of rank one.
+   Close or stop: remove a row and a column from the inverse. If the diagonal of the
+   inverse is not positive there, the rest of S is unstable: border all of S again, open
+   edges first and cells in the order in which they started, and push each node whose
+   pivot is not positive on E.
+4. Return if E was empty and is not, or the other way round, or if the load is at its target.
+   Otherwise go to 1.
+
+A machine of stiffness k' (Pa) lowers the force F = D - k' T'x. It adds k' T T' to K.
+
+Example by hand: one cell without edges that couple, K = 3, T = 1, mu_p N = 2, mu_r N = 1, W = 1.
+The cell starts at D = 2 with the pivot 3 - 1 = 2, and slips at the rate 1/2. At d = 1 (D = 4) it
+meets its corner, and slips at the rate 1/3 from then on. With W = 4 the pivot is -1: the cell jumps
+at D = 2, passes its corner at d = 1/4 with the overstress 1/4, and rests at d = 1/3.
+"""
+
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.base.jit import jit_allocating, jit_inside
+
+Integers = NDArray[np.int64]
+
+RATE_RTOL = 1e-10
+"""A rate below this share of its scale is round-off."""
+PIVOT_RTOL = 1e-9
+"""Smallest positive pivot, as a share of the diagonal of M."""
+OVERSTRESS_RTOL = 1e-12
+"""Overstress that is round-off, as a share of the largest force."""
+MAX_EVENTS_PER_NODE = 64
+"""Events for each cell and edge, on average, after which a path is given up."""
+NOBODY = -1  # no node, no position in S
+
+
+class Status(IntEnum):
+    """Why a path stops. Only the first three can go on."""
+
+    AT_TARGET = 0  # the load is the target
+    UNSTABLE = 1  # E was empty, and is not
+    ARRESTED = 2  # E was not empty, and is
+    SLIDING = 3  # there is no kink ahead
+    GIVEN_UP = 4  # too many events
+
+
+class Kind(IntEnum):
+    """What happens to a node at a kink."""
+
+    NOTHING = 0
+    START = 1
+    AT_STRENGTH = 2  # the top of E has lost its overstress
+    CORNER = 3
+    CLOSE = 4
+
+
+class Kink(NamedTuple):
+    """The nearest kink. `step` is a rise of the load, or of the slip of e."""
+
+    step: float
+    node: int
+    kind: int
+
+
+class PathStop(NamedTuple):
+    """Load D, force F and largest F so far, N/m, and a `Status`."""
+
+    load: float
+    force: float
+    peak: float
+    status: int
+
+
+class Contact(NamedTuple):
+    """A slider on its path. Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
+
+    `columns` is M transposed. `difference` is mu_p - mu_r, and 0 from the corner on.
+    `slip_strength` is W, and 0 from the corner on. `counts` holds the sizes of S and E,
+    the number of starts so far, and the number of events so far.
+    """
+
+    columns: Array  # (m, m): row s is column s of M, Pa
+    load: Array  # (m,): p
+    relief: Array  # (m,): k' T, Pa
+    normal_stiffness: Array  # (n, m): Q K_w, Pa
+    normal_load: Array  # (n,): Q T_w
+    difference: Array  # (n,)
+    weakening: Array  # (n,): Pa
+    overstress: Array  # (m,): o, N/m
+    moved: Array  # (m,): slip in either direction so far, and opening, m
+    inverse: Array  # (m, m): of M_SS in its first rows and columns
+    inside: Integers  # (m,): nodes in S
+    place: Integers  # (m,): position in S, or NOBODY
+    stack: Integers  # (m,): nodes in E
+    stacked: NDArray[np.bool_]  # (m,): whether a node is in E
+    started: Integers  # (m,): number of the last start
+    counts: Integers  # (4,)
+    rate: Array  # (m,): of slip and opening
+    change: Array  # (m,): rate of o
+    left: Array  # (m,): M_eS M_SS^-1
+    right: Array  # (m,): M_SS^-1 M_Se
+
+
+N_INSIDE, N_STACKED, N_STARTED, N_EVENTS = 0, 1, 2, 3
+
+
+@jit_inside
+def normal(edges: Array, n: int, a: int) -> float:
+    """Return (Q P)_a, of values (m,) whose last n + 1 belong to edges."""
+    first = edges[n + a] * (1.0 if a == 0 else 0.5)
+    return first + edges[n + a + 1] * (1.0 if a == n - 1 else 0.5)
+
+
+@jit_inside
+def _multiply_inverse(state: Contact, k: int, product: Array) -> None:
+    """Write M_SS^-1 b (in S) to `product`, for b (k,) in `left`."""
+    for t in range(k):
+        row, total = state.inverse[t], 0.0
+        for r in range(k):
+            total += row[r] * state.left[r]
+        product[t] = total
+
+
+@jit_inside
+def _border(state: Contact, node: int) -> bool:
+    """Put a node into S if its pivot is positive, and return whether it is."""
+    k, columns, inverse = state.counts[N_INSIDE], state.columns, state.inverse
+    left, right = state.left, state.right
+    for t in range(k):
+        left[t] = columns[node, state.inside[t]]
+    _multiply_inverse(state, k, right)
+    pivot = columns[node, node]
+    for t in range(k):
+        left[t] = 0.0
+    for t in range(k):
+        entry = columns[state.inside[t], node]
+        pivot -= entry * right[t]
+        for r in range(k):
+            left[r] += entry * inverse[t, r]
+    if not pivot > PIVOT_RTOL * abs(columns[node, node]):
+        return False
+    for t in range(k):
+        factor = right[t] / pivot
+        for r in range(k):
+            inverse[t, r] += factor * left[r]
+        inverse[t, k] = -factor
+        inverse[k, t] = -left[t] / pivot
+    inverse[k, k] = 1.0 / pivot
+    state.inside[k], state.place[node] = node, k
+    state.counts[N_INSIDE] = k + 1
+    return True
+
+
+@jit_inside
+def _push(state: Contact, node: int) -> None:
+    """Put a node on top of E."""
+    state.stack[state.counts[N_STACKED]] = node
+    state.stacked[node] = True
+    state.counts[N_STACKED] += 1
+
+
+@jit_inside
+def _start(state: Contact, node: int) -> None:
+    """Step 3: put a node into S, or on E."""
+    state.started[node] = state.counts[N_STARTED]
+    state.counts[N_STARTED] += 1
+    if not _border(state, node):
+        _push(state, node)
+
+
+@jit_inside
+def _starts_before(state: Contact, node: int, other: int, n: int) -> bool:
+    """Return whether a node comes before another one if S is bordered again."""
+    if (node < n) != (other < n):
+        return node >= n
+    return state.started[node] < state.started[other]
+
+
+@jit_inside
+def _border_again(state: Contact, without: int) -> None:
+    """Step 3: border S without a node, open edges first, and push what cannot start on E."""
+    k, n, inside = state.counts[N_INSIDE], state.difference.shape[0], state.inside
+    for t in range(1, k):  # sort: edges in the order of their starts, and then cells
+        node, r = inside[t], t
+        while r > 0 and _starts_before(state, node, inside[r - 1], n):
+            inside[r] = inside[r - 1]
+            r -= 1
+        inside[r] = node
+    for t in range(k):
+        state.place[inside[t]] = NOBODY
+    state.counts[N_INSIDE] = 0
+    for t in range(k):  # S is never longer than the nodes that were read
+        node = inside[t]
+        if node != without and not _border(state, node):
+            _push(state, node)
+
+
+@jit_inside
+def _remove(state: Contact, node: int) -> None:
+    """Step 3: take a node out of S."""
+    inverse, place = state.inverse, state.place
+    last, t = state.counts[N_INSIDE] - 1, place[node]
+    if not inverse[t, t] > 0.0:
+        _border_again(state, node)
+        return
+    for r in range(last + 1):
+        if r != t:
+            factor = inverse[r, t] / inverse[t, t]
+            for c in range(last + 1):
+                inverse[r, c] -= factor * inverse[t, c]
+    # The last node takes its place.
+    moved = state.inside[last]
+    for r in range(last + 1):
+        inverse[r, t] = inverse[r, last]
+    for c in range(last + 1):
+        inverse[t, c] = inverse[last, c]
+    state.inside[t], place[moved] = moved, t
+    place[node] = NOBODY
+    state.counts[N_INSIDE] = last
+
+
+@jit_inside
+def _pass_corner(state: Contact, a: int) -> None:
+    """Step 3: the friction coefficient of a cell is mu_r, and its strength no longer falls."""
+    columns, inverse = state.columns, state.inverse
+    k, t = state.counts[N_INSIDE], state.place[a]
+    drop, W = state.difference[a], state.weakening[a]
+    state.difference[a] = state.weakening[a] = 0.0
+    state.load[a] -= drop * state.normal_load[a]
+    for s in range(columns.shape[0]):
+        columns[s, a] -= drop * state.normal_stiffness[a, s]
+    columns[a, a] += W
+    if t == NOBODY:
+        return
+    # (M + e c')^-1 = M^-1 - M^-1 e c' M^-1/(1 + c' M^-1 e), with c' = change of the row
+    left, right = state.left, state.right
+    for r in range(k):
+        left[r] = 0.0
+    pivot = 1.0
+    for s in range(k):
+        node = state.inside[s]
+        entry = -drop * state.normal_stiffness[a, node] + (W if node == a else 0.0)
+        pivot += entry * inverse[s, t]
+        right[s] = inverse[s, t]
+        for r in range(k):
+            left[r] += entry * inverse[s, r]
+    if not pivot > 0.0:
+        _border_again(state, NOBODY)
+        return
+    for s in range(k):
+        factor = right[s] / pivot
+        for r in range(k):
+            inverse[s, r] -= factor * left[r]
+
+
+@jit_inside
+def _find_rates(state: Contact, e: int) -> int:
+    """Steps 1 and 2: write the rates of x and o. Return a cell that stops, or NOBODY."""
+    columns, rate, change = state.columns, state.rate, state.change
+    k, m, n = state.counts[N_INSIDE], rate.shape[0], state.difference.shape[0]
+    for t in range(k):
+        node = state.inside[t]
+        state.left[t] = state.load[node] if e == NOBODY else -columns[e, node]
+    _multiply_inverse(state, k, state.right)
+    most = 0.0
+    for t in range(k):
+        most = max(most, abs(state.right[t]))
+    if e == NOBODY:
+        least, stopping = -RATE_RTOL * most, NOBODY
+        for t in range(k):
+            if state.inside[t] < n and state.right[t] < least:
+                least, stopping = state.right[t], state.inside[t]
+        if stopping != NOBODY:
+            return stopping
+    for i in range(m):
+        rate[i] = 0.0
+        change[i] = state.load[i] if e == NOBODY else -columns[e, i]
+    for t in range(k):
+        speed, column = state.right[t], columns[state.inside[t]]
+        rate[state.inside[t]] = speed
+        for i in range(m):
+            change[i] -= speed * column[i]
+    for t in range(k):
+        change[state.inside[t]] = 0.0
+    if e != NOBODY:
+        rate[e] = 1.0
+    return NOBODY
+
+
+@jit_inside
+def _nearest_kink(state: Contact, e: int, longest: float) -> Kink:
+    """Step 2: return the nearest kink within the longest step."""
+    rate, change, overstress = state.rate, state.change, state.overstress
+    m, n = rate.shape[0], state.difference.shape[0]
+    fastest = forces = 0.0
+    for i in range(m):
+        fastest = max(fastest, abs(rate[i]))
+        if e == NOBODY:
+            forces = max(forces, abs(state.load[i]))
+    step, node, kind = longest, NOBODY, Kind.NOTHING
+    for i in range(m):
+        stiffness = abs(state.columns[i, i])
+        least = RATE_RTOL * (stiffness * fastest + forces)
+        # Starts of resting cells and closed edges, and the end of the overstress of e.
+        if i == e:
+            if -change[i] > max(least, PIVOT_RTOL * stiffness):
+                reach = max(overstress[i], 0.0) / -change[i]
+                if reach < step:
+                    step, node, kind = reach, i, Kind.AT_STRENGTH
+        elif state.place[i] == NOBODY and not state.stacked[i] and change[i] > least:
+            reach = max(-overstress[i], 0.0) / change[i]
+            if reach < step:
+                step, node, kind = reach, i, Kind.START
+        # Corners of cells, also of those that rest after slip, and edges that close.
+        if i < n:
+            if state.difference[i] > 0.0 and (rate[i] != 0.0 or state.moved[i] > 0.0):
+                falls = state.difference[i] * normal(change, n, i)
+                falls += state.weakening[i] * rate[i]
+                if falls > least:
+                    reach = max(_above_corner(state, i), 0.0) / falls
+                    if reach < step:
+                        step, node, kind = reach, i, Kind.CORNER
+        elif state.place[i] != NOBODY and rate[i] < -RATE_RTOL * fastest:
+            reach = max(state.moved[i], 0.0) / -rate[i]
+            if reach < step:
+                step, node, kind = reach, i, Kind.CLOSE
+    return Kink(step, node, kind)
+
+
+@jit_inside
+def _above_corner(state: Contact, a: int) -> float:
+    """Return by how much the strength of a cell is above mu_r N, N/m."""
+    pressed = -normal(state.overstress, state.difference.shape[0], a)
+    return state.difference[a] * pressed - state.weakening[a] * state.moved[a]
+
+
+@jit_inside
+def _move(state: Contact, step: float) -> float:
+    """Step 3: move to the kink, and return by how much slip and opening relieve the force."""
+    relieved = 0.0
+    for i in range(state.rate.shape[0]):
+        state.overstress[i] += step * state.change[i]
+        state.moved[i] += step * state.rate[i]
+        relieved += state.relief[i] * step * state.rate[i]
+    return relieved
+
+
+@jit_allocating
+def follow(state: Contact, load: float, force: float, peak: float, target: float) -> PathStop:
+    """Follow the path from a load (N/m) to a target, an instability or an arrest."""
+    m = state.rate.shape[0]
+    while state.counts[N_EVENTS] < MAX_EVENTS_PER_NODE * m:
+        state.counts[N_EVENTS] += 1
+        held = state.counts[N_STACKED] > 0
+        # 1.
+        e = state.stack[state.counts[N_STACKED] - 1] if held else NOBODY
+        if held and state.overstress[e] < -OVERSTRESS_RTOL * np.abs(state.overstress).max():
+            # Others have taken its overstress away meanwhile.
+            state.stacked[e] = False
+            state.counts[N_STACKED] -= 1
+            if state.counts[N_STACKED] == 0:
+                return PathStop(load, force, peak, Status.ARRESTED)
+            continue
+        stopping = _find_rates(state, e)
+        if stopping != NOBODY:
+            _remove(state, stopping)
+            if state.counts[N_STACKED] > 0:
+                return PathStop(load, force, peak, Status.UNSTABLE)
+            continue
+        # 2.
+        kink = _nearest_kink(state, e, np.inf if held else target - load)
+        if kink.step == np.inf:
+            return PathStop(load, force, peak, Status.SLIDING)
+        # 3.
+        force -= _move(state, kink.step)
+        if not held:
+            load += kink.step
+            force += kink.step
+        peak = max(peak, force)
+        if kink.kind == Kind.NOTHING:
+            return PathStop(target, force, peak, Status.AT_TARGET)
+        i = kink.node
+        if kink.kind == Kind.CORNER:
+            _pass_corner(state, i)
+        elif kink.kind == Kind.CLOSE:
+            state.moved[i] = 0.0
+            _remove(state, i)
+        elif kink.kind == Kind.START:
+            state.overstress[i] = 0.0
+            _start(state, i)
+        else:
+            state.overstress[i] = 0.0
+            state.counts[N_STACKED] -= 1
+            state.stacked[i] = False
+            _start(state, i)
+        # 4.
+        if held != (state.counts[N_STACKED] > 0):
+            return PathStop(load, force, peak, Status.ARRESTED if held else Status.UNSTABLE)
+    return PathStop(load, force, peak, Status.GIVEN_UP)
