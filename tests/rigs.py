@@ -227,11 +227,19 @@ class LoadSteps:
                 return jumped
             A = np.flatnonzero(active)
             M = self._matrix()[np.ix_(A, A)]
-            if not positive_pivots(M):
+            step, longest = np.zeros(len(self.x)), 1.0
+            if positive_pivots(M):
+                step[A] = np.linalg.solve(M, o[A])
+            else:
                 jumped = True
-                M = self._matrix(held_strength=True)[np.ix_(A, A)]
-            step = np.zeros(len(self.x))
-            step[A] = np.linalg.solve(M, o[A])
+                held = self._matrix(held_strength=True)[np.ix_(A, A)]
+                step[A] = np.linalg.solve(held, o[A])
+                # As long as all nodes are beyond their strength, slip is too small.
+                falls = M @ step[A]
+                some = falls > 1e-9 * np.abs(o[A]).max()
+                longest = 0.9 * float((o[A][some] / falls[some]).min(initial=1e3))
+                longest = max(1.0, longest)
+                step *= longest
             # Up to the first corner, and not below the bounds.
             before = self._above_corner(f, self.x)
             after = self._above_corner(
@@ -239,10 +247,16 @@ class LoadSteps:
             )
             scale = 1e-13 * np.abs(f).max()
             crosses = ~self.passed & (after < -scale) & ((step[:n] > 0) | (self.x[:n] > 0))
-            share = 1.0
+            share = 1.0  # and not to where a further node starts, if the step is long
+            if longest > 1.0:
+                further = self._overstress(self.x + step, load)[0]
+                starts = ~active & (further > tol)
+                if starts.any():
+                    rise = (further - o)[starts]
+                    share = float(((tol - o)[starts] / rise).clip(1.0 / longest, 1.0).min())
             if crosses.any():
                 share = min(
-                    1.0, float((before / (before - after))[crosses].clip(0.0, 1.0).min())
+                    share, float((before / (before - after))[crosses].clip(0.0, 1.0).min())
                 )
             self.x = np.maximum(self.x + share * step, lowest)
             _, f = self._overstress(self.x, load)

@@ -117,7 +117,7 @@ class Contact(NamedTuple):
 
     `columns` is M transposed. `difference` is mu_p - mu_r, and 0 from the corner on.
     `slip_strength` is W, and 0 from the corner on. `counts` holds the sizes of S and E,
-    the number of starts so far, and the number of events so far.
+    and the numbers of starts, events and bordering S again so far.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa
@@ -135,14 +135,14 @@ class Contact(NamedTuple):
     stack: Integers  # (m,): nodes in E
     stacked: NDArray[np.bool_]  # (m,): whether a node is in E
     started: Integers  # (m,): number of the last start
-    counts: Integers  # (4,)
+    counts: Integers  # (5,)
     rate: Array  # (m,): of slip and opening
     change: Array  # (m,): rate of o
     left: Array  # (m,): M_eS M_SS^-1
     right: Array  # (m,): M_SS^-1 M_Se
 
 
-N_INSIDE, N_STACKED, N_STARTED, N_EVENTS = 0, 1, 2, 3
+N_INSIDE, N_STACKED, N_STARTED, N_EVENTS, N_BORDERED_AGAIN = range(5)
 
 
 @jit_inside
@@ -220,6 +220,7 @@ def _starts_before(state: Contact, node: int, other: int, n: int) -> bool:
 @jit_inside
 def _border_again(state: Contact, without: int) -> None:
     """Step 3: border S without a node, open edges first, and push what cannot start on E."""
+    state.counts[N_BORDERED_AGAIN] += 1
     k, n, inside = state.counts[N_INSIDE], state.difference.shape[0], state.inside
     for t in range(1, k):  # sort: edges in the order of their starts, and then cells
         node, r = inside[t], t

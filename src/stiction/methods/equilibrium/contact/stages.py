@@ -94,7 +94,7 @@ def make_contact(rig: Matrices, friction: Friction, overstress: Array, moved: Ar
     state = Contact(
         columns, load, rig.relief, rig.normal, normal_load, difference, weakening,
         overstress, moved, np.empty((m, m)), integers[0], place, integers[1],
-        np.zeros(m, np.bool_), integers[2], np.zeros(4, np.int64), *np.empty((4, m)),
+        np.zeros(m, np.bool_), integers[2], np.zeros(5, np.int64), *np.empty((4, m)),
     )  # fmt: skip
     opened = n + np.flatnonzero(moved[n:] > 0.0)
     if opened.size:
