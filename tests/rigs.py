@@ -5,6 +5,7 @@ put into a single sparse matrix, the mesh across the interface is uniform, and t
 the slider have the width of the cells. Nothing is merged or doubled.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +110,7 @@ def plain_rig(
     E, nu = solid
     G, lame = E / (2.0 * (1.0 + nu)), E * nu / (1.0 - nu**2)
     P = lame + 2.0 * G
-    for a, b in zip(y[:-1], y[1:], strict=True):
+    for a, b in itertools.pairwise(y):
         k = int(np.flatnonzero(y == a)[0])
         if a >= push[0] - 0.5 * push[1] - 1e-9 and b <= push[0] + 0.5 * push[1] + 1e-9:
             loads[u[0, k : k + 2], 0] += 0.5 * (b - a) / push[1]
@@ -157,9 +158,7 @@ def plain_rig(
     T = S_B @ np.linalg.solve(A, g)
     stiffness = S_B @ np.linalg.solve(A, S_S)
     C = 1.0 / (g[:, 0] @ np.linalg.solve(A, g[:, 0]) - S_gg)
-    return PlainRig(
-        0.5 * (stiffness + stiffness.T), T[:, 0].copy(), T[:, 1].copy(), float(C)
-    )
+    return PlainRig(0.5 * (stiffness + stiffness.T), T[:, 0].copy(), T[:, 1].copy(), float(C))
 
 
 class LoadSteps:
@@ -242,9 +241,7 @@ class LoadSteps:
                 step *= longest
             # Up to the first corner, and not below the bounds.
             before = self._above_corner(f, self.x)
-            after = self._above_corner(
-                self._forces(self.x + step, load), self.x + step
-            )
+            after = self._above_corner(self._forces(self.x + step, load), self.x + step)
             scale = 1e-13 * np.abs(f).max()
             crosses = ~self.passed & (after < -scale) & ((step[:n] > 0) | (self.x[:n] > 0))
             share = 1.0  # and not to where a further node starts, if the step is long

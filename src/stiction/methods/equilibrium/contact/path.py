@@ -54,7 +54,7 @@ at D = 2, passes its corner at d = 1/4 with the overstress 1/4, and rests at d =
 """
 
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray

@@ -23,7 +23,6 @@ The algorithm is our own (`pressed`, `follow_push`).
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.methods.equilibrium.contact import path
