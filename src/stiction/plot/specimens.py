@@ -24,9 +24,10 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.fields import chosen_row, strength_of
+from stiction.plot.slider import draw as draw_slider
 from stiction.plot.style import ACCENT, COLUMN, INK, PAGE, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
-from stiction.problem.specimen import Pusher
+from stiction.problem.specimen import Pusher, Slider
 
 
 def specimen(
@@ -36,7 +37,7 @@ def specimen(
     *,
     sample: int = 0,
 ) -> NDArray[Any]:
-    """Draw the blocks and their drive, and the shear and pressure that the drive causes.
+    """Draw a specimen and its drive, and the shear and pressure on the interface.
 
     Parameters
     ----------
@@ -46,15 +47,19 @@ def specimen(
         tau_p, Pa, with shape (nodes,) or (samples, nodes), or with
         labels and units.
     result : Dataset, optional
-        From `stiction.onset` with this
-        strength. The critical patch is marked.
+        From `stiction.onset` with this strength. The critical patch
+        between blocks is marked.
     sample : int
         Number of the sample, counted from 0.
 
     Returns
     -------
-    (2,) array of matplotlib.axes.Axes
-        The blocks, and below them the profiles along the interface.
+    (2,) or (3,) array of matplotlib.axes.Axes
+        The specimen, and below it the profiles along the interface. For
+        blocks, the profiles are the shear and the pressure of the drive.
+        A slider is drawn to scale. If its strength (friction
+        coefficients) is given, its shear, pressure and slip before the
+        first event are drawn, otherwise the stresses of the pressing.
 
     Examples
     --------
@@ -69,6 +74,10 @@ def specimen(
     2
     """
     check("problem", problem, Problem)
+    if isinstance(problem.specimen, Slider):
+        number = int(sample)
+        given = None if strength is None else problem.sample(strength)
+        return draw_slider(problem, given and given.part(slice(number, number + 1)))
     blocks, interface = problem.blocks, problem.interface
     rows = None if strength is None else strength_of(problem, strength)
     if result is not None:
