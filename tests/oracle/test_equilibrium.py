@@ -37,7 +37,7 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
     rows, search = problem.sample(tau_p), DenseSearch(problem)
     for row, load in enumerate(loads):
         sample = sample_of(rows, search.pieces, row)
-        found = search.next(sample, replace(at_rest(sample), search=Route.EVENTS))
+        found = search.next(sample, replace(at_rest(sample), route=Route.EVENTS))
         assert found.status == PathStatus.UNSTABLE
         assert found.load == pytest.approx(load, rel=1e-11)
 
