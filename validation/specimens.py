@@ -72,7 +72,7 @@ def drawn(rng: np.random.Generator, joints: bool) -> tuple[str, st.Problem, np.n
     except st.InputError:  # too few nodes
         return drawn(rng, joints)
     spectrum = st.PowerLawSpectrum(correlation_length=10.0 ** rng.uniform(-2.7, -2.0))
-    strength = problem.pressing * st.RandomField(MARGINAL, spectrum).sample(
+    strength = problem.blocks.pressure * st.RandomField(MARGINAL, spectrum).sample(
         problem.interface, seed=int(rng.integers(2**31))
     )
     machine = "machine" if stiffness else "dead load"

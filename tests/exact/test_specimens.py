@@ -20,6 +20,7 @@ from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
 from stiction.methods.equilibrium.endings import PathStatus
 from stiction.methods.equilibrium.sample import pieces_of, sample_of
 from stiction.methods.equilibrium.strength import make_sample
+from stiction.problem.sample import pressing_of
 from stiction.random.stresses import mean_in_stress, support_in_stress
 
 INF = float("inf")
@@ -358,14 +359,14 @@ def test_pressure():
     np.testing.assert_allclose(
         found.friction_coefficient, found.critical_stress / p.mean(axis=1), rtol=1e-12
     )
-    share = pressed.pressing.min(), pressed.pressing.max()
+    share = pressing_of(pressed).min(), pressing_of(pressed).max()
     assert share[0] < 0.9 < 1.0 < share[1]
     bounds = support_in_stress(pressed, drawn, "normal_pressure")
     np.testing.assert_allclose(bounds, (1.5e6 * share[0], 2.4e6 * share[1]))
     assert mean_in_stress(pressed, drawn, "strength") == pytest.approx(0.5 * 1.86e6, rel=0.01)
     each = np.array([[1e6], [3e6], [2e6]])
     rows = bare.sample({"strength": found.strength.values, "normal_pressure": each})
-    np.testing.assert_allclose(rows.normal_pressure, each * pressed.pressing)
+    np.testing.assert_allclose(rows.normal_pressure, each * pressing_of(pressed))
 
 
 def test_a_swept_rigid_machine_is_stored(tmp_path):

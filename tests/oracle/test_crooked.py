@@ -22,7 +22,7 @@ from setups import exact_onset, local_onset
 import stiction as st
 from stiction.methods.criterion.eigenfunction import weight
 from stiction.methods.criterion.windows import STRETCHES
-from stiction.problem.profiles.reading import at_nodes
+from stiction.problem.profiles.placing import at_nodes
 from stiction.theory import energy_release_rate, griffith_length
 
 BOTH = pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from recording import differences, outputs_of, read, record_of
 from specimens import crooked
 
 import stiction as st
+from stiction.ensemble import experiment
 from stiction.problem.problem import Problem
 from stiction.problem.solid import Solid
 
@@ -41,7 +42,7 @@ def moved(values, seed=8):
 
 @pytest.mark.parametrize(("file", "name"), CALLS, ids=[name for _, name in CALLS])
 def test_round_off_of_profiles_and_solids_moves_no_result(file, name, monkeypatch):
-    placed, own = Problem.placed_sample, Problem.own_sample
+    placed, own = Problem.sample, experiment.own_sample
     modulus = Solid.effective_modulus
 
     def changed(rows):
@@ -49,12 +50,10 @@ def test_round_off_of_profiles_and_solids_moves_no_result(file, name, monkeypatc
         rate = rows.weakening_rate * moved(1.0)  # a uniform rate stays uniform
         return rows._replace(weakening_rate=rate, **profiles)
 
-    def placed_sample(*given, **more):
-        rows, measured = placed(*given, **more)
-        return changed(rows), measured
-
-    monkeypatch.setattr(Problem, "placed_sample", placed_sample)
-    monkeypatch.setattr(Problem, "own_sample", lambda *given: changed(own(*given)))
+    monkeypatch.setattr(
+        Problem, "sample", lambda *given, **more: changed(placed(*given, **more))
+    )
+    monkeypatch.setattr(experiment, "own_sample", lambda *given: changed(own(*given)))
     monkeypatch.setattr(Solid, "effective_modulus", lambda *given: moved(modulus(*given)))
     call, recorded = file.calls[name], read(record_of(file.__file__))[name]
     assert differences(outputs_of(call), recorded, call.close) == []

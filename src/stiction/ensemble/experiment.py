@@ -29,7 +29,7 @@ from stiction.methods.protocol import (
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
-from stiction.problem.sample import Sample
+from stiction.problem.sample import Sample, given_twice, own_sample
 from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
@@ -61,7 +61,7 @@ class Experiment:
         random = as_random(self.random, self.seed)
         mistakes: dict[str, None] = {}  # equally likely interfaces share them
         for member in random.members:
-            mistakes |= dict.fromkeys(self.problem.given_twice(member.names, "random"))
+            mistakes |= dict.fromkeys(given_twice(self.problem, member.names, "random"))
             try:
                 check_pressure(self.problem, member)
             except InputError as error:
@@ -186,7 +186,7 @@ class Experiment:
         The resolution, and nodes that do not weaken, are checked
         before, by `check_fields`.
         """
-        return self.problem.own_sample(profiles, optional_member(self.method, "accepts"))
+        return own_sample(self.problem, profiles, optional_member(self.method, "accepts"))
 
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
         """Return profiles and results of draws."""

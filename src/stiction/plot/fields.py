@@ -29,7 +29,7 @@ from stiction.plot.style import INK, PAGE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.profiles.labels import is_coefficient
-from stiction.problem.profiles.reading import at_nodes
+from stiction.problem.profiles.placing import at_nodes
 from stiction.random.fields import RandomField
 
 MOST_LINES = 6

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import cached_property
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,26 +14,22 @@ from pydantic import model_validator
 from stiction.base.arrays import Array
 from stiction.base.errors import (
     InputError,
-    prefixed,
-    warn_accuracy,
 )
 from stiction.base.model import Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
-from stiction.base.variables import PROFILES
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.problem.friction import SCALES, Friction, contradictions
+from stiction.problem.friction import Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load
-from stiction.problem.profiles.labels import is_coefficient
-from stiction.problem.profiles.placing import turned
-from stiction.problem.profiles.reading import (
-    at_nodes,
-    check_values,
-    named_profiles,
-    placed_profiles,
-)
+from stiction.problem.profiles.placing import at_nodes, turned
 from stiction.problem.resolution import check_resolution, warn_if_short
-from stiction.problem.sample import Sample, contradictions_of
+from stiction.problem.sample import (
+    COEFFICIENTS,
+    NO_INITIAL_STRESS,
+    Sample,
+    placed_sample,
+    pressing_of,
+)
 from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks, Slider, Specimen
 
@@ -51,23 +46,6 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """Advice for a force if the area is unknown."""
-STRENGTHS = ("strength", "residual_strength")
-"""Profiles that a slider takes as friction coefficients only."""
-COEFFICIENTS = (
-    "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1"
-)
-"""Advice for strengths of a slider."""
-NO_INITIAL_STRESS = "follows from the pressing of a slider. Leave it out"
-GIVE_PRESSURE = "Give load.normal_pressure (Pa) or load.pressing_force (N)"
-
-
-REPLACED = {
-    "residual_strength": ("friction.residual_strength", "friction.residual_ratio"),
-    "initial_stress": ("load.initial_stress",),
-    "normal_pressure": ("load.normal_pressure", "load.pressing_force"),
-    **dict.fromkeys(SCALES, tuple(f"friction.{name}" for name in SCALES)),
-}
-"""Parameters that a profile, or a random property, of each name would replace."""
 
 
 @model
@@ -313,13 +291,7 @@ class Problem:
     def normal_pressure(self) -> Any:
         """Normal pressure, Pa: a number or an array at the nodes, if any."""
         pressure = self.given_pressure
-        return pressure if pressure is None else pressure * self.pressing
-
-    @property
-    def pressing(self) -> Any:
-        """Ratio of the pressure at the nodes to the given pressure: 1, or (nodes,) if glued."""
-        glued = self.specimen is not None and self.specimen.pressing == "glued"
-        return self.blocks.pressure if glued else 1.0
+        return pressure if pressure is None else pressure * pressing_of(self)
 
     @property
     def load_profile(self) -> Any:
@@ -398,160 +370,7 @@ class Problem:
         strength. An `AccuracyWarning` gives the share of such nodes. It also gives
         the share of nodes whose initial stress is below minus the strength.
         """
-        if isinstance(profiles, Sample):
-            sample = self.own_sample(self._given_sample(profiles), accept)
-        else:
-            given = named_profiles(profiles)
-            rows, mistakes = placed_profiles(given, self.interface, self.pressing)
-            problems = self.given_twice(given, "profiles") + mistakes
-            coefficients = [name for name in STRENGTHS if is_coefficient(given.get(name))]
-            if isinstance(self.specimen, Slider):
-                problems += [
-                    f"{name}: {COEFFICIENTS}"
-                    for name in STRENGTHS
-                    if name in given and name not in coefficients
-                ]
-                if "initial_stress" in given:
-                    problems.append(f"initial_stress: {NO_INITIAL_STRESS}")
-            if problems:
-                raise InputError(problems)
-            pressure = rows.get("normal_pressure", self.normal_pressure)
-            for name in coefficients:
-                rows[name] = rows[name] * pressure
-            if "friction_coefficient" in rows:
-                rows["strength"] = rows.pop("friction_coefficient") * pressure
-            sample = self._made(rows, accept)
-            if (constant := sample.strength <= sample.residual_strength).any():
-                percent = f"{100.0 * constant.mean():.2g} %"
-                warn_accuracy(
-                    f"strength is not above residual_strength at {percent} of the nodes. These do"
-                    " not weaken: their strength is constant"
-                )
-        check_resolution(self, sample.steepest_weakening_rate)
-        return sample
-
-    def constants(self, strength: Any) -> dict[str, Any]:
-        """Return, by name, values for profiles that are not given, or None without a value."""
-        return {
-            "residual_strength": self.friction.residual(strength),
-            "initial_stress": self.load.initial_stress,
-            **dict([self.friction.scale] if self.friction.scale else []),
-            "normal_pressure": self.normal_pressure,
-        }
-
-    def own_sample(self, profiles: Mapping[str, Array], accept: Collection[str] = ()) -> Sample:
-        """Return a sample from arrays by name that the package made. They are in SI units.
-
-        Only values are checked here, because some samples may not fit
-        the problem. The caller checks the resolution, and the nodes
-        that do not weaken, for all samples together.
-        """
-        problems: list[str] = []
-        for name, rows in profiles.items():
-            try:
-                with prefixed(name):
-                    check_values(name, rows, self.interface)
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError(problems)
-        return self._made(profiles, accept)
-
-    def _made(self, profiles: Mapping[str, Array], accept: Collection[str]) -> Sample:
-        """Return a sample from arrays with valid values, if they fit together.
-
-        Profiles that are not given come from the problem.
-        """
-        interface, strength = self.interface, profiles["strength"]
-        constants = self.constants(strength)
-        # A given profile replaces the value in the problem, so its
-        # scale comes first.
-        scale = next(name for name in (*profiles, *constants) if name in SCALES)
-        known = constants | dict(profiles)
-        if known["normal_pressure"] is None:
-            known["normal_pressure"] = np.nan
-        residual, initial, value, pressure = (
-            np.broadcast_to(known[name], strength.shape)
-            for name in ("residual_strength", "initial_stress", scale, "normal_pressure")
-        )
-        # Nodes beyond the extent never break.
-        barriers = ~interface.breakable
-        if interface.is_held:
-            strength = np.where(barriers, np.inf, strength)
-        overstress = "overstress" in accept
-        if problems := contradictions_of(interface, strength, residual, initial, overstress):
-            raise InputError(problems)
-        drop = strength - residual
-        if isinstance(self.specimen, Slider):
-            if np.ptp(pressure, axis=-1).any():
-                raise InputError("normal_pressure: follows from the rig. Give its mean")
-            mu, mu_r = strength / pressure, residual / pressure
-            drop = drop * self.specimen.checked_pressing(self.rig, interface.measure, mu, mu_r)
-        W = self.friction.weakening_rate_of(drop, scale, value)
-        if interface.is_held and scale != "weakening_rate":
-            # Barriers never weaken. Any finite rate will do, and here
-            # it is the fastest.
-            fastest = np.where(barriers, 0.0, W).max(interface.axes, keepdims=True)
-            W = np.where(barriers, fastest, W)
-        constant = strength <= residual
-        if constant.any():
-            # Residual from the start, tau_r = tau_p: then d_c = 0, and
-            # W is of no consequence.
-            residual = np.minimum(residual, strength)
-            slowest = np.min(
-                W, axis=interface.axes, where=~constant, initial=np.inf, keepdims=True
-            )
-            W = np.where(constant, slowest, W)
-        if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
-            warn_accuracy(
-                f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
-                " of the nodes. Reverse slip is not modelled, so these nodes are held"
-            )
-        load_profile = np.array(
-            np.broadcast_to(self.load_profile, interface.shape), dtype=float
-        )
-        return Sample(strength, residual, W, initial, load_profile, pressure, self)
-
-    def given_twice(self, names: Collection[str], owner: str) -> list[str]:
-        """Return messages about values that profiles or random properties would replace.
-
-        There are also messages about values that are given in neither
-        place. In the messages, `owner` stands before the names.
-        """
-        twice = [
-            f"problem.{key}: has no effect beside {owner}.{name}. Leave either out"
-            for name in names
-            for key in REPLACED.get(name, ())
-            if (value := attrgetter(key)(self)) is not None and np.any(value)
-        ]
-        if self.friction.scale is None and not {*SCALES} & {*names}:
-            twice.append(
-                f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
-                " on where it varies from sample to sample. Got none"
-            )
-        pressed = self.given_pressure is not None or "normal_pressure" in names
-        if "friction_coefficient" in names and not pressed:
-            twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
-        if isinstance(self.specimen, Slider) and not pressed:
-            twice.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
-        if self.specimen is not None and self.specimen.pressing == "glued" and not pressed:
-            text = "'glued' has no effect without a normal pressure"
-            twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")
-        return twice
-
-    def _given_sample(self, sample: Sample) -> dict[str, Array]:
-        """Return the profiles of a given `Sample` by name, or refuse a foreign sample."""
-        if sample.shape != self.interface.shape:
-            shapes = f"shape {sample.shape}, the interface {self.interface.shape}"
-            raise InputError(f"profiles: the sample has {shapes}")
-        alike = np.allclose(sample.load_profile, self.load_profile, rtol=1e-6)
-        if not alike or sample.problem not in (None, self):
-            raise InputError("profiles: the sample was made by another problem. Make it anew")
-        given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
-        given["strength"] = np.where(np.isinf(sample.strength), 1.0, sample.strength)
-        if np.isnan(sample.normal_pressure).all():
-            del given["normal_pressure"]
-        return given
+        return placed_sample(self, profiles, accept)
 
 
 def stress_of(problem: Problem, name: str, force: float) -> float:

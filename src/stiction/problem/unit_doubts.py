@@ -10,9 +10,8 @@ import numpy as np
 
 from stiction.base.units import Doubt, doubt_units
 from stiction.problem.problem import Problem
-from stiction.problem.profiles.reading import FRICTION
 from stiction.problem.resolution import check_resolution, warn_if_short
-from stiction.problem.sample import Sample
+from stiction.problem.sample import FRICTION, Sample
 
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a

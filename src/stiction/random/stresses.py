@@ -21,7 +21,8 @@ from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.problem.problem import COEFFICIENTS, Problem
+from stiction.problem.problem import Problem
+from stiction.problem.sample import COEFFICIENTS, constants_of, pressing_of
 from stiction.problem.specimen import Slider
 from stiction.random.fields import FACTOR, RandomInterface
 
@@ -40,7 +41,7 @@ def coefficients_of(random: RandomInterface) -> list[str]:
 
 def check_pressure(problem: Problem, random: RandomInterface) -> None:
     """Raise an `InputError` if coefficients lack a pressure, or a factor lacks its property."""
-    names, constants = coefficients_of(random), problem.constants(np.ones(()))
+    names, constants = coefficients_of(random), constants_of(problem, np.ones(()))
     forces = {"pressing_force": problem.load.pressing_force}
     for name in random.between or {}:
         value = (constants | forces).get(name)
@@ -76,11 +77,13 @@ def profiles_in_stress(
     # a random factor.
     pressure = problem.normal_pressure
     if "normal_pressure" in stresses:
-        pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * problem.pressing
+        pressure = stresses["normal_pressure"] = stresses["normal_pressure"] * pressing_of(
+            problem
+        )
     elif FACTOR + "normal_pressure" in factors:
         pressure = factors[FACTOR + "normal_pressure"] * pressure
     stresses |= {name: stresses[name] * pressure for name in coefficients_of(random)}
-    constants = problem.constants(stresses["strength"]) if factors else {}
+    constants = constants_of(problem, stresses["strength"]) if factors else {}
     for key, factor in factors.items():
         name = key.removeprefix(FACTOR)
         stresses[name] = factor * constants[name]
@@ -102,7 +105,7 @@ def support_in_stress(
         return (law.ppf(chance), law.isf(chance)) if chance else law.support()
 
     if field is None:
-        value = problem.constants(0.0)[name]
+        value = constants_of(problem, 0.0)[name]
         low, high = np.min(value), np.max(value)
     else:
         low, high = extremes(field.marginal)
@@ -110,7 +113,7 @@ def support_in_stress(
     # Rounding may put the lower end of a factor just below zero.
     factors = [np.maximum(extremes(between[key]), 0.0) for key in pressed if key in between]
     if field is not None and name == "normal_pressure":
-        factors.append((np.min(problem.pressing), np.max(problem.pressing)))
+        factors.append((np.min(pressing_of(problem)), np.max(pressing_of(problem))))
     if field is not None and field.of is not None:
         factors.append(support_in_stress(problem, random, "normal_pressure", chance))
     for factor in factors:  # factors are positive, and 0 times infinity counts as 0
@@ -129,7 +132,7 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
     if "normal_pressure" in random.names:
         field = random.properties["normal_pressure"]
         levels = _equally_likely(field.marginal, PRESSURE_QUANTILES)
-        pressure = np.multiply.outer(levels, problem.pressing)
+        pressure = np.multiply.outer(levels, pressing_of(problem))
     for key in {"normal_pressure", "pressing_force"} & {*(random.between or {})}:
         factors = _equally_likely((random.between or {})[key], PRESSURE_QUANTILES)
         pressure = np.multiply.outer(factors, pressure)

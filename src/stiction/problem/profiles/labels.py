@@ -36,7 +36,6 @@ from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
 from stiction.problem.profiles.files import HEIGHT, heights_of, load
-from stiction.problem.profiles.placing import OF_A_PLANE
 from stiction.problem.profiles.tables import Options, name_and_unit, sizes_of, table_of_frame
 
 NAMES = {
@@ -64,6 +63,11 @@ SENTINELS = np.array(
 """Numbers that instruments and formats write for a missing value."""
 UNNAMED = re.compile(r"\d+$|values?$|y\d*$")
 """Names that say nothing about a column. A column without a heading has its number as a name."""
+OF_A_PLANE = (
+    ". A map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
+    " interface of two lengths and two numbers of nodes"
+)
+"""Advice for two dimensions where a line was expected."""
 LISTED_COLUMNS = 20
 """Names of columns in a message."""
 TALL = 1e-3

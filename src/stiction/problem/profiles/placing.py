@@ -15,22 +15,20 @@ L/n, and the profile stops at its ends. The steps are:
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.errors import InputError, prefixed, warn_accuracy
+from stiction.base.model import real_array
 from stiction.problem.interface import Interface
+from stiction.problem.profiles.labels import OF_A_PLANE, is_labelled, labelled, simplified
 
 TOLERANCE = 0.02
 """Share of the spacing by which rounding in a file may move a point."""
-OF_A_PLANE = (
-    ". A map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
-    " interface of two lengths and two numbers of nodes"
-)
-"""Advice for two dimensions where a line was expected."""
 
 
 def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
@@ -159,3 +157,37 @@ def refuse_missing(values: Array, interface: Interface) -> Array:
             " RandomField.given(profile)"
         )
     return values
+
+
+def at_nodes(name: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
+    """Return the values of a quantity at the nodes. With `missing`, some may be NaN.
+
+    `name` may be a dotted key. Numbers, and arrays with a different
+    shape, are returned unchanged, because the caller checks them.
+    """
+    quantity = quantity_of(name)
+    with prefixed(name):
+        if hasattr(value, "options"):  # a `ProfileFile`
+            value = value.to_xarray(interface)
+        value = simplified(value, quantity)
+        if is_labelled(value):
+            array = labelled(value, quantity, interface.dims)
+            if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # a value for each sample
+                if quantity == "strength":
+                    raise InputError(
+                        "has no dimension along the interface. Name this dimension 'x'"
+                    )
+                return array.values[:, np.newaxis]
+            array = place(array, interface)
+            return array if missing else refuse_missing(array, interface)
+        with suppress(TypeError):  # values that are no numbers are refused with other mistakes
+            array = real_array(value)
+            if array.shape[-len(interface.shape) :] == interface.shape:
+                return array if missing else refuse_missing(array, interface)
+    return value
+
+
+def quantity_of(key: str) -> str:
+    """Return the quantity that the parameter with this name or dotted key holds."""
+    field = key.rsplit(".", 1)[-1]
+    return "load_profile" if field == "profile" else field

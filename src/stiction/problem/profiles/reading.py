@@ -15,7 +15,6 @@ these steps. `at_nodes` takes steps 1 and 3:
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -29,34 +28,24 @@ from stiction.base.model import (
     as_numbers,
     check,
     checked,
-    real_array,
 )
-from stiction.base.variables import PROFILES, QUANTITIES
-from stiction.problem.friction import SCALES
+from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.profiles.labels import (
+    OF_A_PLANE,
     Column,
     check_positive,
-    is_coefficient,
-    is_labelled,
     labelled,
-    simplified,
 )
 from stiction.problem.profiles.placing import (
-    OF_A_PLANE,
     place,
+    quantity_of,
     refuse_missing,
-    turned,
 )
 from stiction.problem.profiles.tables import Options
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FRICTION = (1e-3, 10.0), (1e-4, 100.0)
-"""Usual and possible mean strengths over normal pressure, from superlubricity to adhesive gels."""
-LARGEST = 1e100
-"""Of a profile, in SI units; sums and products of larger numbers overflow."""
 
 Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
@@ -221,35 +210,7 @@ def _in_order(array: Any) -> Any:
     return array.sortby([dim for dim in array.dims if dim in array.coords])
 
 
-# -- profiles as arguments and in study files ----------------------------------------------------
-
-
-def at_nodes(name: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
-    """Return the values of a quantity at the nodes. With `missing`, some may be NaN.
-
-    `name` may be a dotted key. Numbers, and arrays with a different
-    shape, are returned unchanged, because the caller checks them.
-    """
-    quantity = quantity_of(name)
-    with prefixed(name):
-        if isinstance(value, ProfileFile):
-            value = value.to_xarray(interface)
-        value = simplified(value, quantity)
-        if is_labelled(value):
-            array = labelled(value, quantity, interface.dims)
-            if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # a value for each sample
-                if quantity == "strength":
-                    raise InputError(
-                        "has no dimension along the interface. Name this dimension 'x'"
-                    )
-                return array.values[:, np.newaxis]
-            array = place(array, interface)
-            return array if missing else refuse_missing(array, interface)
-        with suppress(TypeError):  # values that are no numbers are refused with other mistakes
-            array = real_array(value)
-            if array.shape[-len(interface.shape) :] == interface.shape:
-                return array if missing else refuse_missing(array, interface)
-    return value
+# -- profiles in study files -----------------------------------------------------------------------
 
 
 class ProfileFile(NamedTuple):
@@ -273,127 +234,3 @@ def profile_in_file(given: Any, field: str, folder: Path) -> Any:
     if reserved:
         raise InputError(f"{reserved[0]}: is not an option in a study file")
     return ProfileFile(path, table | {"quantity": quantity_of(field)})
-
-
-def quantity_of(key: str) -> str:
-    """Return the quantity that the parameter with this name or dotted key holds."""
-    field = key.rsplit(".", 1)[-1]
-    return "load_profile" if field == "profile" else field
-
-
-# -- profiles of samples -------------------------------------------------------------------------
-
-
-def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name, from a mapping, a dataset or the strength alone.
-
-    The strength may consist of friction coefficients. Their name or
-    their unit shows this.
-    """
-    if hasattr(given, "marginal") or hasattr(given, "members"):
-        raise InputError(
-            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
-            " or call st.monte_carlo"
-        )
-    if not isinstance(given, Mapping):  # a Dataset is one too
-        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
-    known = (*PROFILES, "friction_coefficient")
-    unknown = [
-        unknown_name("profiles", str(name), known) for name in given if name not in known
-    ]
-    if "strength" in given and "friction_coefficient" in given:
-        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
-    if unknown and not hasattr(given, "data_vars"):
-        raise InputError(unknown)
-    profiles = {name: given[name] for name in given if name in known}
-    if is_coefficient(profiles.get("strength")):
-        profiles["friction_coefficient"] = profiles.pop("strength")
-    return profiles
-
-
-def placed_profiles(
-    given: Mapping[str, Any], interface: Interface, pressing: Any
-) -> tuple[dict[str, Array], list[str]]:
-    """Return users' profiles by name as (samples, *shape), and the mistakes in them.
-
-    A profile with a mistake is missing in the result. A pressure
-    without values along the interface is a mean, which is multiplied by
-    `pressing`.
-    """
-    first = "strength" if "strength" in given else "friction_coefficient"
-    if first not in given:
-        raise InputError("strength: missing among the profiles")
-    rows: dict[str, Array] = {}
-    scales = [name for name in SCALES if name in given]
-    problems = [f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}"] * (
-        len(scales) > 1
-    )
-    samples = None
-    for name in (first, *(name for name in given if name != first)):
-        try:
-            of_friction = name == "residual_strength" and is_coefficient(given[name])
-            quantity = "friction_coefficient" if of_friction else name
-            value = at_nodes(quantity, given[name], interface)
-            with prefixed(name):
-                rows[name] = rows_of(quantity, value, interface, samples)
-            if name == "normal_pressure" and np.shape(value) in ((), (samples, 1)):
-                rows[name] = rows[name] * pressing
-        except InputError as error:
-            problems += error.problems
-        if name == first:
-            samples = len(rows[first]) if first in rows else 1
-    return rows, problems
-
-
-def rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
-    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
-
-    A single profile (*shape) counts as one sample. If `samples` is
-    given, a number, a profile, or one number per sample with shape
-    (samples, 1) is broadcast to (samples, *shape).
-    """
-    shape, array = interface.shape, as_numbers(value)
-    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
-    if samples is None:
-        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
-    else:
-        valid += f", ({samples}, 1) or a number"
-        column = (samples, *(1 for _ in shape))
-        array = array.reshape(column) if array.shape == (samples, 1) else array
-        fits = array.shape in ((), shape, column, (samples, *shape))
-    if not fits:
-        hint = turned(array.shape[-2:], shape)
-        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    check_values(name, array, interface)
-    if samples is None:
-        return array.reshape(-1, *shape)
-    return np.broadcast_to(array, (samples, *shape))
-
-
-def check_values(name: str, array: Array, interface: Interface) -> None:
-    """Raise an `InputError` if a value is impossible for the profile with this name.
-
-    `array` is a number, a profile or rows of profiles.
-    """
-    least, greatest = array.min(), array.max()
-    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
-        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
-        given = f"{array[entry]:g} (at most {LARGEST:g})"
-        if name == "strength" and array[entry] == np.inf:
-            given += ". Give interface.extent, beyond which nothing breaks, instead"
-        raise InputError(f"must be finite. Entry {entry} is {given}")
-    given = f"{least:g} {QUANTITIES[name].units}"
-    if name in SCALES and least <= 0.0:
-        raise InputError(f"must be positive, got {given}")
-    if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
-        raise InputError(
-            f"its mean is {array.mean():.3g}; if that is a strength, state its unit, as"
-            " .assign_attrs(units='Pa') does"
-        )
-    if name == "residual_strength" and least < 0.0:
-        raise InputError(f"must not be negative, got {given}")
-    if name == "normal_pressure":
-        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
-        if means.min() <= 0.0:
-            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
-            raise InputError(f"must be positive on average, but {worst}")
