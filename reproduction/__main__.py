@@ -102,12 +102,12 @@ def _drawn(data, chosen: int | None) -> list[int]:
 
 def _draw(data, number: int, folder: Path) -> Path:
     """Draw a figure as soon as its studies are done, and return its file."""
-    import stiction as st
     from reproduction.figures import beyond, common, paper
+    from stiction.plot.style import paper_style
 
     folder.mkdir(parents=True, exist_ok=True)
     module = paper if number <= 7 else beyond
-    with st.plot.paper_style():
+    with paper_style():
         figure = getattr(module, f"figure_{number}")(data)
         common.label(figure, FIGURES[str(number)]["panels"])
         path = folder / f"figure_{number:02}.png"

@@ -132,7 +132,7 @@ class Runner:
     def study(self, name: str, study: st.Study) -> xr.Dataset:
         """Run a study into its folder, or what is missing of it."""
         plain = study.to_dict()
-        plain["ensemble"] = {k: v for k, v in plain["ensemble"].items() if k != "samples"}
+        del plain["samples"]
         plain.pop("title", None)
         place = self.folder / f"{name}-{_digest(plain)}"
         with self.locks[place]:
@@ -142,9 +142,11 @@ class Runner:
         """Run one study at each xi_0/h_n, with draws of its own, along 'correlation_ratio'."""
         parts = []
         for ratio in ratios:
-            ensemble = st.Ensemble(samples=samples, seed=self.seed_of(ratio))
             random = field_of(ratio)
-            study = st.Study(problem=problem, random=random, method=method, ensemble=ensemble)
+            study = st.Study(
+                problem=problem, random=random, method=method, samples=samples,
+                seed=self.seed_of(ratio),
+            )  # fmt: skip
             parts.append(self.study(f"{name}-{ratio:g}", study))
         return along("correlation_ratio", ratios, parts)
 

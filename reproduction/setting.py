@@ -28,7 +28,7 @@ def _study(plane: str | None = None) -> st.Study:
     random = st.paper.strength(problem)
     unscaled = random.spectrum.correlation_length
     study = st.Study(problem=problem, random=random, method=st.LocalCriterion(),
-                     ensemble=st.Ensemble(samples=1))  # fmt: skip
+                     samples=1)  # fmt: skip
     plain = study.to_dict()
     valid = ("problem", "random", *OWN_KEYS)
     if unknown := [key for key in PARAMETERS if key not in valid]:

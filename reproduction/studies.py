@@ -189,7 +189,8 @@ def trend(run: Runner) -> xr.Dataset:
         problem=PROBLEM,
         random=strength(1.0),
         method=LOCAL,
-        ensemble=st.Ensemble(samples=run.size.trend, seed=run.seed),
+        samples=run.size.trend,
+        seed=run.seed,
         sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
     )
     result = run.study("trend", study).rename(correlation_length="ratio")
@@ -374,7 +375,7 @@ def driving(run: Runner) -> xr.Dataset:
         energy = setting.MARGINAL.distribution.expect(lambda s, r=residual: (s - r) ** 2)
         study = st.Study(problem=problem, random=strength(setting.SECOND),
                          method=st.Equilibrium(events=12),
-                         ensemble=st.Ensemble(samples=count, seed=run.seed))  # fmt: skip
+                         samples=count, seed=run.seed)  # fmt: skip
         events = run.study(f"driving-{case}", study)[["event_length", "event_stress"]]
         stress = events["event_stress"].values
         griffith = np.full(stress.shape, np.nan)
@@ -423,8 +424,7 @@ def what_if(run: Runner, name: str, suffix: str) -> xr.Dataset:
     most = run.size.trend if study.method == LOCAL else run.size.what_if
     if suffix:
         study, most = dataclasses.replace(study, method=RUPTURE), run.size.arrests
-    ensemble = st.Ensemble(samples=min(most, study.ensemble.samples), seed=run.seed)
-    changed = dataclasses.replace(study, ensemble=ensemble)
+    changed = dataclasses.replace(study, samples=min(most, study.samples), seed=run.seed)
     result = run.study(name + suffix, changed)
     swept = [dim for dim in result["critical_stress"].dims if dim != "sample"]
     numbered = result.drop_vars([name for name in result.coords if name != "sample"])

@@ -30,7 +30,8 @@ def small_study(
             }
         },
         "method": {"type": "local_criterion"},
-        "ensemble": {"samples": 30, "seed": 3},
+        "samples": 30,
+        "seed": 3,
     }  # fmt: skip
     return plain | tables
 

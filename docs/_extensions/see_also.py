@@ -19,7 +19,7 @@ ROWS = """
     statistics.density statistics.quantiles
     theory.nucleation_stress theory.nucleation_statistics
     theory.griffith_length theory.energy_release_rate
-    Study Ensemble open_run monte_carlo
+    Study open_run monte_carlo
 """
 _RELATED = [[f"stiction.{name}" for name in row.split()] for row in ROWS.splitlines()]
 

@@ -10,7 +10,6 @@ from stiction.base.errors import AccuracyWarning as AccuracyWarning
 from stiction.base.errors import InputError as InputError
 from stiction.base.errors import RunError as RunError
 from stiction.base.errors import UnitWarning as UnitWarning
-from stiction.ensemble.experiment import Ensemble as Ensemble
 from stiction.ensemble.monte_carlo import monte_carlo as monte_carlo
 from stiction.inference.curves import read_curve as read_curve
 from stiction.inference.design import design_of_tests as design_of_tests

@@ -1,6 +1,6 @@
 """Functions for external programs: samplers, reliability codes, tables, the SCEC comparison."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,36 @@ def __dir__() -> list[str]:  # what completion lists
     return __all__
 
 
+@dataclass(frozen=True, eq=False)
+class Simulator:
+    """Simulated peaks as a function of parameters. See `stiction.external.simulator`."""
+
+    problem: Problem
+    random: RandomInterface
+    parameters: tuple[str, ...]
+    method: Any
+    samples: int
+    seed: int
+    load_cell_error: float
+
+    def __call__(self, theta: Any, *, first: int = 0) -> Array:
+        """Return the peaks (samples,), Pa, of samples first, first + 1, ... at theta."""
+        first = check("first", first, Number)
+        values = check("theta", theta, RealArray)
+        if values.shape != (len(self.parameters),) or not np.isfinite(values).all():
+            raise InputError(
+                f"theta: must be {len(self.parameters)} finite numbers,"
+                f" {', '.join(self.parameters)}, got {describe(theta)}"
+            )
+        at_values = with_parameters(self.problem, self.random, self.parameters, values)
+        (peaks,) = simulate(
+            [Experiment(*at_values, self.method)],
+            Simulation(self.method, self.samples, self.seed), first, "critical_stress",
+        )  # fmt: skip
+        errors = np.random.default_rng([self.seed, first, 1]).standard_normal(self.samples)
+        return peaks + self.load_cell_error * errors
+
+
 @checked
 def simulator(
     problem: Problem,
@@ -44,7 +74,7 @@ def simulator(
     samples: Count,
     seed: Number = 0,
     load_cell_error: NotNegative = 0.0,
-) -> Callable[..., Array]:
+) -> Simulator:
     """Return a function that simulates the peaks of repeated tests, for dynesty or sbi.
 
     Parameters
@@ -61,7 +91,8 @@ def simulator(
 
     Returns
     -------
-    callable
+    Simulator
+        A callable that can be pickled for other processes.
         ``simulate(theta)`` returns an array (samples,) of
         peaks, Pa, for an array theta with a number for each
         parameter. ``simulate(theta, first=k)`` returns the
@@ -98,21 +129,6 @@ def simulator(
     if unknown:
         raise InputError(unknown)
 
-    def simulated(theta: Any, *, first: int = 0) -> Array:
-        """Return the peaks (samples,), Pa, of samples first, first + 1, ... at theta."""
-        first = check("first", first, Number)
-        values = check("theta", theta, RealArray)
-        if values.shape != (len(parameters),) or not np.isfinite(values).all():
-            raise InputError(
-                f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
-                f" {describe(theta)}"
-            )
-        at_values = with_parameters(problem, interface, parameters, values)
-        (peaks,) = simulate(
-            [Experiment(*at_values, method)], Simulation(method, samples, seed), first,
-            "critical_stress",
-        )  # fmt: skip
-        errors = np.random.default_rng([seed, first, 1]).standard_normal(samples)
-        return peaks + load_cell_error * errors
-
-    return simulated
+    return Simulator(
+        problem, interface, tuple(parameters), method, samples, seed, load_cell_error
+    )

@@ -378,7 +378,7 @@ def test_a_swept_rigid_machine_is_stored(tmp_path):
         problem=problem,
         random=st.RandomField(st.Lognormal(mean=1.0e6, cv=0.2), st.PowerLawSpectrum(9e-3)),
         method=EXACT,
-        ensemble=st.Ensemble(samples=2),
+        samples=2,
         sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
     )
     assert study.to_dict()["problem"]["specimen"]["quality_factor"] == "inf"

@@ -26,7 +26,9 @@ METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
 STUDY = st.Study.from_dict(
     small_study(
         nodes=64,
-        ensemble={"samples": 40, "seed": 3, "keep": ["strength"]},
+        samples=40,
+        seed=3,
+        keep=["strength"],
         sweep=[lengths(8e-3, 12e-3)[0] | {"method": METHODS}],
     )
 )

@@ -24,7 +24,9 @@ from stiction.study.study import Study
 PLAIN = small_study(
     weakening_rate=0.1e12,
     correlation_length=0.02,
-    ensemble={"samples": 20, "seed": 11, "first": 0},
+    samples=20,
+    seed=11,
+    first=0,
     sweep=[*lengths(0.02, 0.03), {"problem.interface.length": [0.1, 0.2]}],
 )
 PLAIN["problem"]["load"] = {"profile": 1.0, "initial_stress": 0.0, "normal_pressure": 5e6}
@@ -88,7 +90,7 @@ def use(path: Path) -> None:
     point = study.experiments[0]
     interface = point.problem.interface
     if max(interface.size, point.dimension) <= 2**15:
-        point.results(study.ensemble.first, 1)
+        point.results(study.first, 1)
 
 
 def test_mutated_studies_are_refused_or_right(tmp_path, fuzz):

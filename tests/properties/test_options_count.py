@@ -196,7 +196,7 @@ def test_a_law_without_a_scale_takes_it_from_profiles_only():
 def test_no_dimension_of_a_sweep_is_a_keyword_of_sel():
     problem = make_problem(128, 0.05)
     study = st.Study(
-        problem=problem, random=FIELD, method=LOCAL, ensemble=st.Ensemble(samples=4),
+        problem=problem, random=FIELD, method=LOCAL, samples=4,
         sweep=[{"method": [LOCAL, EXACT]}],
     )  # fmt: skip
     stress = study.run(progress=False).critical_stress

@@ -87,7 +87,7 @@ def test_a_plot_reads_units_and_directions_like_a_call():
 
 
 def test_a_plot_refuses_what_it_cannot_draw():
-    for name in {*st.plot.__all__} - {"paper_style", "field", "film", "onset"}:
+    for name in {*st.plot.__all__} - {"field", "film", "onset"}:
         for wrong in (3, "result", None, [3]):
             with pytest.raises(st.InputError):
                 getattr(st.plot, name)(wrong)

@@ -101,7 +101,7 @@ def scanned(values, places=(0.01, 0.02), units="Pa", x_units="m"):
 
 
 def study(**options):
-    given = {"method": LOCAL, "ensemble": st.Ensemble(samples=2)} | options
+    given = {"method": LOCAL, "samples": 2} | options
     return st.Study(problem=PROBLEM, random=FIELD, **given)
 
 
@@ -109,7 +109,7 @@ def gathered(share):
     """Two points, the kept profiles of each of which take a share of the memory of the machine."""
     there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     kept = Experiment(PROBLEM, FIELD, LOCAL, keep=("strength",))
-    return Gathered([kept, kept], st.Ensemble(samples=share * there // (8 * 256)))
+    return Gathered([kept, kept], share * there // (8 * 256))
 
 
 def scaled(modulus=1e9, density=1170.0, length=0.1, pressure=None, **weakening):

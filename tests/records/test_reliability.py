@@ -1,6 +1,7 @@
 """Recorded outputs: failure probabilities, design stresses, curves, and lists of interfaces."""
 
 import dataclasses
+import pickle
 from functools import partial
 
 import numpy as np
@@ -214,6 +215,7 @@ def limit_state_and_simulator():
         ("correlation_length", "marginal.low"),
     )
     by = st.external.simulator(LINE, field, names, method=LOCAL, samples=3, seed=2)
+    by = pickle.loads(pickle.dumps(by))  # for the processes of a sampler
     return {
         "written": repr(state),
         "dimension": state.dimension,

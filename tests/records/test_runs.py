@@ -28,7 +28,8 @@ SAME = "the same numbers by st.monte_carlo, tests/user/test_study.py"
 small = partial(small_study, 96, 0.047)
 SWEPT = small(
     0.31e12,
-    ensemble={"samples": 9, "seed": 11},
+    samples=9,
+    seed=11,
     sweep=[
         *lengths(2.2e-3, 5.1e-3),
         {
@@ -110,7 +111,7 @@ def commands_of_a_sweep():
 @calls("events by st.onset of the same samples")
 def commands_of_a_specimen():
     method, some = {"type": "equilibrium", "events": 1}, {"samples": 6, "seed": 2}
-    plain = small_study(64, 0.083, 0.19e12, 6e-3, method=method, ensemble=some)
+    plain = small_study(64, 0.083, 0.19e12, 6e-3, method=method, **some)
     plain["problem"]["specimen"] = {"height": 0.031, "thickness": 0.0071, "drive": PUSHER}
     plain["problem"]["load"] = {"normal_pressure": 2.1e6}
     plain["problem"]["friction"]["residual_strength"] = 3.1e5
@@ -121,7 +122,7 @@ def commands_of_a_specimen():
 def commands_of_a_plane():
     method = {"type": "equilibrium", "slip": True}
     some = {"samples": 3, "seed": 2, "keep": ["strength"]}
-    plain = small_study([24, 20], [0.023, 0.0164], 0.28e12, method=method, ensemble=some)
+    plain = small_study([24, 20], [0.023, 0.0164], 0.28e12, method=method, **some)
     plain["random"]["strength"]["anisotropy"] = 1.4
     plain["problem"]["load"] = {"normal_pressure": 2.7e6}
     lines = ("check study.toml", RUN, "status run", "export run all.csv", "report run")
@@ -152,11 +153,11 @@ def answers_of_commands():
 def mistakes_of_commands():
     """And two points of a sweep that have one label."""
     twice = {"problem.interface.nodes": [96, 96], "random.strength.marginal.alpha": [1.5, 3.0]}
-    plain = small(ensemble={"samples": 12}, sweep=[twice])
+    plain = small(samples=12, sweep=[twice])
     with beside(plain):
         found = {"twice": command("run study.toml --out run --no-pilot")}
         changed = plain["problem"] | {"friction": {"critical_slip": 3e-6}}
-        other = plain | {"ensemble": {"samples": 12, "seed": 4}, "problem": changed}
+        other = plain | {"samples": 12, "seed": 4, "problem": changed}
         Path("other.toml").write_text(tomli_w.dumps(other))
         for line in """run missing.toml --out run
 run study.toml --out run --part 3/2
@@ -181,7 +182,7 @@ def a_run_with_failures():
             raise FloatingPointError("not finite")
         return original(self, first, count)
 
-    plain = small(ensemble={"samples": 12, "seed": 4}, sweep=lengths(2.2e-3, 5.1e-3))
+    plain = small(samples=12, seed=4, sweep=lengths(2.2e-3, 5.1e-3))
     lines = [RUN, "status run", "check study.toml"]
     with mock.patch.object(Experiment, "results", results):
         lines += ["report run", "export run all.csv --partial"]
@@ -190,7 +191,7 @@ def a_run_with_failures():
 
 @calls("counted: a third of the samples, and what is left of them")
 def a_run_in_parts():
-    plain = small(ensemble={"samples": 31, "seed": 5, "first": 2})
+    plain = small(samples=31, seed=5, first=2)
     seen = []
 
     def show(done, total):

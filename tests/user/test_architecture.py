@@ -113,7 +113,7 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     field = st.paper.strength(problem, correlation_ratio=2.0)
     study = st.Study(
         problem=problem, random=dataclasses.replace(field, marginal=Unregistered()),
-        method=st.LocalCriterion(), ensemble=st.Ensemble(samples=2),
+        method=st.LocalCriterion(), samples=2,
     )  # fmt: skip
     words = "Unregistered is a class of your own that study files cannot name"
     assert words in study.run(progress=False).attrs["study_incomplete"]

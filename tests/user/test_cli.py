@@ -28,7 +28,8 @@ from stiction.study import run as runs_on_disk
 STUDY = small_study(
     title="a small sweep",
     nodes=256,  # 16 in a nucleation length
-    ensemble={"samples": 100, "seed": 3},
+    samples=100,
+    seed=3,
     sweep=lengths(4e-3, 6e-3, 8e-3),
 )
 STUDY["problem"]["load"] = {"normal_pressure": 5e6}

@@ -129,7 +129,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
 
 def make(**tables):
     return st.Study(
-        problem=PROBLEM, method=GIVEN["method"], ensemble=st.Ensemble(samples=1),
+        problem=PROBLEM, method=GIVEN["method"], samples=1,
         reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
     )  # fmt: skip
 

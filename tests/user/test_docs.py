@@ -218,7 +218,7 @@ def test_study_files_and_tables_of_them():
     whole = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
     whole["method"] = {"type": "equilibrium"}  # the one that can keep slip and sensitivity
     for table in parsed:
-        if {"random", "sweep", "ensemble"} & table.keys():
+        if {"random", "sweep", "samples"} & table.keys():
             st.Study.from_dict(whole | table)
 
 

@@ -168,7 +168,7 @@ def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs)
             b"[tool.poetry]\n",
             "`stiction example FILE` writes a study to start from",
         ),
-        "case.toml": (study.replace("[ensemble]", "[Ensemble]").encode(), "mean 'ensemble'"),
+        "case.toml": (study.replace("[method]", "[Method]").encode(), "mean 'method'"),
     }
     for name, (content, words) in contents.items():
         (inside / name).write_bytes(content)

@@ -23,7 +23,9 @@ from stiction.ensemble.experiment import Experiment
 from stiction.study.run import samples_of_part
 
 STUDY = small_study(
-    ensemble={"samples": 120, "seed": 3, "keep": ["strength"]},
+    samples=120,
+    seed=3,
+    keep=["strength"],
     sweep=[*lengths(4e-3, 6e-3), {"problem.solid.poisson_ratio": [0.25, 0.33]}],
 )
 ALL = 4 * 120
@@ -51,7 +53,7 @@ class Forbidding(Executor):
 
 def make_study(samples=120, **changes):
     study = copy.deepcopy(STUDY)
-    study["ensemble"]["samples"] = samples
+    study["samples"] = samples
     return st.Study.from_dict(study | changes)
 
 
@@ -87,7 +89,7 @@ def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
     assert sum(span.samples for span in counting.spans) == 4 * 40
     assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
     fewer = make_study(samples=80)
-    words = "ensemble.samples: 80 here, 120 there"
+    words = "samples: 80 here, 120 there"
     refuses(words, lambda: fewer.run(out=tmp_path / "run"))
 
 
@@ -157,7 +159,7 @@ def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
     whole = batches.solve_span(point, batches.Span(0, 5, 5))
     failures = tuple(batches.Failure(0, sample, 0, "lost") for sample in (7, 8))
     for rows, lost in ((whole.rows, []), (np.delete(whole.rows, 2), [7])):
-        gathered = Gathered([point], st.Ensemble(samples=3, first=5))
+        gathered = Gathered([point], 3, 5)
         gathered.add(whole._replace(rows=rows, failures=failures))
         assert [one.sample for one in gathered.failed] == lost
         found = gathered.dataset({})

@@ -41,7 +41,8 @@ def test_python_and_toml_and_result_are_the_same_study(tmp_path):
         problem=make_problem(128, weakening_rate=0.25e12),
         random=beta_strength(4e-3),
         method=LOCAL,
-        ensemble=st.Ensemble(samples=30, seed=3),
+        samples=30,
+        seed=3,
     )
     assert study == loaded(title="a study")
     study.to_toml(tmp_path / "study.toml")
@@ -55,7 +56,7 @@ def test_python_and_toml_and_result_are_the_same_study(tmp_path):
         assert read.attrs["stiction_version"] == st.__version__
         assert read.attrs["seed"] == 3
         assert read.attrs["title"] == "a study"
-        assert json.loads(read.attrs["study"])["ensemble"]["samples"] == 30
+        assert json.loads(read.attrs["study"])["samples"] == 30
         for variable in read.variables.values():
             assert {"units", "long_name"} <= set(variable.attrs)
 
@@ -106,7 +107,7 @@ def test_a_function_cannot_be_written_down(tmp_path):
 
 def test_every_point_is_the_study_with_its_values():
     study = swept(
-        {LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]}, ensemble__samples=8
+        {LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]}, samples=8
     )
     result = study.run()
     assert result["critical_stress"].dims == ("correlation_length", "poisson_ratio", "sample")
@@ -114,7 +115,7 @@ def test_every_point_is_the_study_with_its_values():
     assert result["correlation_length"].attrs == {"units": "m", "long_name": LENGTH}
     for point in study.points:
         values = {name.replace(".", "__"): value for name, value in point.values.items()}
-        alone = loaded(**values, ensemble__samples=8).run()
+        alone = loaded(**values, samples=8).run()
         part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
         for name in alone.data_vars:
             np.testing.assert_array_equal(part[name], alone[name])
@@ -191,7 +192,7 @@ def test_a_correlation_coefficient_is_swept():
     residual = field | {"marginal": LOGNORMAL | {"scale": 1e5}}
     kept = {"samples": 2, "keep": ["strength", "residual_strength"]}
     key = "random.correlation.strength.residual_strength"
-    given = {"random__residual_strength": residual, "ensemble": kept}
+    given = {"random__residual_strength": residual, **kept}
     result = swept({key: [-1.0, 0.0, 1.0]}, **given).run()
     rho = result["random_correlation_strength_residual_strength"]
     assert rho.attrs == {"units": "1", "long_name": key}
@@ -240,7 +241,7 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
     assert np.array_equal(result.critical_stress, called.critical_stress)
     assert st.Study.from_result(result) == read == st.open_run(tmp_path / "run").study
     sweep = [{"random.strength.given.noise": [5e3, 20e3]}]
-    found = loaded(tmp_path, **options, ensemble={"samples": 3}, sweep=sweep).run()
+    found = loaded(tmp_path, **options, samples=3, sweep=sweep).run()
     assert found.critical_stress.sizes == {"noise": 2, "sample": 3}
 
 
@@ -255,9 +256,9 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
             "method: 20,000 evaluations",
         ),
         (
-            "problem.load.normal_pressure",
+            "problem.load",
             {"friction_coefficient": 0.4},
-            0.0,
+            {},
             "needs a normal pressure",
         ),
     ],

@@ -89,9 +89,7 @@ def test_samples_are_counted_over_those_without_the_doubt_too():
     assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
 
 
-changed = partial(
-    altered, small_study(64, correlation_length=9e-3, ensemble={"samples": 6, "seed": 3})
-)
+changed = partial(altered, small_study(64, correlation_length=9e-3, samples=6, seed=3))
 
 
 DOUBTED = {

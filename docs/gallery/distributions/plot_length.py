@@ -12,7 +12,7 @@ study = st.Study(
     problem=problem,
     random=st.paper.strength(problem),
     method=st.LocalCriterion(),
-    ensemble=st.Ensemble(samples=2000, seed=0),
+    samples=2000, seed=0,
     sweep=[
         {
             "problem.interface.length": [0.05, 0.1, 0.2, 0.4],

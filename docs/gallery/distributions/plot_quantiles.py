@@ -14,7 +14,7 @@ study = st.Study(
     problem=problem,
     random=dataclasses.replace(st.paper.strength(problem), mean_mode=True),
     method=st.Equilibrium(),
-    ensemble=st.Ensemble(samples=500, seed=0),
+    samples=500, seed=0,
     sweep=[{"random.strength.spectrum.correlation_length": [1e-3, 2e-3, 4e-3, 8e-3]}],
 )
 st.plot.quantiles(study.run(progress=False))

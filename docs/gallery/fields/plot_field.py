@@ -12,8 +12,7 @@ import stiction as st
 
 plain = st.paper.problem(nodes=1024)
 problem = st.Problem(plain.solid, plain.interface, plain.friction, st.Load(normal_pressure=5e6))
-with st.plot.paper_style():
-    figure, panels = plt.subplots(2, 1, figsize=(6.75, 4), sharex=True)
+figure, panels = plt.subplots(2, 1, figsize=(6.75, 4), sharex=True, layout="constrained")
 for axes, ratio in zip(panels, (0.25, 2.0), strict=True):
     strength = st.paper.strength(problem, correlation_ratio=ratio)
     tau_p = strength.sample(problem.interface, seed=3)

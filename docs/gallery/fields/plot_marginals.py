@@ -12,8 +12,7 @@ import stiction as st
 problem = st.paper.problem(nodes=1024)
 spectrum = st.PowerLawSpectrum(4e-3)
 families = (st.Lognormal, st.Weibull, st.Gamma, st.TruncatedNormal)
-with st.plot.paper_style():
-    figure, panels = plt.subplots(4, 1, figsize=(6.75, 7), sharex=True, sharey=True)
+figure, panels = plt.subplots(4, 1, figsize=(6.75, 7), sharex=True, sharey=True, layout="constrained")
 for axes, family in zip(panels, families, strict=True):
     tau_p = st.RandomField(family(mean=1e6, cv=0.35), spectrum).sample(
         problem.interface, seed=1

@@ -16,8 +16,7 @@ spectra = {
     "power law, exponent 2": st.PowerLawSpectrum(2e-3, exponent=2.0).with_efolding_length(2e-3),
     "exponential": st.ExponentialSpectrum(2e-3),
 }
-with st.plot.paper_style():
-    figure, panels = plt.subplots(3, 1, figsize=(6.75, 6), sharex=True)
+figure, panels = plt.subplots(3, 1, figsize=(6.75, 6), sharex=True, layout="constrained")
 for axes, (name, spectrum) in zip(panels, spectra.items(), strict=True):
     tau_p = st.RandomField(marginal, spectrum).sample(problem.interface, seed=1)
     st.plot.field(problem, tau_p, ax=axes)

@@ -308,10 +308,10 @@ def description(study: Any) -> dict[str, str]:
 
     from stiction.ensemble.dataset import distinct
 
-    points, ensemble = study.experiments, study.ensemble
-    samples = f"{ensemble.samples} (seed {ensemble.seed})"
+    points = study.experiments
+    samples = f"{study.samples} (seed {study.seed})"
     if study.sweep:
-        samples += f" at each of {len(points)} points: {len(points) * ensemble.samples} in all"
+        samples += f" at each of {len(points)} points: {len(points) * study.samples} in all"
     different = distinct(points, "problem", "random", "method")
     methods = ", ".join(dict.fromkeys(point.method.label for point in different))
     lines = {"method": methods, "samples": samples}
@@ -349,7 +349,7 @@ def _cost(study: Any) -> dict[str, str]:
     """Return the approximate computing time for a study, and the size of its result."""
     from stiction.ensemble.batches import usable_cores
 
-    points, samples, cores = study.experiments, study.ensemble.samples, usable_cores()
+    points, samples, cores = study.experiments, study.samples, usable_cores()
     costs = [point.seconds for point in points]
     seconds, size = sum(costs) * samples, sum(point.sample_bytes for point in points) * samples
     ends = " to ".join(dict.fromkeys((duration(min(costs)), duration(max(costs)))))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stiction.base.model import check_memory, describe
 from stiction.base.variables import DIRECTION, SAMPLE, Variable
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table
-from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.experiment import Experiment
 from stiction.problem.results import to_dataset
 
 if TYPE_CHECKING:
@@ -70,14 +70,15 @@ class Gathered:
     def __init__(
         self,
         points: Sequence[Experiment],
-        ensemble: Ensemble,
+        samples: int,
+        first: int = 0,
         only: Sequence[str] | None = None,
     ) -> None:
         if only is None:
             largest = max(point.sample_bytes for point in distinct(points, "problem", "method"))
-            check_memory("samples", largest * len(points) * ensemble.samples)
-        self.points, self.first, self._only = points, ensemble.first, only
-        self.done = np.zeros((len(points), ensemble.samples), dtype=np.bool_)
+            check_memory("samples", largest * len(points) * samples)
+        self.points, self.first, self._only = points, first, only
+        self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN without a value
         self._types: dict[str, np.dtype[Any]] = {}
@@ -105,7 +106,7 @@ class Gathered:
 
     def add(self, table: Table) -> None:
         """Put the rows of a table in their places. Ignore other samples."""
-        # The folder of a run may hold more samples than this ensemble.
+        # The folder of a run may hold more samples than are gathered.
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure

@@ -8,14 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain, pairwise
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
-from stiction.base.model import Count, Names, Number, model
 from stiction.base.variables import PROFILES, Variable
 from stiction.methods.protocol import (
     Solver,
@@ -221,33 +219,3 @@ class Experiment:
 
 
 _solver = lru_cache(maxsize=8)(prepared)
-
-
-@model(kw_only=True)
-class Ensemble:
-    """The number of samples, the seed, and the profiles to keep.
-
-    Parameters
-    ----------
-    samples : int
-        Number of samples.
-    seed : int
-        Not negative.
-    first : int
-        Number of the first sample.
-    keep : str or tuple of str
-        Random fields whose profiles are kept, such as ``"strength"``.
-        Other profiles are kept by options of the method, such as
-        ``slip=True`` in `Equilibrium`.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> st.Ensemble(samples=1e4, seed=1).samples
-    10000
-    """
-
-    samples: Annotated[Count, Field(le=10**10)]
-    seed: Number = 0
-    first: Annotated[Number, Field(le=2**62)] = 0
-    keep: Names = ()

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from stiction.base.errors import (
     InputError,
@@ -27,7 +28,7 @@ from stiction.ensemble.batches import (
     usable_cores,
 )
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
-from stiction.ensemble.experiment import Ensemble, Experiment
+from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.ensemble.store import Store
 from stiction.methods.protocol import MethodObject
@@ -38,6 +39,8 @@ from stiction.random.equally_likely import AnyRandom
 if TYPE_CHECKING:
     import xarray as xr
 
+Samples: TypeAlias = Annotated[Count, Field(le=10**10)]
+First: TypeAlias = Annotated[Number, Field(le=2**62)]
 MAX_SHOWN_FAILURES = 3
 """Number of failures that a warning lists."""
 LONG_RUN_SECONDS = 3600.0
@@ -115,7 +118,8 @@ def complete(
 
 def gather(
     points: Sequence[Experiment],
-    ensemble: Ensemble,
+    samples: int,
+    first: int,
     attributes: Mapping[str, Any],
     axes: GridAxes = MappingProxyType({}),
     *,
@@ -132,7 +136,7 @@ def gather(
     samples), marks samples that a different job computes. See
     `monte_carlo` for the other arguments.
     """
-    rows, cores = Gathered(points, ensemble), workers or usable_cores()
+    rows, cores = Gathered(points, samples, first), workers or usable_cores()
     # Samples that are stored, or that another job computes, are not missing.
     if store:
         store.resume(rows)
@@ -147,7 +151,7 @@ def gather(
     comparison = store.pilot if store else None
     if comparison is None and pilot:
         show = progress is True
-        comparison = compare(points, rows.onsets, ensemble.first, show, workers)
+        comparison = compare(points, rows.onsets, first, show, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
         if text := pilot_doubt(points[0], comparison, where):
             warn_accuracy(text)
@@ -171,9 +175,9 @@ def monte_carlo(
     random: AnyRandom,
     *,
     method: MethodObject,
-    samples: Count,
+    samples: Samples,
     seed: Number = 0,
-    first: Number = 0,
+    first: First = 0,
     keep: Names = (),
     workers: Count | None = None,
     executor: Executor | None = None,
@@ -193,10 +197,14 @@ def monte_carlo(
         The members of a list are equally likely, and every sample uses
         one of them.
     method : LocalCriterion, Equilibrium or Rupture
-    samples, seed, first, keep
-        As in `Ensemble`. To see the profiles of a few
-        samples, repeat them: a call with the same
-        seed and fewer samples gives the same samples.
+    samples, seed, first : int
+        Number of samples, seed, and number of the first sample.
+    keep : str or tuple of str
+        Random fields whose profiles are kept, such as ``"strength"``.
+        Other profiles are kept by options of the method, such as
+        ``slip=True`` in `Equilibrium`. To see the profiles of a few
+        samples, repeat them: a call with the same seed and fewer
+        samples gives the same samples.
     workers : int, optional
         Number of threads, by default one for each core. The compiled
         kernels release the interpreter lock.
@@ -259,12 +267,12 @@ def monte_carlo(
     >>> len(found.drop_dims("x", errors="ignore").to_dataframe())
     50
     """
-    ensemble = Ensemble(samples=samples, seed=seed, first=first, keep=keep)
-    experiment = Experiment(problem, random, method, ensemble.keep, seed)
+    experiment = Experiment(problem, random, method, keep, seed)
     about = study_attributes(
-        problem=problem, random=experiment.given, method=experiment.method, ensemble=ensemble
-    )
+        problem=problem, random=experiment.given, method=experiment.method,
+        samples=samples, seed=seed, first=first, keep=keep,
+    )  # fmt: skip
     return gather(
-        [experiment], ensemble, about | {"seed": seed}, workers=workers, executor=executor,
+        [experiment], samples, first, about | {"seed": seed}, workers=workers, executor=executor,
         progress=progress, pilot=pilot,
     )  # fmt: skip

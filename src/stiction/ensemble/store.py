@@ -48,7 +48,7 @@ from stiction.base.model import describe
 from stiction.ensemble.batches import NUMBER, POINT, Failure, Table, versions
 from stiction.ensemble.pilot import MAX_RANKED_SAMPLES
 
-FORMAT = 5
+FORMAT = 6
 STUDY, PILOT_FILE, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
@@ -104,7 +104,7 @@ class Store:
         # description.
         if before != study:
             # A pilot of fewer samples is no longer valid.
-            if before and before["ensemble"]["samples"] < MAX_RANKED_SAMPLES:
+            if before and before["samples"] < MAX_RANKED_SAMPLES:
                 (path / PILOT_FILE).unlink(missing_ok=True)
             _write_json(path / STUDY, study)
         return store
@@ -283,25 +283,22 @@ def read_json(file: Path) -> dict[str, Any]:
 def read_study(folder: Path) -> dict[str, Any]:
     """Return the study of a run, or raise a `StoreError`."""
     study = read_json(folder / STUDY)
-    ensemble = study.get("ensemble")
-    if not isinstance(ensemble, dict) or not isinstance(ensemble.get("samples"), int):
+    if not isinstance(study.get("samples"), int):
         raise Damaged(f"{folder / STUDY}: is damaged. Run the study again to repair it")
     return study
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
     """Return a study without title and number of samples. The result identifies a run."""
-    ensemble = {key: value for key, value in study["ensemble"].items() if key != "samples"}
-    rest = {key: value for key, value in study.items() if key != "title"}
-    return rest | {"ensemble": ensemble}
+    return {key: value for key, value in study.items() if key not in ("title", "samples")}
 
 
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
     """Refuse a study that differs from the stored study, except by additional samples."""
-    now, before = here["ensemble"]["samples"], there["ensemble"]["samples"]
+    now, before = here["samples"], there["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
-        differences.append(f"ensemble.samples: {now} here, {before} there: a run can only grow")
+        differences.append(f"samples: {now} here, {before} there: a run can only grow")
     if differences:
         raise InputError(
             f"{path}: holds another study. Choose another folder, or make the study the same:\n"

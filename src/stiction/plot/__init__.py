@@ -18,7 +18,6 @@ from stiction.plot.fields import field, onset
 from stiction.plot.fits import agreement, fit
 from stiction.plot.ruptures import events, film, moment_rate, rupture
 from stiction.plot.specimens import block, force_travel, precursors, specimen
-from stiction.plot.style import paper_style
 
 __all__ = [
     "agreement",
@@ -32,7 +31,6 @@ __all__ = [
     "moment_rate",
     "monte_carlo",
     "onset",
-    "paper_style",
     "precursors",
     "quantiles",
     "rupture",

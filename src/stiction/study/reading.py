@@ -18,7 +18,7 @@ from stiction.inference.peaks import read_peaks
 from stiction.problem.profiles.reading import ProfileFile, profile_in_file
 
 T = TypeVar("T")
-TABLES = "problem", "random", "method", "ensemble"
+TABLES = "problem", "random", "method"
 """Tables that a study file must have."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
 """Bytes of a study file, bytes beside lists of numbers, and dots in a line of those bytes."""

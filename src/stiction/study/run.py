@@ -92,7 +92,7 @@ class StoredRun:
         self.path, self.study, self._store = store.path, study, store
 
     def __repr__(self) -> str:
-        points, samples = len(self.study.experiments), self.study.ensemble.samples
+        points, samples = len(self.study.experiments), self.study.samples
         what = f"{points} x {samples} samples by {self.methods}"
         return f"{type(self).__name__}({str(self.path)!r}, {what})"
 
@@ -143,7 +143,7 @@ class StoredRun:
         return rows.dataset(attributes, self.study.axes)
 
     def _read(self, only: Sequence[str] | None = None) -> Gathered:
-        rows = Gathered(self.study.experiments, self.study.ensemble, only)
+        rows = Gathered(self.study.experiments, self.study.samples, self.study.first, only)
         self._store.read_into(rows)
         return rows
 

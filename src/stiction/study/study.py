@@ -20,6 +20,8 @@ from stiction.base.model import (
     Count,
     FilePath,
     Flag,
+    Names,
+    Number,
     Positive,
     Progress,
     Real,
@@ -30,8 +32,8 @@ from stiction.base.model import (
     to_plain,
 )
 from stiction.ensemble.dataset import GridAxes, distinct, variables_in
-from stiction.ensemble.experiment import Ensemble, Experiment
-from stiction.ensemble.monte_carlo import gather
+from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.monte_carlo import First, Samples, gather
 from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.methods.protocol import METHODS, as_method
@@ -42,9 +44,9 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 from stiction.reliability.answer import Answer, Probability, TargetCv, too_slow
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
-from stiction.study.reading import TABLES, check_toml, read_toml, validated
+from stiction.study.reading import check_toml, read_toml, validated
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
-from stiction.study.sweep import Point, Sweep, grid_axes
+from stiction.study.sweep import SWEPT, Point, Sweep, grid_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -167,7 +169,7 @@ class _Parts:
     problem: Problem
     random: RandomOfStudy
     method: MethodOfStudy
-    ensemble: Ensemble
+    seed: Number = 0
 
 
 @model(kw_only=True)
@@ -184,7 +186,8 @@ class Study(_Parts):
         The random properties. A field is the peak strength, Pa. Members
         of a list are equally likely.
     method : LocalCriterion, Equilibrium or Rupture
-    ensemble : Ensemble
+    samples, seed, first, keep
+        As in `stiction.monte_carlo`.
     sweep : list of dict
         Axes of the sweep. All their combinations are computed. An axis
         maps dotted keys, which vary together, to lists of values. The
@@ -214,7 +217,7 @@ class Study(_Parts):
     ...     problem=problem,
     ...     random=st.paper.strength(problem, correlation_ratio=2.0),
     ...     method=st.LocalCriterion(),
-    ...     ensemble=st.Ensemble(samples=20),
+    ...     samples=20,
     ...     sweep=[{"random.strength.spectrum.correlation_length": [3e-3, 6e-3]}],
     ... )
     >>> dict(study.run().sizes)
@@ -223,6 +226,9 @@ class Study(_Parts):
     True
     """
 
+    samples: Samples
+    first: First = 0
+    keep: Names = ()
     sweep: Sweep = ()
     reliability: Question | None = None
     peaks: PeaksOfStudy | None = None
@@ -259,24 +265,24 @@ class Study(_Parts):
 
         A mistake is reported once, with the first point at which it occurs.
         """
-        base = _Parts(**{name: getattr(self, name) for name in TABLES})
+        base = _Parts(**{name: getattr(self, name) for name in SWEPT})
         made: dict[Any, Any] = {}
         experiments: list[Experiment] = []
         problems: dict[str, str] = {}
         for point in self.points:
             try:
                 parts = {}
-                for name in TABLES:
+                for name in SWEPT:
                     values = {k: v for k, v in point.values.items() if k.split(".")[0] == name}
                     key = name, *map(id, values.values())
                     if key not in made:
                         made[key] = getattr(with_values(base, values), name)
                     parts[name] = made[key]
-                problem, random, method, _ = parts.values()
+                problem, random, method, seed = parts.values()
                 key = id(problem), id(random), id(method)
                 if key not in made:
-                    made[key] = Experiment(problem, random, method, self.ensemble.keep)
-                experiments.append(made[key].with_seed(parts["ensemble"].seed))
+                    made[key] = Experiment(problem, random, method, self.keep)
+                experiments.append(made[key].with_seed(seed))
             except InputError as error:
                 where = f", at {point} of the sweep" if point.values else ""
                 for text in error.problems:
@@ -301,7 +307,7 @@ class Study(_Parts):
         except InputError as error:  # a function of the user's: the result states it
             attributes = {"study_incomplete": str(error)}
         title = {"title": self.title} if self.title else {}
-        return attributes | {"seed": self.ensemble.seed} | title
+        return attributes | {"seed": self.seed} | title
 
     @checked
     def run(
@@ -348,12 +354,13 @@ class Study(_Parts):
         store = None if out is None else Store.open(Path(out), self.to_dict())
         return gather(
             self.experiments,
-            self.ensemble,
+            self.samples,
+            self.first,
             self.attributes,
             self.axes,
             store=store,
             elsewhere=part is not None
-            and ~samples_of_part(part, len(self.experiments), self.ensemble.samples),
+            and ~samples_of_part(part, len(self.experiments), self.samples),
             workers=workers,
             executor=executor,
             progress=progress,
@@ -370,7 +377,7 @@ class Study(_Parts):
             Python function.
         """
         plain = to_plain(self).items()
-        left_out = ("title", "sweep")
+        left_out = ("title", "sweep", "first", "keep")
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:

@@ -15,12 +15,13 @@ from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.base.model import describe, to_plain
 from stiction.base.variables import UNITS, Variable, unit_of_key
 from stiction.ensemble.dataset import Coordinates, GridAxes
-from stiction.study.reading import TABLES
 
+SWEPT = "problem", "random", "method", "seed"
+"""Keys of a study that a sweep, or the keys below them, may change."""
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
 """Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
-_FIXED = ("ensemble", "ensemble.samples", "ensemble.first", "ensemble.keep")
+FIXED = "samples", "first", "keep"
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
@@ -86,10 +87,10 @@ def read_axes(given: Any) -> list[Axis]:
     for key in keys:
         table = key.split(".")[0]
         inside = [longer for longer in keys if f"{longer}.".startswith(f"{key}.")]
-        if key in _FIXED:
+        if key in FIXED:
             problems[f"{key}: cannot be swept"] = None
-        elif table not in TABLES:
-            problems[unknown_name(key, table, TABLES)] = None
+        elif table not in SWEPT:
+            problems[unknown_name(key, table, SWEPT)] = None
         elif len(inside) > 1:
             problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
     points = math.prod(len(next(iter(axis.values()))) for axis in axes)
