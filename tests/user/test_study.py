@@ -2,10 +2,12 @@
 
 import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.stats
+import tomli_w
 import xarray as xr
 from refusals import refuses
 from setups import LOCAL, beta_strength, make_problem
@@ -269,3 +271,39 @@ def test_a_question_is_refused_wherever_its_bad_point_is(key, question, bad, wor
     values = [good, good]
     values[place] = bad
     refuses(words, lambda: swept({key: values}, reliability=question))
+
+
+def test_a_measured_profile_in_a_file_is_run_and_reported(tmp_path, monkeypatch, runs):
+    """To the bit as by st.onset of the file, and read again from the run."""
+    monkeypatch.chdir(tmp_path)
+    plain = {name: table for name, table in STUDY.items() if name in ("problem", "method")}
+    problem = st.Problem(**plain["problem"])
+    x = problem.interface.x
+    scan = 1.0 + 0.2 * np.sin(300.0 * x) + 0.1 * np.cos(777.0 * x)
+    table = np.column_stack([1e3 * x, scan])
+    np.savetxt("scan.csv", table, delimiter=",", header="x,strength", comments="")
+    profiles = {"strength": {"file": "scan.csv", "unit": "MPa", "x_unit": "mm"}}
+    Path("study.toml").write_text(tomli_w.dumps(plain | {"profiles": profiles}))
+    runs("run study.toml --out run", "critical stress (MPa)", "1 of 1 samples")
+    runs("report run")
+    assert "data:image/png" in Path("run/report.html").read_text("utf-8")
+    given = st.read_profile("scan.csv", unit="MPa", x_unit="mm", interface=problem.interface)
+    exact = st.onset(problem, given, method=st.LocalCriterion())
+    stored = st.open_run("run")
+    assert stored.dataset().critical_stress.values == exact.critical_stress.values
+    assert (
+        st.Study.from_result(stored.dataset())
+        == stored.study
+        == st.Study.from_toml("study.toml")
+    )
+    methods = [{"type": "local_criterion"}, {"type": "equilibrium"}]
+    both = st.Study.from_dict(stored.study.to_dict() | {"sweep": [{"method": methods}]}).run()
+    assert both.sizes == {"onset_method": 2, "sample": 1}
+    for wrong, words in (
+        ({"samples": 2}, "samples: given profiles"),
+        ({"random": STUDY["random"]}, "random: give either"),
+        ({"profiles": None}, "random: give either"),
+        ({"reliability": {"stress": 1e6}}, "reliability: has no effect"),
+        ({"profiles": {"strength": [1e6, 2e6]}}, "profiles"),
+    ):
+        refuses(words, lambda wrong=wrong: st.Study.from_dict(stored.study.to_dict() | wrong))

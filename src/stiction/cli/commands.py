@@ -321,6 +321,8 @@ def description(study: Any) -> dict[str, str]:
         unit = f" {variable.units}".removesuffix(" 1")
         text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
         lines[f"axis {number}"] = text
+    if study.profiles is not None:
+        return lines
     pairs = [(point.problem, member) for point in different for member in point.random.members]
     for (title, unit), column in pd.DataFrame([_numbers(*pair) for pair in pairs]).items():
         ends = dict.fromkeys(f"{value:.5g}" for value in (column.min(), column.max()))

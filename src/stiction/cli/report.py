@@ -98,10 +98,16 @@ def write_report(run: StoredRun, path: Path) -> None:
     page.text(f"{state.done:,} of {state.samples:,} samples by {run.methods}.")
     if not state.complete:
         page.text("The run is not complete.", warning=True)
-    result, axes = run.dataset(only=[*REPORTED, "critical_position"]), run.study.axes
-    if not axes:
-        with paper_style():
+    axes, profiles = run.study.axes, run.study.profiles
+    result = run.dataset(only=[*REPORTED, "critical_position", "critical_load"])
+    with paper_style():
+        if not axes and profiles is None:
             page.figure(densities(result), "Densities of the onset and of its position.")
+        elif not axes and "strength" in profiles:
+            figure = Figure(figsize=(PAGE, 3.0))
+            strength = np.array(profiles["strength"])
+            plot.onset(result, strength, problem=run.study.problem, ax=figure.subplots())
+            page.figure(figure, "Strength and position of the onset.")
     add_tables(page, result, axes)
     if state.failures:
         rows = [[str(failure)] for failure in state.failures[:MOST_ROWS]]
@@ -145,6 +151,17 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
     places = [key * scale[0] if key.dtype.kind == "f" else key for key, scale in pairs]
     count = min(flat.sizes["point"], MOST_ROWS)
     labels = list(itertools.islice(zip(*places, strict=True), count)) if keys else [()]
+    if flat.sizes["sample"] == 1:
+        onsets = [
+            part for name in (*REPORTED, "critical_position") for part in _parts(flat, name)
+        ]
+        factors, _, titles = zip(*map(scaled, onsets), strict=True)
+        columns = [
+            part.values.reshape(-1) * by for part, by in zip(onsets, factors, strict=True)
+        ]
+        rows = [[*at, *row] for at, *row in zip(labels, *columns, strict=False)]
+        page.table("Onset", [*swept[:-1], *titles], rows)
+        return
     quantities = [f"{what} \N{PLUS-MINUS SIGN} standard error" for what in SPREAD]
     quantities += [f"{100 * level:g} % quantile" for level in QUANTILE_LEVELS]
     if flat["first_instability"].equals(flat["critical_stress"]):  # of the local criterion
@@ -156,6 +173,19 @@ def add_tables(page: Page, result: xr.Dataset, axes: GridAxes) -> None:
             samples = flat[name].transpose("point", ...).values * factor
             rows = [[*at, *_estimates(row)] for at, row in zip(labels, samples, strict=False)]
             page.table(flat[name].attrs["long_name"].capitalize(), columns, rows)
+
+
+def _parts(flat: xr.Dataset, name: str) -> list[xr.DataArray]:
+    """Return a variable, or each of its components, or no part if the result lacks it."""
+    if name not in flat:
+        return []
+    values = flat[name]
+    if DIRECTION not in values.dims:
+        return [values]
+    return [
+        part.assign_attrs(long_name=f"{part.attrs['long_name']}, {part[DIRECTION].item()}")
+        for part in values.transpose(DIRECTION, ...)
+    ]
 
 
 def _estimates(samples: Any) -> list[Any]:

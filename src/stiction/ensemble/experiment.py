@@ -6,14 +6,21 @@ import copy
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
+from stiction.base.errors import (
+    InputError,
+    UnitWarning,
+    collect_warnings,
+    prefixed,
+    unknown_name,
+    warn_user,
+)
 from stiction.base.variables import PROFILES, Variable
 from stiction.methods.protocol import (
     Solver,
@@ -216,6 +223,51 @@ class Experiment:
         # draws are whole.
         edges = chain((first,), range(first - first % size + size, end, size), (end,))
         return ((start, stop - start) for start, stop in pairwise(edges))
+
+
+class Measured(Experiment):
+    """An experiment with given profiles in place of random properties. It has a single sample."""
+
+    def __post_init__(self) -> None:
+        problems = refusals(self.problem, self.method)
+        if self.keep:
+            problems.append("keep: has no effect, because the profiles are given")
+        if problems:
+            raise InputError(problems)
+        with prefixed("profiles"), collect_warnings():  # `check_fields` issues them
+            if (count := len(self._sample.strength)) != 1:
+                raise InputError(f"must be one profile of each name, got {count} samples")
+
+    @cached_property
+    def _sample(self) -> Sample:
+        accepted = optional_member(self.method, "accepts")
+        return self.problem.sample(self.random, accept=accepted)
+
+    @property
+    def given(self) -> Any:
+        """The given profiles."""
+        return self.random
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        """Variables of `results` by name."""
+        return variables_of(self.problem, self.method, "normal_pressure" in self.random)
+
+    def check_fields(self) -> None:
+        """Warn about profiles that do not suit the grid or their units."""
+        self.problem.sample(self.random, accept=optional_member(self.method, "accepts"))
+
+    def draws(self, first: int, count: int) -> Array:
+        """Return an array (count, 0), because given profiles need no draws."""
+        return np.zeros((count, 0))
+
+    def profiles(self, draws: Array) -> dict[str, Array]:
+        """Return no random profiles."""
+        return {}
+
+    def sample(self, profiles: Mapping[str, Array]) -> Sample:
+        """Return the given profiles as a sample."""
+        return self._sample
 
 
 _solver = lru_cache(maxsize=8)(prepared)

@@ -58,14 +58,16 @@ def compare(
             known = None if onsets is None else onsets[point]
             differences = _differences(points[point], known, first, cores)
             for name, relative in differences.items():
-                if relative.size > 1:
+                if relative.size:
                     parts.setdefault(name, []).append(relative)
             meter.advance()
     attributes: dict[str, Any] = {}
     for name, differing in parts.items():
         attributes[f"{name}_samples"] = differing[0].size
         attributes[f"{name}_bias"] = float(max((part.mean() for part in differing), key=abs))
-        attributes[f"{name}_scatter"] = float(max(part.std(ddof=1) for part in differing))
+        attributes[f"{name}_scatter"] = float(
+            max(part.std(ddof=1) if part.size > 1 else 0.0 for part in differing)
+        )
     return attributes
 
 

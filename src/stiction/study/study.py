@@ -10,8 +10,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+import numpy as np
 import tomli_w
-from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag, model_validator
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    PlainSerializer,
+    Tag,
+    ValidationInfo,
+    model_validator,
+)
 
 from stiction.base.errors import InputError, StoreError, prefixed
 from stiction.base.files import write_whole
@@ -32,11 +40,12 @@ from stiction.base.model import (
     to_plain,
 )
 from stiction.ensemble.dataset import GridAxes, distinct, variables_in
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Experiment, Measured
 from stiction.ensemble.monte_carlo import First, Samples, gather
 from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.methods.protocol import METHODS, as_method
+from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, stress_of
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import FIRST_MEMBERS, Source
@@ -82,6 +91,19 @@ RandomOfStudy: Any = Annotated[
     "RandomInterface | list",
 ]
 """A random interface, or several equally likely interfaces. A field becomes an interface."""
+
+
+def _profiles_of(given: Any, info: ValidationInfo) -> Any:
+    """Return profiles. In a study file, a profile may be a file or a table {file, ...}."""
+    read = (info.context or {}).get("read")
+    if not isinstance(given, Mapping) or read is None:
+        return given
+    files = str, Path, dict
+    return {k: read(v, str(k)) if isinstance(v, files) else v for k, v in given.items()}
+
+
+ProfilesOfStudy: Any = Annotated[Any, BeforeValidator(_profiles_of), "mapping of arrays"]
+"""Profiles by name, which become plain values at the nodes."""
 
 
 def _peaks_of(given: Any) -> Any:
@@ -167,7 +189,7 @@ class _Parts:
     """The parts of a study at a point of a sweep. Each part is valid by itself."""
 
     problem: Problem
-    random: RandomOfStudy
+    random: RandomOfStudy | None = None
     method: MethodOfStudy
     seed: Number = 0
 
@@ -185,6 +207,10 @@ class Study(_Parts):
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         The random properties. A field is the peak strength, Pa. Members
         of a list are equally likely.
+    profiles : mapping of arrays, optional
+        Given profiles instead of random properties, by name, as in
+        `stiction.onset`. In a study file, a profile may be the name of
+        a file or a table {file, ...} with options of `read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
         As in `stiction.monte_carlo`.
@@ -226,7 +252,8 @@ class Study(_Parts):
     True
     """
 
-    samples: Samples
+    profiles: ProfilesOfStudy | None = None
+    samples: Samples = 1
     first: First = 0
     keep: Names = ()
     sweep: Sweep = ()
@@ -236,6 +263,10 @@ class Study(_Parts):
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
+        if (self.random is None) == (self.profiles is None):
+            raise InputError("random: give either random properties or profiles")
+        if self.profiles is not None:
+            self._place_profiles()
         points = self.experiments
         variables = variables_in(points)
         wide = [name for name in variables if {"x", "y"} & {*variables[name].dims}]
@@ -248,6 +279,21 @@ class Study(_Parts):
             for point in distinct(points, "problem", "random", "method"):
                 self.reliability.check(point)
         return self
+
+    def _place_profiles(self) -> None:
+        """Read the profiles, and hold them as plain values at the nodes, in SI."""
+        unused = [f"{name}: has no effect on given profiles" for name in ("reliability", "peaks")
+                  if getattr(self, name) is not None]  # fmt: skip
+        if self.samples > 1 or self.first:
+            unused.append("samples: given profiles are a single sample")
+        if unused:
+            raise InputError(unused)
+        sample = Measured(self.problem, self.profiles, self.method)._sample
+        names = [*self.profiles] if isinstance(self.profiles, Mapping) else ["strength"]
+        fields = {"friction_coefficient": "strength"} | dict.fromkeys(SCALES, "weakening_rate")
+        held = [fields.get(str(name), str(name)) for name in names]
+        plain = {name: np.asarray(getattr(sample, name))[0].tolist() for name in held}
+        object.__setattr__(self, "profiles", plain)
 
     @property
     def points(self) -> list[Point]:
@@ -281,7 +327,9 @@ class Study(_Parts):
                 problem, random, method, seed = parts.values()
                 key = id(problem), id(random), id(method)
                 if key not in made:
-                    made[key] = Experiment(problem, random, method, self.keep)
+                    kind = Experiment if self.profiles is None else Measured
+                    given = random if self.profiles is None else self.profiles
+                    made[key] = kind(problem, given, method, tuple(self.keep))
                 experiments.append(made[key].with_seed(seed))
             except InputError as error:
                 where = f", at {point} of the sweep" if point.values else ""
@@ -295,8 +343,8 @@ class Study(_Parts):
     def axes(self) -> GridAxes:
         """The axes of the sweep as dimensions of the result."""
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
-        fields = self.experiments[0].random.properties.items()
-        coefficients = [name for name, field in fields if field.of]
+        fields = {} if self.profiles else self.experiments[0].random.properties
+        coefficients = [name for name, field in fields.items() if field.of]
         return grid_axes(self.sweep, taken, coefficients)
 
     @property
