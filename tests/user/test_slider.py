@@ -13,7 +13,6 @@ import stiction as st
 
 PROBLEM = rig_problem()
 MU = coefficients(PROBLEM)
-ENSEMBLE = st.Ensemble(samples=2)
 STIFF = dataclasses.replace(SOLID, shear_modulus=80e9, density=7800.0)
 
 
@@ -161,7 +160,7 @@ def test_a_study_of_a_slider():
     )  # fmt: skip
     for slider in (SLIDER, dataclasses.replace(SLIDER, base=base, drive=st.TopShear())):
         problem = rig_problem(problem={"specimen": slider})
-        given = {"problem": problem, "random": field, "method": EXACT, "ensemble": ENSEMBLE}
+        given = {"problem": problem, "random": field, "method": EXACT, "samples": 2}
         study = st.Study(**given)
         assert st.Study.from_dict(study.to_dict()).problem == problem
         assert study.to_dict()["problem"]["specimen"]["type"] == "slider"
