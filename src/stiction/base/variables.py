@@ -101,6 +101,8 @@ FORCES: dict[str, tuple[str, str]] = {
     "machine_stress": ("machine_force", "force of the machine"),
 }  # fmt: skip
 """Names and texts of the forces that accompany mean stresses if the area is known."""
+OF_WHOLE_INTERFACE = ("machine_stress",)
+"""Stresses of `FORCES` that the whole interface carries, not only the part that can break."""
 
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
@@ -109,10 +111,20 @@ def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
     return {FORCES[name][0]: Variable("N", FORCES[name][1], dims[name]) for name in dims}
 
 
-def forces(values: Mapping[str, Any], area: float) -> dict[str, Any]:
-    """Return the forces, N, for the stresses among some values, with an area in m²."""
+def forces(
+    values: Mapping[str, Any], area: float | None, whole_area: float | None
+) -> dict[str, Any]:
+    """Return the forces, N, for the stresses among some values, or none without an area.
 
-    return {FORCES[name][0]: one * area for name, one in values.items() if name in FORCES}
+    `area` can break, and `whole_area` is the whole interface, both in m².
+    """
+    if area is None or whole_area is None:
+        return {}
+    return {
+        FORCES[name][0]: stress * (whole_area if name in OF_WHOLE_INTERFACE else area)
+        for name, stress in values.items()
+        if name in FORCES
+    }
 
 
 SAMPLE = Variable("1", "sample number", ("sample",))

@@ -343,7 +343,8 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     if W is None:  # the nucleation length varies along the interface
         return numbers
     numbers["nucleation length", "m"] = problem.nucleation_length
-    numbers["nodes in h_n", ""] = min(nodes_in_nucleation_length(problem, W))
+    steepest = W * problem.friction.steepening
+    numbers["nodes in h_n", ""] = min(nodes_in_nucleation_length(problem, steepest))
     return numbers
 
 

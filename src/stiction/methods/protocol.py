@@ -169,7 +169,7 @@ def prepared(problem: Problem, method: Method) -> Solver:
         pressure = sample.mean(sample.normal_pressure)
         if not np.isnan(pressure).all():
             values["friction_coefficient"] = values["critical_stress"] / pressure
-        return values if problem.area is None else values | forces(values, problem.area)
+        return values | forces(values, problem.area, problem.whole_area)
 
     return solve
 

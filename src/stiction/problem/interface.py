@@ -273,18 +273,16 @@ class Interface:
         extent, grid = self.extent, np.meshgrid(*self.coordinates.values(), indexing="ij")
         if isinstance(extent, np.ndarray):
             return extent
+        # The distance from the middle, in units of half the extent. Around a
+        # period, the end of the interface is its first node.
+        distances = []
+        for at, (low, high), length in zip(grid, self._ends or (), self.lengths, strict=True):
+            away = np.abs(at - 0.5 * (low + high))
+            away = away if self.is_free else np.minimum(away, length - away)
+            distances.append(away / (0.5 * (high - low)))
         if isinstance(extent, Ellipse):
-            axes = zip(grid, extent.centre, extent.semi_axes, strict=True)
-            distance = np.sum(
-                [((at - middle) / half) ** 2 for at, middle, half in axes], axis=0
-            )
-            return np.asarray(distance <= 1.0 + 1e-9)
-        inside = np.ones(self.shape, dtype=bool)
-        for at, (low, high), spacing in zip(
-            grid, self._ends or (), self.spacings, strict=False
-        ):
-            inside &= (at >= low - 1e-9 * spacing) & (at <= high + 1e-9 * spacing)
-        return inside
+            return np.asarray(np.sum(np.square(distances), axis=0) <= 1.0 + 1e-9)
+        return np.asarray(np.max(distances, axis=0) <= 1.0 + 1e-9)
 
     @cached_property
     def breakable(self) -> Mask:
@@ -309,6 +307,17 @@ class Interface:
     def breakable_measure(self) -> float:
         """Length (m), or area on a plane (m²), of the nodes that can break."""
         return np.count_nonzero(self.breakable) * self.cell if self.is_held else self.measure
+
+    @property
+    def reach(self) -> float:
+        """Longest side of the part that can break, m. The whole interface reaches over a period."""
+        if not self.is_held:
+            return max(self.lengths)
+        sides = [
+            np.count_nonzero(self.breakable.any(axis=tuple({*self.axes} - {axis}))) * spacing
+            for axis, spacing in zip(self.axes, self.spacings, strict=True)
+        ]
+        return max(sides)
 
     @property
     def is_free(self) -> bool:

@@ -114,8 +114,9 @@ class Problem:
             self._check_drive()
         weakening_rate = self.friction.weakening_rate
         if weakening_rate is not None:
-            check_resolution(self, float(np.max(weakening_rate)))
-            warn_if_short(self, float(np.median(weakening_rate)))
+            steepening = self.friction.steepening
+            check_resolution(self, float(np.max(weakening_rate)) * steepening)
+            warn_if_short(self, float(np.median(weakening_rate)) * steepening)
         return self
 
     def _of_specimen(self) -> list[str]:
@@ -280,12 +281,22 @@ class Problem:
         return None if depth is None else interface.breakable_measure * depth
 
     @property
+    def whole_area(self) -> float | None:
+        """Area of the whole interface, m², also beyond an extent, if `area` is known."""
+        interface = self.interface
+        return self.area and self.area * interface.measure / interface.breakable_measure
+
+    @property
     def given_pressure(self) -> Any:
-        """Given normal pressure, or force over area, Pa: a number or an array, if any."""
+        """Given normal pressure, or force over area, Pa: a number or an array, if any.
+
+        Blocks are pressed together over the whole interface, also beyond an extent.
+        """
         force = self.load.pressing_force
-        if force is None:
+        area = self.area if self.specimen is None else self.whole_area
+        if force is None or area is None:
             return self.load.normal_pressure
-        return stress_of(self, "load.pressing_force", force)
+        return force / area
 
     @property
     def normal_pressure(self) -> Any:
@@ -328,8 +339,9 @@ class Problem:
     def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
         """Return h_n, m, in each direction, for a uniform weakening rate (Pa/m).
 
-        On a plane, the length along x belongs to mode II and the length
-        along y to mode III.
+        If the law steepens, give its steepest rate, such as
+        `Sample.steepest_weakening_rate`. On a plane, the length along x
+        belongs to mode II and the length along y to mode III.
         """
         if not weakening_rate > 0.0:
             given = describe(weakening_rate)
@@ -374,10 +386,22 @@ class Problem:
 
 
 def stress_of(problem: Problem, name: str, force: float) -> float:
-    """Return force (N) over area of the interface, Pa. An error message begins with `name`."""
+    """Return force (N) over area that can break, Pa. An error message begins with `name`."""
     if problem.area is None:
         raise InputError(f"{name}: {NO_AREA}")
+    warn_of_weld(problem, name)
     return force / problem.area
+
+
+def warn_of_weld(problem: Problem, name: str) -> None:
+    """Warn that the machine of a specimen carries more than the force on the part that breaks."""
+    if problem.specimen is not None and problem.interface.is_held:
+        percent = 100.0 * problem.interface.breakable_measure / problem.interface.measure
+        warn_accuracy(
+            f"{name}: is compared with the shear force on the part that can break, {percent:.3g} %"
+            " of the interface. Beyond it the blocks are in one piece, and the machine carries the"
+            " force on both parts"
+        )
 
 
 def refuse_specimen(problem: Problem, what: str, instead: str) -> None:

@@ -23,12 +23,12 @@ AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 
 
 def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[float, ...]:
-    """Return how many nodes of a `Problem` span h_n at a weakening rate (Pa/m).
+    """Return how many nodes of a `Problem` span h_n, in each direction.
 
-    There is a number for each direction. If the law steepens, its
-    steepest rate is used.
+    The weakening rate (Pa/m) is the steepest at any slip, as everywhere
+    in this file.
     """
-    lengths = problem.nucleation_lengths(weakening_rate * problem.friction.steepening)
+    lengths = problem.nucleation_lengths(weakening_rate)
     return tuple(np.divide(lengths, problem.interface.spacings).tolist())
 
 
@@ -37,15 +37,14 @@ def check_resolution(problem: Any, weakening_rate: float) -> None:
     resolution = nodes_in_nucleation_length(problem, weakening_rate)
     if min(resolution) >= MIN_NODES_IN_NUCLEATION:
         return _check_extent(problem, resolution)
-    steepest = weakening_rate * problem.friction.steepening
-    length = problem.nucleation_lengths(steepest)[int(np.argmin(resolution))]
+    length = problem.nucleation_lengths(weakening_rate)[int(np.argmin(resolution))]
     if min(resolution) < HARDLY_RESOLVED:
         modulus = problem.solid.shear_modulus
         raise InputError(
             "solid.shear_modulus, interface.length, friction: the nucleation length is"
             f" {length:.3g} m, and the nodes are {problem.interface.spacing:.3g} m apart. Check"
             f" the units of the modulus, {modulus:g} Pa, of lengths, strengths"
-            f" and the weakening rate, {steepest:.3g} Pa/m"
+            f" and the weakening rate, {weakening_rate:.3g} Pa/m"
         )
     least = MIN_NODES_IN_NUCLEATION
     raise InputError(
@@ -62,7 +61,7 @@ def _check_extent(problem: Any, resolution: tuple[float, ...]) -> None:
     for axis, dim in enumerate(interface.dims):
         across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
         width = np.count_nonzero(breakable.any(axis=across))
-        if width < int(resolution[axis]):
+        if width < (1.0 - 1e-9) * resolution[axis]:
             spacing = interface.spacings[axis]
             raise InputError(
                 f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
@@ -96,7 +95,7 @@ def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str
 def warn_if_short(problem: Any, weakening_rate: float) -> None:
     """Warn about an interface that h_n fills, or on which free ends would count."""
     interface = problem.interface
-    patch = problem.nucleation_lengths(weakening_rate * problem.friction.steepening)[0]
+    patch = problem.nucleation_lengths(weakening_rate)[0]
     length = min(interface.lengths)
     if problem.specimen is not None:
         return

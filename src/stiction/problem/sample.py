@@ -63,7 +63,7 @@ LARGEST = 1e100
 
 
 def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
-    """Return the largest weakening rate, Pa/m, among nodes that may break.
+    """Return the largest of some weakening rates, Pa/m, among nodes that may break.
 
     Arrays have shape (samples, *shape). Barriers do not count: with a
     uniform critical slip they weaken steeply but never slip.
@@ -162,9 +162,13 @@ class Sample(Result, _Profiles):
 
     @property
     def steepest_weakening_rate(self) -> float:
-        """Largest weakening rate, Pa/m, among nodes that may break."""
+        """Largest weakening rate at any slip, Pa/m, among nodes that may break.
+
+        A sample without a problem has a law that does not steepen.
+        """
         W = self.weakening_rate
-        return steepest_weakening_rate(self.strength, self.residual_strength, W)
+        steepest = steepest_weakening_rate(self.strength, self.residual_strength, W)
+        return steepest if self.problem is None else steepest * self.problem.friction.steepening
 
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at loads tau_0 with shape (samples,)."""

@@ -89,5 +89,6 @@ def doubt_strengths(
     for scale, value in (scales or fixed).items():
         fall = np.array(strength - residual)
         W = max(float(friction.weakening_rate_of(fall, scale, np.median(value))), 1e-300)
+        W *= friction.steepening
         warn_if_short(problem, W)
         check_resolution(problem, W)

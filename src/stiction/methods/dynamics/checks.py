@@ -43,7 +43,8 @@ def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn about nodes that weaken too steeply for the grid, or whose stress would reverse slip."""
-    W, interface, now = run.setting.nodes.weakening_rate, run.medium.interface, state.now
+    interface, now = run.medium.interface, state.now
+    W = run.setting.nodes.weakening_rate * run.medium.problem.friction.steepening
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
     steep = np.flatnonzero((state.slip > 0.0) & (steepest < W))

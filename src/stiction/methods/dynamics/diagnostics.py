@@ -6,10 +6,10 @@ Waves carry away the unbalanced stress, so the mean stress on the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-If the interface has an extent, <tau> is the mean over all nodes
-(`whole_stress`), and the nodes beyond the extent take over stress
-without any waves. Results are means over the nodes that can break
-(`mean_stress`).
+All means are over the nodes that can break, so that nothing beyond an
+extent has an effect. If the interface has an extent, the nodes beyond
+take over stress without any waves. Then (1) includes the stress that
+they take over (`whole_stress`), and results do not (`mean_stress`).
 
 An instability is slip that the load does not drive: after a maximum of
 <tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
@@ -97,24 +97,24 @@ class TakenStep(NamedTuple):
 def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     """Return the stress scale as a function of the load, both Pa.
 
-    The scale is the mean over nodes of
+    The scale is the mean over the nodes that can break of
 
         max(0, min(tau_p - tau_r, MAX_DROP_RATIO (tau_0 p + tau_i - tau_r))).
 
     The second term is the drop that the load provides. If strengths are
     similar, the scale is the mean of tau_p - tau_r. Nodes far stronger
-    than the load, or unbreakable, do not raise it. The scale grows as
-    the load becomes able to break them.
+    than the load do not raise it. The scale grows as the load becomes
+    able to break them.
     """
-    peak, residual = nodes.peak, nodes.residual
-    profile, initial = nodes.profile, nodes.initial
+    can_break = np.isfinite(nodes.peak)
+    peak, residual = nodes.peak[can_break], nodes.residual[can_break]
+    profile, initial = nodes.profile[can_break], nodes.initial[can_break]
     # Loads between which the term of a node rises, with this slope.
     first = (residual - initial) / profile
     last = first + (peak - residual) / (MAX_DROP_RATIO * profile)
     slope = MAX_DROP_RATIO * profile / profile.size
-    ends = np.isfinite(last)
-    loads, kink = np.unique(np.concatenate([first, last[ends]]), return_inverse=True)
-    bends = np.bincount(kink, np.concatenate([slope, -slope[ends]]))
+    loads, kink = np.unique(np.concatenate([first, last]), return_inverse=True)
+    bends = np.bincount(kink, np.concatenate([slope, -slope]))
     # Add a load, so that the table shows the slope beyond the last kink.
     loads = np.append(loads, loads[-1] + max(1.0, abs(loads[-1])))
     scales = np.concatenate([[0.0], np.cumsum(np.cumsum(bends) * np.diff(loads))])
@@ -233,13 +233,13 @@ def finish_step(
     whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
     now.whole_stress, now.weakened_nodes = whole_stress, weakened
-    now.strength_change = change / slip.size
+    now.strength_change = change / thresholds.breakable
     # Without locked nodes, equation (1) has less round-off than the sum.
     now.mean_stress = stress_sum / thresholds.breakable if thresholds.held else whole_stress
     now.top_slip_rate, now.top_node = top_slip_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / thresholds.breakable
-    now.mean_slip_rate = step.radiated / grid.impedance * slip.size / thresholds.breakable
+    now.mean_slip_rate = step.radiated / grid.impedance
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, thresholds, step.radiated)
     if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:

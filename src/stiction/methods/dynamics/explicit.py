@@ -150,7 +150,7 @@ def explicit_steps(
     `state.phase` is EXPLICIT. `record` has at least `count` rows, or no
     rows to keep no record.
     """
-    n, impedance, step = state.slip.size, grid.impedance, tables.step
+    impedance, step = grid.impedance, tables.step
     now, thresholds = state.diagnostics[0], setting.thresholds
     slip_rate_hat, slip_hat = tables.slip_rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
@@ -182,7 +182,7 @@ def explicit_steps(
             grid.poles.size, grid.multiplicity,
         )  # fmt: skip
         # 4. Diagnostics, and the end.
-        rise, radiated = abs(load - now.load), impedance * total / n
+        rise, radiated = abs(load - now.load), impedance * total / thresholds.breakable
         now.explicit_steps += 1
         done = TakenStep(time, step, load, work * grid.cell, radiated)
         fall = finish_step(

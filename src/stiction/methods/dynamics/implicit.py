@@ -148,7 +148,8 @@ def _assemble(
     largest = 0.0
     for i in range(trial.size):
         trial[i] += attempt.load * profile[i] + initial[i]
-        largest = max(largest, abs(trial[i]))
+        if setting.nodes.peak[i] < np.inf:
+            largest = max(largest, abs(trial[i]))
         tables.increment[i] = state.past[i] * size
         tables.slipping[i] = 1 if state.slip_rate[i] > 0.0 else 0
     # Round-off of the transforms limits the accuracy.
@@ -179,7 +180,7 @@ def _effect(
             largest = max(largest, u[i] / residual_slip[i])
         total += u[i]
         radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
-    return largest, total, radiated * (impedance / u.size)
+    return largest, total, radiated * (impedance / setting.thresholds.breakable)
 
 
 @jit_inside

@@ -153,11 +153,13 @@ class Run:
         now["load"] = now["maximum_load"] = now["start_load"] = load
         # The mean stress before the first slip, when no waves are radiated.
         now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
-        now["whole_stress"] = stress.mean()
+        radiated = impedance * slip_rate.sum() / thresholds.breakable
+        now["whole_stress"] = now["maximum_stress"] - radiated
         weakens = np.isfinite(limit)
-        now["strength_change"] = (limit[weakens] - nodes.peak[weakens]).sum() / limit.size
+        change = (limit[weakens] - nodes.peak[weakens]).sum()
+        now["strength_change"] = change / thresholds.breakable
         # Stress above the strength counts as strength.
-        now["maximum_strength"] = now["strength_change"] + impedance * slip_rate.mean()
+        now["maximum_strength"] = now["strength_change"] + radiated
         now["maximum_breakable"] = now["maximum_stress"]
         if thresholds.held:
             now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)
@@ -327,4 +329,5 @@ class Run:
         state.past[:] = state.slip_rate
         state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
         state.now["two_step"] = 0  # the first implicit step is of first order
-        state.now["previous_radiated"] = self.medium.impedance * state.slip_rate.mean()
+        mean_rate = state.slip_rate.sum() / self.setting.thresholds.breakable
+        state.now["previous_radiated"] = self.medium.impedance * mean_rate

@@ -30,7 +30,7 @@ from stiction.methods.dynamics.summary import arrested_events, scalars, summary
 from stiction.methods.equilibrium.events import event_table, event_variables, of_samples
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import onset_variables
-from stiction.problem.sample import Sample, steepest_weakening_rate
+from stiction.problem.sample import Sample
 
 ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
@@ -280,9 +280,12 @@ class Rupture:
         """Return whether strength bounds the stress of an event from below and from above.
 
         A rupture begins at a maximum of the mean stress, which is not
-        below the stress of the first slip. Specimens are in equilibrium
-        up to each event.
+        below the stress of the first slip, unless the interface ends:
+        then slip lowers the mean stress of the part that can break.
+        Specimens are in equilibrium up to each event.
         """
+        if problem.interface.is_held:
+            return False, False
         if problem.specimen is None:
             return True, False
         certain = not (problem.has_machine and event == "first_instability")
@@ -372,20 +375,19 @@ def make_run(
     weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
     # Unbreakable nodes have an infinite strength, and an infinite
     # residual slip.
-    friction, finite = medium.problem.friction, np.isfinite(strength)
+    friction, finite = medium.problem.friction, np.isfinite(strength).ravel()
     with np.errstate(over="ignore"):
         residual_slip = friction.reach * friction.critical_slip_of(
             strength - residual, weakening
         )
-    if not np.all(np.isfinite(residual_slip[finite])):
+    if not np.all(np.isfinite(residual_slip.ravel()[finite])):
         raise InputError(
             f"friction: a weakening rate of {weakening.min():.3g} Pa/m gives an infinite critical"
             " slip. Check the unit of the rate"
         )
     profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
-    steepest = steepest_weakening_rate(strength[None], residual[None], weakening[None])
-    steepest *= friction.steepening
+    steepest = rows.part(slice(sample, sample + 1)).steepest_weakening_rate
     load = method.load
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
@@ -395,8 +397,8 @@ def make_run(
     setting = Setting(
         law=friction.parameters,
         nodes=nodes,
-        mean_profile=float(nodes.profile.mean()),
-        mean_initial=float(nodes.initial.mean()),
+        mean_profile=float(nodes.profile[finite].mean()),
+        mean_initial=float(nodes.initial[finite].mean()),
         load=load,
         turning_times=load.at[1:-1][rising[1:] != rising[:-1]],
         scale=stress_scale(nodes),
@@ -425,19 +427,21 @@ def _thresholds(
 ) -> Thresholds:
     """Return the thresholds at which steps change or end.
 
-    A run is calm if, while shear waves cross the interface, no node
-    slips faster than in a crack with half the length of the interface
-    that only the load drives, or if no node slips faster than before.
+    A run is calm if, while shear waves cross the part that can break,
+    no node slips faster than in a crack with half its length that only
+    the load drives, or if no node slips faster than before.
     """
     friction, finite = medium.problem.friction, np.isfinite(nodes.peak)
     held = not finite.all()
     # An interface that slides and is unloaded later may still come to rest.
     stress = load.values[-1] * nodes.profile + nodes.initial  # at the end of the samples
-    unloaded = load.values[-1] < load.values[-2] or stress.mean() < nodes.residual.mean()
+    too_low = stress[finite].mean() < nodes.residual[finite].mean()
+    unloaded = load.values[-1] < load.values[-2] or too_low
     rests_later = method.stop == "rest" and unloaded and not held
     # The longest wave crosses the interface in 2 pi/(|k| c_s).
-    frequency = medium.grid.frequency
-    crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() / medium.step
+    frequency, longest = medium.grid.frequency, max(medium.interface.lengths)
+    reach = medium.interface.reach
+    crossing = 2.0 * np.pi / frequency[frequency > 0.0].min() * (reach / longest) / medium.step
     typical = float(np.median((nodes.peak - nodes.residual)[finite]))
     front_share = min(friction.slip_at(1.0 - method.arrival), friction.reach) / friction.reach
     breakable = int(np.count_nonzero(finite))
@@ -448,7 +452,7 @@ def _thresholds(
         rest_stop=method.stop == "rest",
         end_time=np.inf if method.end_time is None else method.end_time,
         breakable=breakable,
-        calm_slip=max(medium.interface.lengths) / medium.problem.effective_modulus,
+        calm_slip=reach / medium.problem.effective_modulus,
         calm_count=max(_MIN_CALM_STEPS, int(np.ceil(crossing))),
         slip_step=method.slip_step,
         load_step=method.load_step,

@@ -225,7 +225,7 @@ class EventRecord:
         variables = {name: along(interface, variable) for name, variable in nodal.items()}
         variables |= VARIABLES | of_events
         if problem.area is not None:
-            values |= forces(values, problem.area)
+            values |= forces(values, problem.area, problem.whole_area)
             variables |= force_variables(variables)
         frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"])
         values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum

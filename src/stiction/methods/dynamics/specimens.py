@@ -151,8 +151,9 @@ def begin(
     `arrival` is the slip, in units of d_c,
     at which a front counts as arrived.
     """
-    fall = (sample.excess - sample.residual)[np.isfinite(sample.excess)]
-    load = before.load + LOAD_RISE * float(fall.mean() / sample.profile.mean())
+    can_break = np.isfinite(sample.excess)
+    fall = (sample.excess - sample.residual)[can_break]
+    load = before.load + LOAD_RISE * float(fall.mean() / sample.profile[can_break].mean())
     # Scale the unstable direction by the node that grows fastest.
     z = before.direction
     fastest = int(np.argmax(z))
@@ -164,8 +165,7 @@ def begin(
     front = arrival * sample.critical
     front = np.where(before.slip < front, np.maximum(front, slip * (1.0 + 1e-12)), front)
     waves = block_at_rest(mesh, slip)
-    typical = float(np.median(sample.excess - sample.residual))
-    waves.now["fast_slip_rate"] = UNSTABLE_STRESS * typical / mesh.impedance
+    waves.now["fast_slip_rate"] = UNSTABLE_STRESS * float(np.median(fall)) / mesh.impedance
     return DynamicEvent(sample, mesh, before, start, waves, front)
 
 

@@ -84,12 +84,12 @@ DIAGNOSTICS = np.dtype(
         ("mean_slip", "f8"),  # m
         ("mean_slip_rate", "f8"),  # m/s
         ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
-        ("whole_stress", "f8"),  # mean stress of all nodes
+        ("whole_stress", "f8"),  # and with the stress that nodes beyond an extent took over
         ("strength_change", "f8"),  # change of their mean strength by slip
         ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
         ("top_node", "i8"),
         ("weakened_nodes", "i8"),  # number of nodes at the residual strength
-        # The last maximum of the mean stress of all nodes.
+        # The last maximum of `whole_stress`.
         ("maximum_stress", "f8"),
         ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time
         ("maximum_radiated", "f8"),  # Z <V>
@@ -118,7 +118,7 @@ DIAGNOSTICS = np.dtype(
         ("arrested_events", "i8"),
         ("last_arrested", "i8"),  # whether the last instability is among them
         ("first_stress", "f8"),  # mean stress at the first instability
-        ("onset_stress", "f8"),  # mean stress of all nodes at the highest instability
+        ("onset_stress", "f8"),  # `whole_stress` at the highest instability
         ("critical_stress", "f8"),  # largest mean stress of breakable nodes at an instability
         ("onset_time", "f8"),
         ("onset_load", "f8"),

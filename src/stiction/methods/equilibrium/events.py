@@ -206,13 +206,15 @@ def _measures(
         **timed,
     }
     if problem.specimen is not None:
+        # The machine drives the whole interface, also beyond an extent.
+        whole = before.load - float(problem.blocks.mean_relief(before.slip))
         travel_before = travel_of(problem, before.load, before.slip)
         travel_after = travel_of(problem, after.load, after.slip)
         values |= {
             "event_stress_drop": (stress_before - stress_after) * profile,
             "event_travel": travel_before,
             "event_crosshead_travel": travel_before
-            + elongation_of(problem, values["event_stress"]),
+            + elongation_of(problem, float(rows.initial_stress[row].mean()) + whole),
             "event_travel_step": travel_after - travel_before,
             "event_start": float(np.argmax(inside)) * interface.spacing,
         }

@@ -249,7 +249,7 @@ def equilibrium_path(
         values |= {"travel": travel, "crosshead_travel": far}
         variables |= TRAVEL
     if problem.area is not None:
-        values |= forces(values, problem.area)
+        values |= forces(values, problem.area, problem.whole_area)
         variables |= force_variables(variables)
     coordinates = {"load": (given, LOAD), "event": (np.arange(len(events)), EVENT)}
     attributes = study_attributes(problem=problem, **({"method": method} if method else {}))

@@ -129,6 +129,7 @@ class Bracket:
         self.lower = float((self.excess / self.profile).min())
         self.upper = np.inf
         self.can_break = np.isfinite(self.excess)
+        self._mean_profile = float(self.profile[self.can_break].mean())
         # Where nothing can break y = 0, and inf times 0 must count as 0.
         self.finite_excess = np.where(self.can_break, self.excess, 0.0)
         if self.can_break.all():
@@ -149,7 +150,8 @@ class Bracket:
         """Load to which relative gaps refer: the onset, unless the onset is close to zero."""
         return max(
             abs(self.upper),
-            MIN_MAGNITUDE * float(np.abs(self.finite_excess).mean() / self.profile.mean()),
+            MIN_MAGNITUDE
+            * float(np.abs(self.excess[self.can_break]).mean() / self._mean_profile),
         )
 
     def closed(self, gap: float) -> bool:
@@ -159,7 +161,7 @@ class Bracket:
     @property
     def scale(self) -> float:
         """Stress to which errors refer, Pa."""
-        return self.magnitude * float(self.profile.mean())
+        return self.magnitude * self._mean_profile
 
     def raise_slip(self, slip: Array) -> None:
         """Accept a slip, cut off at zero, if it proves a higher lower bound."""

@@ -111,8 +111,9 @@ def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> fl
 
     Strength above the load, such as the strength of barriers, does not count.
     """
-    applied = abs(load) * sample.profile
-    mean = np.minimum(np.abs(sample.excess), applied).mean() + applied.mean()
+    can_break = np.isfinite(sample.excess)
+    applied = abs(load) * sample.profile[can_break]
+    mean = np.minimum(np.abs(sample.excess[can_break]), applied).mean() + applied.mean()
     return accuracy * float(mean)
 
 
