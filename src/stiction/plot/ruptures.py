@@ -54,6 +54,8 @@ DECADES = 7.0
 """Drawn decades of slip rate below the largest."""
 BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
+FILMED_RATE = 1e-3
+"""Slip rate, over the largest of a run, from which its frames are in a film."""
 SHOWN_RATE, BESIDE_PULSE = 0.05, 0.25
 """Moment rate from which on a rupture is drawn, as a share of its largest, and the time before and
 after, as a share of its duration. Slip that follows the load reaches a hundredth."""
@@ -131,7 +133,7 @@ def moment_rate(run: xr.Dataset) -> NDArray[Any]:
     'frequency (Hz)'
     """
     need(run, "moment_rate", "moment_rate_spectrum", "onset_time")
-    since, begin = _since_onset(run)
+    since, begin = _since_onset(run, "step_time")
     moment_rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
     fast = since[moment_rate.values > SHOWN_RATE * moment_rate.values.max()]
     ends = (fast[0], fast[-1]) if fast.size else (since[0], since[-1])
@@ -284,8 +286,8 @@ def film(
         Ends in .gif.
     frames : int
         Maximum number of frames. They are evenly spaced over the frames
-        of the run, which are closer in time as the interface
-        accelerates.
+        of the run from the first to the last slip that is faster than
+        a thousandth of the fastest, so that creep is left out.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -305,7 +307,10 @@ def film(
     target = check("path", path, FilePath)
     if target.suffix != ".gif":
         raise InputError(f"path: must end in .gif, got {target.name!r}")
-    shown = np.unique(np.linspace(0, run.sizes["time"] - 1, frames).round().astype(int))
+    top = run["top_slip_rate"].values
+    fast = np.flatnonzero(top >= FILMED_RATE * top.max())
+    first, last = max(fast[0] - 1, 0), min(fast[-1] + 1, top.size - 1)
+    shown = np.unique(np.linspace(first, last, frames).round().astype(int))
     images, still = [], Image.Dither.NONE  # with dithering, parts at rest would flicker
     with paper_style(), Meter("film", shown.size, progress, unit="frames") as meter:
         figure, moving = (_plane_film if "y" in run.dims else _line_film)(run)

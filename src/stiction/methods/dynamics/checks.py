@@ -106,6 +106,15 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         )
 
 
+def warn_of_cut_events(count: int) -> None:
+    """Warn about events in which slip was still fast, or had just been, as their run ended."""
+    if count:
+        warn_accuracy(
+            f"end_time: {count} events had not ended when their run did. Their moments, energies"
+            " and stress drops are values at this time (event_settled is 0). Raise end_time"
+        )
+
+
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
     """Return the rise of the load while shear waves cross the nucleation length, and its rate.
 

@@ -52,6 +52,10 @@ Algorithm, after each step of a run (`observe`)
    the last nodes beside the end of an extent may creep to this
    state. If they do, the interface slid in the previous
    instability, which then does not count as arrested.
+6. An event of the table ends once no node has slipped fast during
+   `Thresholds.settling_time`. Neither the size of a step, nor creep
+   under the load, nor a late echo of a periodic image moves this end.
+   Its instability ends with it.
 
 This has two consequences. A maximum without such a fall, for example
 the largest load or the stress that returns when slip ends, is not an
@@ -245,6 +249,11 @@ def finish_step(
     if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:
         now.fast_since = now.fast_since if now.fast else now.time
         now.fast, now.fast_until = 1, now.time
+    settled = now.time >= now.fast_until + thresholds.settling_time
+    if settled and now.fast and now.event_open and not now.event_begun:
+        # 6. The end of an event. The next one may begin from here.
+        end_event(now, thresholds.unstable_slip_rate, step.radiated)
+        now.event_calm = 1
     if now.maximum_time == now.time:  # an event may begin here
         now.maximum_work = now.work
         for i in range(slip.size):

@@ -320,7 +320,7 @@ def implicit_steps(
             reason = Reason.DROPPED
         elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
             reason = Reason.TO_EXPLICIT
-        ends = reason != Reason.DONE or now.event_begun
+        ends = reason != Reason.DONE or now.event_begun or now.event_calm
         if ends or last or now.time >= thresholds.end_time:
             break
     return taken, step, reason

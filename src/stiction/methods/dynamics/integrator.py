@@ -262,36 +262,52 @@ class Run:
         return taken, Reason.DONE
 
     def _follow_event(self, state: RuptureState, rests: bool) -> None:
-        """Keep the open event if it has come to rest. Open the event that has just begun.
+        """Keep the open event if it has ended. Open the event that has just begun.
 
-        An event comes to rest when the interface is calm (`rests`). If
-        the next event begins before, the open event ends at the maximum
-        of the mean stress at which the next event begins.
+        An event ends when its fast slip has settled (`rests`). If the
+        next event begins before, the open event ends at the maximum of
+        the mean stress at which the next event begins.
         """
-        now, slip, load, work = state.now, state.maximum_slip, "maximum_load", "maximum_work"
+        now = state.now
         if rests:
-            slip, load, work = state.slip, "load", "work"
-        # A sliding interface can be calm,
-        # too. Its event has not come to rest.
-        thresholds = self.setting.thresholds
-        slides = rests and now["all_broken"] and not thresholds.held
+            self._keep_event(state, state.slip, "load", "work")
+        else:
+            self._keep_event(state, state.maximum_slip, "maximum_load", "maximum_work")
+        now["fast"], now["event_open"] = 0, now["event_begun"]
+        # The next event may begin from the present state of rest.
+        if rests and now["maximum_time"] == now["time"]:
+            now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
+        for name in ("time", "load", "work", "node"):
+            now[f"event_{name}"] = now[f"maximum_{name}"]
+        state.event_slip[:] = state.maximum_slip
+        now["event_begun"] = now["event_calm"] = 0
+
+    def _keep_event(
+        self, state: RuptureState, slip: Floats, load: str, work: str, settled: bool = True
+    ) -> None:
+        """Keep the open event with its slip, load and work at the end, if its slip was fast."""
+        now, thresholds = state.now, self.setting.thresholds
+        # A sliding interface never comes to rest.
+        slides = now["all_broken"] and not thresholds.held and slip is state.slip
         slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
         if now["event_open"] and now["fast"] and not slides:
             event = np.zeros((), event_type(slip.size))
-            event["time"] = now["event_time"]
+            event["time"], event["node"] = now["event_time"], now["event_node"]
+            event["settled"] = settled
             event["duration"] = now["fast_until"] - now["fast_since"]
             event["load"] = now["event_load"], now[load]
             event["work"] = now["event_work"], now[work]
             event["slip"] = state.event_slip, slip
             self.events.append(event)
-        now["fast"], now["event_open"] = 0, now["event_begun"]
-        # The next event may begin from the present state of rest.
-        if rests and now["maximum_time"] == now["time"]:
-            now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
-        for name in ("time", "load", "work"):
-            now[f"event_{name}"] = now[f"maximum_{name}"]
-        state.event_slip[:] = state.maximum_slip
-        now["event_begun"] = now["event_calm"] = 0
+
+    def cut_event(self, state: RuptureState) -> None:
+        """Keep the event that the end of the run cuts short."""
+        self._keep_event(state, state.slip, "load", "work", settled=False)
+
+    @property
+    def cut_events(self) -> int:
+        """Number of events that the end of the run cut short, 0 or 1."""
+        return sum(not event["settled"] for event in self.events)
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()

@@ -36,6 +36,7 @@ ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
 _EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
+_SETTLING_CROSSINGS = 0.5  # times shear waves cross the part that can break after fast slip
 
 _UNKNOWN_AT_ONSET = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
@@ -314,7 +315,7 @@ class Rupture:
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_of_coarse_grid(problem, rows)
-            summaries, rises = [], []
+            summaries, rises, cut = [], [], 0
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
                 start = None
@@ -322,6 +323,8 @@ class Rupture:
                     start = slow_start(static, run, rows, i, loading_rate)
                 summaries.append(self._summary_of(run, start, rows, i))
                 rises.append(checks.rise_in_crossing(run, summaries[-1]))
+                cut += run.cut_events
+            checks.warn_of_cut_events(cut)
             checks.warn_of_survival(self.stop, summaries)
             checks.warn_of_fast_loading(rises)
             names = self.variables(problem)
@@ -351,6 +354,7 @@ class Rupture:
                     f" tau_0 = {state.now['load']:.6g} Pa with {state.now['weakened_nodes']} nodes"
                     " at their residual strength. Raise max_steps or the loading rate"
                 )
+            run.cut_event(state)
         checks.warn_of_slip(run, state)
         values = summary(run, state)
         if self.stop == "onset":
@@ -454,6 +458,7 @@ def _thresholds(
         breakable=breakable,
         calm_slip=reach / medium.problem.effective_modulus,
         calm_count=max(_MIN_CALM_STEPS, int(np.ceil(crossing))),
+        settling_time=_SETTLING_CROSSINGS * reach / medium.problem.solid.shear_wave_speed,
         slip_step=method.slip_step,
         load_step=method.load_step,
         smallest_step=_EXPLICIT_STEPS_IN_IMPLICIT * medium.step,

@@ -38,7 +38,7 @@ from stiction.base.model import (
     model,
 )
 from stiction.base.netcdf import read_netcdf
-from stiction.base.variables import Variable
+from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import (
     DIAGNOSTICS,
@@ -85,7 +85,6 @@ SCALARS: dict[str, Variable] = over(
     top_slip_rate=("m/s", "largest slip rate"),
     weakened_fraction=("1", "share of nodes at the residual strength"),
     seismic_moment=("N", "seismic moment per length"),
-    moment_rate=("N/s", "seismic moment rate per length"),
     work=("J/m", "work of the load on the slip"),
     strain_energy=("J/m", "static strain energy of the slip"),
     fracture_energy=("J/m", "energy dissipated above the residual"),
@@ -101,6 +100,9 @@ STEPS = over(  # DIAGNOSTICS of these names
     step_top_slip_rate=("m/s", "largest slip rate after each step"),
     step_size=("s", "size of each step"),
     step_work=("J/m", "work of the load up to each step"),
+)
+MOMENT_RATE = over(
+    "step", moment_rate=("N/s", "seismic moment rate per length after each step")
 )
 STATIONS = over(  # as in STATION
     "step",
@@ -215,7 +217,8 @@ class Recorder:
         self._frames: list[dict[str, Any]] = []
         self._steps: list[dict[str, Floats]] = []
         variables = {name: along(interface, field) for name, field in FIELDS.items()}
-        variables |= SCALARS | STEPS | STATIONS
+        variables |= SCALARS | STEPS | MOMENT_RATE | STATIONS
+        variables |= force_variables(SCALARS)
         self.variables = {
             name: per_area(interface, variable) for name, variable in variables.items()
         }
@@ -239,7 +242,6 @@ class Recorder:
             "weakened_fraction": float(now["weakened_nodes"])
             / run.setting.thresholds.breakable,
             "seismic_moment": moment_of(medium.problem, state.slip),
-            "moment_rate": moment_of(medium.problem, state.slip_rate),
         }
         # Energies are quadratic and overflow first.
         with np.errstate(over="ignore"):  # just before a run becomes non-finite
@@ -263,6 +265,10 @@ class Recorder:
         data |= {name: data[name].reshape(shape) for name in save.fields}
         for name, column in self._columns.items():
             data[name] = np.concatenate([column[:0], *(steps[name] for steps in self._steps)])
+        problem = self.run.medium.problem
+        moment_per_slip = problem.solid.shear_modulus * interface.breakable_measure
+        data["moment_rate"] = moment_per_slip * data["step_mean_slip_rate"]
+        data |= forces(data, problem.area, problem.whole_area)
         self._frames, self._steps = [], []
         coordinates = {"time": (data.pop("time"), TIME)}
         coordinates |= {dim: coordinate(interface, dim) for dim in interface.dims}

@@ -10,6 +10,7 @@ import numpy as np
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Number, Progress, checked
 from stiction.base.progress import Meter
+from stiction.base.variables import FRICTION_COEFFICIENT, force_variables, forces
 from stiction.methods.dynamics import checks
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.method import Rupture, make_run
@@ -69,19 +70,21 @@ def simulate_rupture(
     xarray.Dataset
         Over ('time', 'x'): the fields. Over 'time': `load`,
         `mean_stress`, `mean_slip`, `top_slip_rate`,
-        `weakened_fraction`, `seismic_moment`, `moment_rate`, `work` and
-        energies. Over 'step': `step_time`, and some of the above after
+        `weakened_fraction`, `seismic_moment`, `work` and energies. Over
+        'step': `step_time`, `moment_rate`, and some of the above after
         every step. Over ('step', 'station'): `station_slip`,
         `station_slip_rate` and `station_shear_stress`. Over 'station':
         `station_x` (and `station_y`), the places of the nodes. Over
         'x': `peak_strength` and `arrival_time`. Over 'event': the table
         of events, with the variables of `equilibrium_path`,
-        `event_time`, `event_duration` and `event_radiated_energy`. Over
+        `event_time`, `event_duration`, `event_radiated_energy` and
+        `event_settled`. Over
         'frequency': `moment_rate_spectrum`, the amplitude spectrum of
         the moment rate from the onset to the next event or to the end
         of the run, which cuts off an interface that slides. The scalars
-        of `Rupture` refer to the run so far. The attribute `stopped` is
-        the reason why the run ended.
+        of `Rupture` refer to the run so far. Forces and the
+        `friction_coefficient` are as in `onset`. The attribute
+        `stopped` is the reason why the run ended.
 
         On a specimen, there are also `machine_stress` (with a thickness
         `machine_force`, N) and `drive_travel` over 'time', and energies
@@ -90,7 +93,6 @@ def simulate_rupture(
         velocity along x in the upper block (m/s) at a few times. The
         lower block is its mirror image and moves the opposite way. The
         table of events holds all events of the path that came to rest.
-        There is no 'step'.
 
     Raises
     ------
@@ -148,6 +150,8 @@ def simulate_rupture(
     recorder.attributes["stopped"] = stopped
     checks.warn_of_slip(run, state)
     recorder.flush(state, last=True)
+    run.cut_event(state)
+    checks.warn_of_cut_events(run.cut_events)
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, method, run, state, rows)
@@ -189,14 +193,12 @@ def _record_to_end(
 
 def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
     """Return the spectrum of the highest instability, up to the next one or the end of the run."""
-    problem, interface = run.medium.problem, run.medium.interface
-    stiffness = problem.solid.shear_modulus * interface.breakable_measure
-    moment_rate = stiffness * dataset["step_mean_slip_rate"].values
+    moment_rate = dataset["moment_rate"].values
     time, onset = dataset["step_time"].values, float(state.now["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]
     inside = (time >= onset) & (time <= min(later, default=np.inf))
     inside &= state.now["instabilities"] > 0
-    return rate_spectrum(problem, time[inside], moment_rate[inside])
+    return rate_spectrum(run.medium.problem, time[inside], moment_rate[inside])
 
 
 def _complete(
@@ -218,6 +220,13 @@ def _complete(
         events, of_events = arrested_events(run), event_variables(interface, inertia=True)
         values |= event_table(problem, rows, 0, events, of_events)
     variables |= of_events
+    pressure = float(rows.mean(rows.normal_pressure)[0])  # NaN if the problem has none
+    if not np.isnan(pressure):
+        values["friction_coefficient"] = values["critical_stress"] / pressure
+        variables["friction_coefficient"] = replace(FRICTION_COEFFICIENT, dims=())
+    if problem.area is not None:
+        values |= forces(values, problem.area, problem.whole_area)
+        variables |= force_variables(variables)
     # Energies and moment are there already, over 'time'. Their last
     # value is the total.
     added = {name: value for name, value in values.items() if name not in SCALARS}

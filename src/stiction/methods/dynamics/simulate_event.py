@@ -18,7 +18,16 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.base.variables import Variable, force_variables, forces
 from stiction.methods.dynamics.mesh import layer_matrix
-from stiction.methods.dynamics.save import FIELDS, OVER_NODES, SCALARS, TIME, Save, over
+from stiction.methods.dynamics.save import (
+    FIELDS,
+    MOMENT_RATE,
+    OVER_NODES,
+    SCALARS,
+    STEPS,
+    TIME,
+    Save,
+    over,
+)
 from stiction.methods.dynamics.specimens import (
     DynamicEvent,
     RuptureSearch,
@@ -50,7 +59,7 @@ OVER_TIME = over(
     attenuated_energy=("J/m", "energy lost to attenuation, the rest of the work"),
 )
 AS_BETWEEN_HALF_SPACES = (
-    "load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction", "moment_rate",
+    "load", "mean_stress", "mean_slip", "top_slip_rate", "weakened_fraction",
 )  # fmt: skip
 OF_EVENT = over(
     critical_load=("Pa", "drive of the event"),
@@ -63,7 +72,7 @@ OF_PICTURES = over(
 VARIABLES: dict[str, Variable] = {
     **{name: SCALARS[name] for name in AS_BETWEEN_HALF_SPACES},
     **{name: replace(speed, dims=()) for name, speed in SPEEDS.items()},
-    **OVER_TIME, **OF_EVENT, **OF_PICTURES,
+    **OVER_TIME, **OF_EVENT, **OF_PICTURES, **MOMENT_RATE, "step_time": STEPS["step_time"],
 }  # fmt: skip
 
 
@@ -97,7 +106,7 @@ def simulate_event(
         record = EventRecord(problem, rows, search.event(sample, before), save, trial)  # 3.
         record.add()
         for _ in range(0, steps, save.every):
-            record.event.take_steps(save.every, ends=False)
+            record.take_steps(save.every)
             record.add()
     return record.dataset(method, "sliding" if trial.slides else "rest", path)
 
@@ -123,9 +132,18 @@ class EventRecord:
         self.frames: list[dict[str, Any]] = []
         self.pictures: list[Any] = []
         self.picture_times: list[float] = []
+        self.steps: list[tuple[float, float]] = []  # time (s) and moment rate (N/s)
         nodes, count = problem.interface.size, event.mesh.heights.size - 1
         self._layers = [layer_matrix(event.mesh, row, nodes) for row in range(count)]
         self._begun = event.waves.slip.copy()
+
+    def take_steps(self, count: int) -> None:
+        """Take `count` steps, and keep the moment rate after each."""
+        for _ in range(count):
+            self.event.take_steps(1, ends=False)
+            waves = self.event.waves
+            rate = moment_of(self.problem, waves.slip_rate)
+            self.steps.append((float(waves.now["time"]), rate))
 
     def add(self) -> None:
         """Keep a frame of the present state, and a picture of the block if it is due."""
@@ -150,7 +168,6 @@ class EventRecord:
                 "mean_stress": problem.interface.mean(fields["shear_stress"]),
                 "mean_slip": problem.interface.mean(waves.slip),
                 "top_slip_rate": waves.slip_rate.max(),
-                "moment_rate": moment_of(problem, waves.slip_rate),
                 "weakened_fraction": problem.interface.mean(residual_nodes(sample, waves.slip)),
                 "machine_stress": stress_before + now["force"] / problem.interface.measure,
                 "drive_travel": 2.0 * now["travel"],
@@ -227,7 +244,8 @@ class EventRecord:
         if problem.area is not None:
             values |= forces(values, problem.area, problem.whole_area)
             variables |= force_variables(variables)
-        frequency, spectrum = rate_spectrum(problem, time, values["moment_rate"])
+        values["step_time"], values["moment_rate"] = np.array(self.steps).T
+        frequency, spectrum = rate_spectrum(problem, values["step_time"], values["moment_rate"])
         values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum
         taken = Variable("s", "time of a picture of the block", ("snapshot",))
         above = Variable("m", "height above the interface", ("height",))

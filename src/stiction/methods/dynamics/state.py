@@ -104,14 +104,15 @@ DIAGNOSTICS = np.dtype(
         ("instabilities", "i8"),  # number of instabilities so far
         ("in_event", "i8"),  # whether an instability is under way
         ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
-        # The event that `Run` follows until all is calm, or until the
-        # next one begins.
+        # The event that `Run` follows until its fast slip has settled,
+        # or until the next one begins.
         ("event_open", "i8"),  # whether there is one
         ("event_begun", "i8"),  # whether one has just begun,
         ("event_calm", "i8"),  # or has just ended
         ("event_time", "f8"),  # when it began, s, at this load, Pa, after this work, J/m
         ("event_load", "f8"),
         ("event_work", "f8"),
+        ("event_node", "i8"),  # the fastest as it began
         ("fast", "i8"),  # whether a node slipped fast in the event, and if so
         ("fast_since", "f8"),  # first and last time above `unstable_slip_rate`
         ("fast_until", "f8"),  # in the event, s
@@ -155,6 +156,8 @@ def event_type(nodes: int) -> np.dtype[Any]:
     return np.dtype(
         [
             ("time", "f8"),  # when it began, s
+            ("node", "i8"),  # where it began
+            ("settled", "i8"),  # 0 if the end of the run cut it short
             ("duration", "f8"),  # from the first to the last fast slip, s
             ("load", "f8", (2,)),  # tau_0, Pa
             ("work", "f8", (2,)),  # of the load on the slip so far, J/m
@@ -181,6 +184,7 @@ class Thresholds(NamedTuple):
     breakable: int  # number of nodes that can break
     calm_slip: float  # slip of a calm step per rise of the load, m/Pa; see `explicit._calm`
     calm_count: int  # calm steps in a row after which implicit steps take over
+    settling_time: float  # time after the last fast slip at which an event has ended, s
     slip_step: float  # weakening of a node in an implicit step, in units of tau_p - tau_r
     load_step: float  # largest rise of the load in a step, in units of the stress scale
     smallest_step: float  # of implicit steps, s; below it explicit steps take over

@@ -21,7 +21,7 @@ from stiction.base.arrays import Array
 from stiction.base.variables import Variable
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Floats, RuptureState, Spectrum
-from stiction.methods.equilibrium.events import ArrestedEvent, moment_of
+from stiction.methods.equilibrium.events import ArrestedEvent, moment_of, place_of
 from stiction.methods.equilibrium.state import EquilibriumState
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
@@ -148,12 +148,14 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
             slip_hat = interface.transform(slip.reshape(interface.shape)).ravel()
             radiated.append(_energies(run, slip, slip_hat, work)["radiated_energy"])
             states.append(EquilibriumState(float(load), slip, np.empty(0)))
-        timed = {
+        known: dict[str, Any] = {
             "event_time": float(record["time"]),
+            "event_settled": float(record["settled"]),
+            "event_hypocentre": place_of(interface, int(record["node"])),
             "event_duration": float(record["duration"]),
             "event_radiated_energy": radiated[1] - radiated[0],
         }
-        events.append(ArrestedEvent(states[0], states[1], timed))
+        events.append(ArrestedEvent(states[0], states[1], known))
     return events
 
 

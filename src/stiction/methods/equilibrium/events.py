@@ -54,7 +54,6 @@ OF_SPECIMENS = {
         "m", "travel of the machine's far ends before the event", ("event",)
     ),
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
-    "event_start": Variable("m", "left end of the patch that slipped", ("event",)),
 }
 WITH_INERTIA = {
     "event_duration": Variable("s", "time from the first to the last fast slip", ("event",)),
@@ -62,6 +61,7 @@ WITH_INERTIA = {
 BETWEEN_HALF_SPACES = {
     "event_time": Variable("s", "time from zero load to the event", ("event",)),
     "event_radiated_energy": Variable("J/m", "energy radiated by the event", ("event",)),
+    "event_settled": Variable("1", "whether the event ended before its run did", ("event",)),
 }
 MIN_ADDED_SLIP = 1e-3
 """Smallest added slip of the nodes in the patch of an event, as a share of the largest."""
@@ -78,12 +78,18 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
     plane = interface.is_plane
     centre = variable("m", "centre of the slip added by the event")
     extent = variable("m", f"{'extent' if plane else 'length'} of the patch that slipped")
+    hypocentre = variable("m", "position of the node from which the event starts")
+    start = variable("m", "end of the patch that slipped, towards smaller coordinates")
+    end = variable("m", "end of the patch that slipped, towards larger coordinates")
     moment = "shear modulus times slip added" + ("" if plane else ", per unit depth")
     variables = {
         "event_load": variable("Pa", "load factor of the event"),
         "event_stress": variable("Pa", "mean interface stress at the event"),
         "event_position": position(interface, centre),
+        "event_hypocentre": position(interface, hypocentre),
         "event_extent" if plane else "event_length": position(interface, extent),
+        "event_start": position(interface, start),
+        "event_end": position(interface, end),
         **({"event_area": variable("m2", "area of the patch that slipped")} if plane else {}),
         "event_mean_slip": variable("m", "mean slip added to that patch"),
         "event_largest_slip": variable("m", "largest slip added by the event"),
@@ -114,13 +120,13 @@ def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
 class ArrestedEvent(NamedTuple):
     """The states before and after an instability that came to rest.
 
-    `timed` holds, by name, the variables that only a method with
-    inertia provides.
+    `known` holds, by name, the variables that only a method with
+    inertia provides, and those that it knows better.
     """
 
     before: EquilibriumState
     after: EquilibriumState
-    timed: Mapping[str, float] = MappingProxyType({})
+    known: Mapping[str, Any] = MappingProxyType({})
 
 
 def event_table(
@@ -157,7 +163,7 @@ def _measures(
     row: int,
     before: EquilibriumState,
     after: EquilibriumState,
-    timed: Mapping[str, float],
+    known: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the variables of one event."""
     interface, law = problem.interface, problem.friction
@@ -186,13 +192,18 @@ def _measures(
     released = 0.5 * float(((2.0 * above - drop) * added).sum()) * interface.cell
     # With inertia, the energies are known. They include the work of the
     # load that rises.
-    if "event_radiated_energy" in timed:
-        released = fracture + timed["event_radiated_energy"]
+    if "event_radiated_energy" in known:
+        released = fracture + known["event_radiated_energy"]
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
         "event_position": patch.centre,
+        "event_hypocentre": place_of(interface, int(np.argmax(before.direction)))
+        if before.direction.any()
+        else (np.nan,) * len(interface.shape),
         "event_length": patch.area,
+        "event_start": patch.starts,
+        "event_end": np.mod(np.add(patch.starts, patch.extents), _periods(interface)),
         "event_extent": patch.extents,
         "event_area": patch.area,
         "event_mean_slip": added[inside].mean(),
@@ -203,7 +214,7 @@ def _measures(
         "event_slip_stress_drop": (drop * added).sum() / added.sum(),
         "event_energy_stress_drop": 2.0 * released / (added.sum() * interface.cell),
         "event_fracture_energy": fracture,
-        **timed,
+        **known,
     }
     if problem.specimen is not None:
         # The machine drives the whole interface, also beyond an extent.
@@ -216,9 +227,19 @@ def _measures(
             "event_crosshead_travel": travel_before
             + elongation_of(problem, float(rows.initial_stress[row].mean()) + whole),
             "event_travel_step": travel_after - travel_before,
-            "event_start": float(np.argmax(inside)) * interface.spacing,
         }
     return values
+
+
+def place_of(interface: Interface, node: int) -> list[float]:
+    """Return the position of a node of the flattened interface along each direction, m."""
+    entry = np.unravel_index(node, interface.shape)
+    return [float(at[i]) for at, i in zip(interface.coordinates.values(), entry, strict=True)]
+
+
+def _periods(interface: Interface) -> tuple[float, ...]:
+    """Return the length in each direction after which places repeat, m, or infinity."""
+    return (np.inf,) if interface.is_free else interface.lengths
 
 
 def moment_of(problem: Problem, slip: Array) -> float:

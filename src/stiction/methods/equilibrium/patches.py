@@ -27,11 +27,15 @@ share changes areas by a sixth to a quarter, and no other result.
 
 
 class Patch(NamedTuple):
-    """Centre (m, from 0 to the period) and extents (m) along each direction, area (m²; m)."""
+    """Centre, extents and first ends (m) along each direction, and area (m²; m).
+
+    Centre and first ends are from 0 to the period.
+    """
 
     centre: tuple[float, ...]
     extents: tuple[float, ...]
     area: float
+    starts: tuple[float, ...]
 
 
 def count_patches(slip: Array) -> int:
@@ -91,9 +95,11 @@ def with_ends(field: Array, interface: Any) -> Array:
 def line_patch(field: Array, interface: Any) -> Patch:
     """Return the patch on a line that contains the largest entry of a field."""
     spacing = interface.spacing
-    _, length, centre = main_patch(with_ends(field, interface))
+    first, length, centre = main_patch(with_ends(field, interface))
     centre += interface.first
-    return Patch((centre * spacing,), (length * spacing,), length * spacing)
+    # A node represents half a spacing on each side.
+    start = (first + interface.first - 0.5) % field.size * spacing
+    return Patch((centre * spacing,), (length * spacing,), length * spacing, (start,))
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
@@ -134,7 +140,7 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
 def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
     """Return the patch marked by a mask on a plane, centred at the centroid of the weight."""
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
-    centre, extents = [], []
+    centre, extents, starts = [], [], []
     for axis in (0, 1):
         # The other axis is projected away, so that the patch becomes an arc.
         start, length = span(np.any(mask, axis=1 - axis), int(peak[axis]))
@@ -144,8 +150,9 @@ def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
         place = (start + (along * np.arange(length)).sum() / along.sum()) % n
         centre.append(float(place * spacings[axis]))
         extents.append(length * spacings[axis])
+        starts.append((start - 0.5) % n * spacings[axis])
     area = float(mask.sum()) * spacings[0] * spacings[1]
-    return Patch((centre[0], centre[1]), (extents[0], extents[1]), area)
+    return Patch(tuple(centre), tuple(extents), area, tuple(starts))
 
 
 def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Patch]:
@@ -177,7 +184,7 @@ def critical_patch(multiplier: Array, interface: Any) -> Patch:
     """
     if not multiplier.any():
         nowhere = (np.nan,) * len(interface.shape)
-        return Patch(nowhere, nowhere, np.nan)
+        return Patch(nowhere, nowhere, np.nan, nowhere)
     if not interface.is_plane:
         return line_patch(multiplier, interface)
     field = multiplier.reshape(interface.shape)

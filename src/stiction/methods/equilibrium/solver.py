@@ -127,7 +127,7 @@ def follow_to_sliding(
             first = first or state
         slides = outcome in (Outcome.SLIDING, Outcome.UNDECIDED)
         if outcome == Outcome.ARRESTED:  # 4.
-            events.append(ArrestedEvent(state, jump.state, jump.timed))
+            events.append(ArrestedEvent(state, jump.state, jump.known))
             slides = all_breakable_slip(sample, jump.state.slip)
         if slides:
             arrival = jump.arrival

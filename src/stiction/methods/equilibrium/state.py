@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Jump(NamedTuple):
     outcome: Outcome
     state: EquilibriumState
     arrival: Array | None = None  # with inertia: arrival time of the front at each node, s
-    timed: Mapping[str, float] = MappingProxyType({})  # with inertia: variables of the event
+    known: Mapping[str, Any] = MappingProxyType({})  # with inertia: variables of the event
 
 
 class EquilibriumSearch(Protocol):
