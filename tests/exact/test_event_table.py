@@ -85,16 +85,20 @@ def test_energies_of_an_event_add_up():
     run = st.simulate_rupture(problem, strength, method=method, save=st.Save(["slip"], every=1))
     event, cell, load = run.isel(event=0), problem.interface.cell, run["load"].values
     since = int(np.argmin(np.abs(run.time.values - float(event.event_time))))
-    slip = run.slip.values[since:]
-    added, rise = slip[-1] - slip[0], load[since:] - load[since]
+    # The event ends before the run, at the frame with its moment.
+    moment = run.seismic_moment.values
+    end = int(np.argmin(np.abs(moment - moment[since] - float(event.event_moment)))) + 1
+    slip = run.slip.values[since:end]
+    added, rise = slip[-1] - slip[0], load[since:end] - load[since]
     stress = load[since] - 2e5 - problem.released_stress(slip[0] + 0.5 * added)
     work = (stress * added).sum() + np.trapezoid(rise, slip.sum(axis=1))
     shared = float(event.event_fracture_energy + event.event_radiated_energy)
     assert cell * work == pytest.approx(shared, rel=1e-9)
     assert event.event_energy_stress_drop == pytest.approx(2.0 * work / added.sum(), rel=1e-9)
-    # The load rises by a quarter of the stress drop in the event.
-    assert work > 1.2 * (stress * added).sum()
-    assert float(event.event_moment) == pytest.approx(float(run.seismic_moment[-1]), rel=0.05)
+    # The load rises by an eighth of the stress drop in the event.
+    assert work > 1.1 * (stress * added).sum()
+    # The rest of the run is creep that the load drives.
+    assert moment[-1] > 1.1 * float(event.event_moment)
 
 
 def test_a_spectrum_is_that_of_the_lines_between_the_times():
@@ -110,8 +114,8 @@ def test_a_spectrum_is_that_of_the_lines_between_the_times():
 
 def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):
     moment, time = run.seismic_moment.values, run.time.values
-    # Frames hold every tenth of 400 steps.
-    assert np.trapezoid(run.moment_rate, time) == pytest.approx(moment[-1], rel=0.03)
+    released = np.trapezoid(run.moment_rate, run.step_time)
+    assert released == pytest.approx(moment[-1], rel=0.03)
     released = moment[-1] - np.interp(run.onset_time, time, moment)
     spectrum = run.moment_rate_spectrum.values
     assert spectrum.max() <= 1.001 * released
@@ -153,11 +157,11 @@ def test_pictures_name_their_parts(run):
     texts = [text.get_text() for text in right.get_legend().get_texts()]
     assert texts[:2] == ["a", "b"]
     assert texts[2].startswith("cracks, area stress drop ")
-    later = np.append(run.time, run.time[-1] + 1.0)  # slip that follows the load
+    later = np.append(run.step_time, run.step_time[-1] + 1.0)  # slip that follows the load
     moment_rate = np.append(run.moment_rate, 0.02 * run.moment_rate.max())
-    longer = run.drop_dims("time").assign_coords(time=later)
+    longer = run.drop_dims("step").assign(step_time=("step", later))
     left = st.plot.moment_rate(
-        longer.assign(moment_rate=("time", moment_rate, {"units": "N/s"}))
+        longer.assign(moment_rate=("step", moment_rate, {"units": "N/s"}))
     )[0]
     assert left.lines[0].get_xdata().size < moment_rate.size
 

@@ -52,10 +52,12 @@ Algorithm, after each step of a run (`observe`)
    the last nodes beside the end of an extent may creep to this
    state. If they do, the interface slid in the previous
    instability, which then does not count as arrested.
-6. An event of the table ends once no node has slipped fast during
-   `Thresholds.settling_time`. Neither the size of a step, nor creep
-   under the load, nor a late echo of a periodic image moves this end.
-   Its instability ends with it.
+6. Slip is fast while a node slips at `Thresholds.unstable_slip_rate`
+   and the mean slip rate is above `PULSE_SHARE` of its largest. An event
+   of the table ends when `Thresholds.settling_time` has passed since its
+   last fast slip, and its instability ends with it. Neither the size of
+   a step, nor creep under the load, nor an echo of a periodic image
+   moves this end.
 
 This has two consequences. A maximum without such a fall, for example
 the largest load or the stress that returns when slip ends, is not an
@@ -71,6 +73,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
 from stiction.methods.dynamics.state import (
+    PULSE_SHARE,
     Grid,
     Nodes,
     PiecewiseLinear,
@@ -247,8 +250,10 @@ def finish_step(
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, thresholds, step.radiated)
     if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:
-        now.fast_since = now.fast_since if now.fast else now.time
-        now.fast, now.fast_until = 1, now.time
+        now.peak_rate = max(now.peak_rate, now.mean_slip_rate)
+        if now.mean_slip_rate >= PULSE_SHARE * now.peak_rate:
+            now.fast_since = now.fast_since if now.fast else now.time
+            now.fast, now.fast_until = 1, now.time
     settled = now.time >= now.fast_until + thresholds.settling_time
     if settled and now.fast and now.event_open and not now.event_begun:
         # 6. The end of an event. The next one may begin from here.

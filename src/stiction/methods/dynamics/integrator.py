@@ -273,7 +273,7 @@ class Run:
             self._keep_event(state, state.slip, "load", "work")
         else:
             self._keep_event(state, state.maximum_slip, "maximum_load", "maximum_work")
-        now["fast"], now["event_open"] = 0, now["event_begun"]
+        now["fast"], now["peak_rate"], now["event_open"] = 0, 0.0, now["event_begun"]
         # The next event may begin from the present state of rest.
         if rests and now["maximum_time"] == now["time"]:
             now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip

@@ -90,7 +90,7 @@ SCALARS: dict[str, Variable] = over(
     fracture_energy=("J/m", "energy dissipated above the residual"),
     radiated_energy=("J/m", "work minus dissipated and strain energy"),
 )
-STEPS = over(  # DIAGNOSTICS of these names
+STEPS: dict[str, Variable] = over(  # DIAGNOSTICS of these names
     "step",
     step_time=("s", "time after each step"),
     step_load=("Pa", "load factor tau_0 after each step"),
@@ -101,7 +101,7 @@ STEPS = over(  # DIAGNOSTICS of these names
     step_size=("s", "size of each step"),
     step_work=("J/m", "work of the load up to each step"),
 )
-MOMENT_RATE = over(
+MOMENT_RATE: dict[str, Variable] = over(
     "step", moment_rate=("N/s", "seismic moment rate per length after each step")
 )
 STATIONS = over(  # as in STATION

@@ -74,6 +74,10 @@ UNSTABLE_STRESS = 0.075
 """Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
 those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s)."""
 
+PULSE_SHARE = 0.1
+"""Slip is fast if a node slips at the rate of an instability, and if the mean slip rate is above
+this share of its largest in the event. Echoes of images in a period of two extents reach 0.06."""
+
 DIAGNOSTICS = np.dtype(
     [
         # The last step.
@@ -113,9 +117,10 @@ DIAGNOSTICS = np.dtype(
         ("event_load", "f8"),
         ("event_work", "f8"),
         ("event_node", "i8"),  # the fastest as it began
-        ("fast", "i8"),  # whether a node slipped fast in the event, and if so
-        ("fast_since", "f8"),  # first and last time above `unstable_slip_rate`
-        ("fast_until", "f8"),  # in the event, s
+        ("peak_rate", "f8"),  # largest mean slip rate in the event while slip was fast, m/s
+        ("fast", "i8"),  # whether slip was fast in the event, and if so
+        ("fast_since", "f8"),  # when it was so first, s,
+        ("fast_until", "f8"),  # and last: see step 6 of `diagnostics`
         ("arrested_events", "i8"),
         ("last_arrested", "i8"),  # whether the last instability is among them
         ("first_stress", "f8"),  # mean stress at the first instability

@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating, jit_inside
 from stiction.methods.dynamics.mesh import Mesh
+from stiction.methods.dynamics.state import PULSE_SHARE
 from stiction.methods.equilibrium.strength import StaticSample, strength_at
 
 
@@ -82,9 +83,10 @@ TOTALS = np.dtype(
         ("force", "f8"),  # change of the force of this drive, N/m
         ("friction", "f8"),  # energy that friction took from a block, J/m
         ("fast_slip_rate", "f8"),  # slip rate that counts as fast, m/s
-        ("fast", "i8"),  # whether a node has slipped faster, and if so
-        ("fast_since", "f8"),  # when this first happened, s,
-        ("fast_until", "f8"),  # and when it last happened
+        ("peak_rate", "f8"),  # largest sum of the rates of all nodes while slip was fast, m/s
+        ("fast", "i8"),  # whether slip was fast, as in `diagnostics`, and if so
+        ("fast_since", "f8"),  # when it was so first, s,
+        ("fast_until", "f8"),  # and last
     ]
 )
 """Numbers of an event so far."""
@@ -156,7 +158,7 @@ def _slide(
     """Step 3: move the nodes of the interface. Return how many nodes never slipped."""
     dx, step = mesh.spacing, mesh.step
     slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.totals[0]
-    never, fast = 0, False
+    never, fast, total = 0, False, 0.0
     for i in range(slip.shape[0]):
         # In double precision, since slip adds up many small increments.
         before = np.float64(velocities[i])
@@ -185,9 +187,12 @@ def _slide(
         velocities[i] = np.float32(after)
         never += slip[i] == 0.0
         fast |= 2.0 * after > now.fast_slip_rate
+        total += 2.0 * after
     if fast:
-        now.fast_since = now.fast_since if now.fast else now.time
-        now.fast, now.fast_until = 1, now.time
+        now.peak_rate = max(now.peak_rate, total)
+        if total >= PULSE_SHARE * now.peak_rate:
+            now.fast_since = now.fast_since if now.fast else now.time
+            now.fast, now.fast_until = 1, now.time
     # Update the stress of the correction by the added slip only: most
     # nodes rest most of the time.
     for j in range(slip.shape[0]):
