@@ -12,9 +12,7 @@ import numpy as np
 from pydantic import model_validator
 
 from stiction.base.arrays import Array
-from stiction.base.errors import (
-    InputError,
-)
+from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
 from stiction.elasticity.protocol import HalfSpaces
