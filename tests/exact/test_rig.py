@@ -5,7 +5,7 @@ import pytest
 
 from stiction.elasticity.blocks import Pushes, block_response
 from stiction.elasticity.columns import Material, block, eliminated
-from stiction.elasticity.rig import Body, Rig, _loaded, contact_rig, on_cells
+from stiction.elasticity.rig import Body, Rig, contact_rig, loaded, on_cells
 
 LENGTH = 0.14
 ACRYLIC, STEEL = Material(1.11e9, 2.65 / 1.35), Material(77e9, 2.7 / 1.3)
@@ -66,7 +66,7 @@ def test_energy_and_betti(pressing):
     n = 40
     rig = rig_of("acrylic", n, pressing=pressing)
     cell = LENGTH / n
-    S, g, travels = _loaded(block(0.075, cell, n, ACRYLIC, push=PUSH), n, False, pressing, 0.0)
+    S, g, travels = loaded(block(0.075, cell, n, ACRYLIC, push=PUSH), n, pressing, 0.0)
     signs = np.repeat([1.0, -1.0], [n, n + 1])
     below = block(0.03, cell, n, ACRYLIC, far="fixed", behind=0.06, ahead=0.1)
     S_B = below * np.outer(signs, signs)

@@ -23,9 +23,9 @@ symbol 2i sin(k h/2)/h, so that a half-plane has the symbol E* sin(k h/2)/h of t
 2. Terms of a cell, of an edge between two cells, and of an edge at an end, where sigma_xx = 0
    or -p in the half cell between the line and the end (`Columns`).
 3. A piece is a matrix with labels. `merge` adds pieces and eliminates labels by Cholesky.
-4. Cell 0 and edge 1 are the first piece. Merge each piece with its shifted copy, and so double
-   it, following the bits of n - 1 (`_repeated`). A piece keeps its first and last two lines,
-   and its points on the surface and the far side.
+4. Cell 0 and edge 1 are a period. n - 1 periods are two copies of half of them, and one period
+   more if n - 1 is odd (`_repeated`). A piece keeps its first and last two lines, and its points
+   on the surface and the far side.
 5. Columns beyond the surface in contact grow outwards. Merge them inwards (`_beyond`).
 6. Merge the cells with the last cell and the ends. If the far side is held, its points are
    left out of each term.
@@ -33,13 +33,14 @@ symbol 2i sin(k h/2)/h, so that a half-plane has the symbol E* sin(k h/2)/h of t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
 from stiction.base.arrays import Array
 
@@ -54,8 +55,6 @@ STRIDE = 1 << 20
 """Distance between the labels of two lines. Lines at edges are even, and lines of cells odd."""
 LOBATTO = np.concatenate(([-1.0], legendre.Legendre.basis(DEGREE).deriv().roots(), [1.0]))
 """Points of an element on [-1, 1]."""
-LOBATTO_WEIGHTS = 1.0 / (DEGREE * (DEGREE + 1) * legendre.Legendre.basis(DEGREE)(LOBATTO) ** 2)
-"""Integrals of the functions of an element over its length."""
 PUSH = 1 << 60
 """Label of the force of the push, per unit depth. Rows and columns hold minus its loads."""
 
@@ -77,6 +76,11 @@ class Material(NamedTuple):
         """Lame's lambda of the plane state, Pa."""
         return self.modulus * (3.0 - self.kappa) / (self.kappa - 1.0)
 
+    @property
+    def longitudinal(self) -> float:
+        """P = lambda + 2 G, Pa."""
+        return self.lame + 2.0 * self.modulus
+
 
 class Piece(NamedTuple):
     """A symmetric matrix, Pa, with a label for each row."""
@@ -84,19 +88,18 @@ class Piece(NamedTuple):
     labels: Labels
     matrix: Array
 
+    def shifted(self, lines: int) -> Piece:
+        """Return the same piece further along x."""
+        return Piece(self.labels + lines * STRIDE, self.matrix)
+
 
 class Elements(NamedTuple):
-    """Step 1: elements across a body, with the integrals of N_i N_j, N_i N_j' and N_i' N_j'."""
+    """Step 1: points across a body (m), and the integrals of N_i N_j, N_i N_j' and N_i' N_j'."""
 
-    edges: Array  # (elements + 1,), depth of their borders, m
+    points: Array
     mass: Array
     mixed: Array
     slope: Array
-
-    @property
-    def n_points(self) -> int:
-        """Number of points on a line."""
-        return len(self.mass)
 
 
 def graded(length: float, first: float) -> list[float]:
@@ -113,44 +116,38 @@ def elements(height: float, first: float, push: Interval | None = None) -> Eleme
     # 1. An interval between two fine places is split in the middle.
     sizes: list[float] = []
     fine = [0.0, *(edge for edge in push or () if 0.0 < edge < height)]
-    for low, high in zip(fine, [*fine[1:], height], strict=True):
-        if high < height:
-            half = graded(0.5 * (high - low), first)
-            sizes += [*half, *half[::-1]]
-        else:
-            sizes += graded(high - low, first)
-    edges = np.concatenate(([0.0], np.cumsum(sizes)))
+    for low, high in pairwise(fine):
+        half = graded(0.5 * (high - low), first)
+        sizes += [*half, *half[::-1]]
+    sizes += graded(height - fine[-1], first)
     gauss, weights = legendre.leggauss(DEGREE + 1)
     coefficients = np.linalg.inv(legendre.legvander(LOBATTO, DEGREE))
     values = legendre.legval(gauss, coefficients).T
     slopes = legendre.legval(gauss, legendre.legder(coefficients)).T
-    totals = np.zeros((3, DEGREE * len(sizes) + 1, DEGREE * len(sizes) + 1))
+    count = DEGREE * len(sizes) + 1
+    points, totals = np.zeros(count), np.zeros((3, count, count))
     for i, size in enumerate(sizes):
-        points = slice(DEGREE * i, DEGREE * (i + 1) + 1)
-        weighted = values.T * weights
-        totals[0, points, points] += 0.5 * size * weighted @ values
-        totals[1, points, points] += weighted @ slopes
-        totals[2, points, points] += 2.0 / size * (slopes.T * weights) @ slopes
-    return Elements(edges, *totals)
+        at = slice(DEGREE * i, DEGREE * (i + 1) + 1)
+        points[at] = points[at.start] + 0.5 * size * (LOBATTO + 1.0)
+        totals[0, at, at] += 0.5 * size * (values.T * weights) @ values
+        totals[1, at, at] += (values.T * weights) @ slopes
+        totals[2, at, at] += 2.0 / size * (slopes.T * weights) @ slopes
+    return Elements(points, *totals)
 
 
 def merge(pieces: list[Piece], keep: Keep) -> Piece:
     """Step 3: add pieces, and eliminate the labels that are not kept, without load on them."""
-    labels, places = np.unique(np.concatenate([p.labels for p in pieces]), return_inverse=True)
+    labels = np.unique(np.concatenate([piece.labels for piece in pieces]))
     total = np.zeros((labels.size, labels.size))
-    start = 0
     for piece in pieces:
-        rows = places[start : start + piece.labels.size]
+        rows = np.searchsorted(labels, piece.labels)
         total[np.ix_(rows, rows)] += piece.matrix
-        start += piece.labels.size
     kept = keep(labels)
     return Piece(labels[kept], eliminated(total, kept))
 
 
 def eliminated(matrix: Array, kept: Mask) -> Array:
     """Return the Schur complement of a symmetric matrix on the rows that are kept."""
-    if kept.all():
-        return matrix
     factor = cholesky(matrix[np.ix_(~kept, ~kept)], lower=True)
     half = solve_triangular(factor, matrix[np.ix_(~kept, kept)], lower=True)
     complement: Array = matrix[np.ix_(kept, kept)] - half.T @ half
@@ -164,96 +161,85 @@ class Columns(NamedTuple):
     material: Material
     far: Far
 
-    def _piece(self, lines: Sequence[int], matrix: Array, more: Sequence[int] = ()) -> Piece:
-        count = self.across.n_points
+    def _piece(self, lines: list[int], matrix: Array) -> Piece:
+        """Return a piece on some lines, without the points that are held on the far side."""
+        count = len(self.across.points)
         labels = (np.array(lines)[:, None] * STRIDE + np.arange(count)).ravel()
         held = (labels % STRIDE == count - 1) & (self.far != "free")
         if self.far == "rollers":
             held &= labels // STRIDE % 2 == 0
-        free = np.append(~held, np.ones(len(more), dtype=bool))
-        return Piece(
-            np.append(labels[~held], more).astype(np.int64), matrix[np.ix_(free, free)]
-        )
+        size = len(labels)
+        return Piece(labels[~held], matrix[:size, :size][np.ix_(~held, ~held)])
+
+    def _coupled(self, lines: list[int], M: Array, D: Array, S: Array) -> Piece:
+        return self._piece(lines, np.block([[M, -D, -M], [-D.T, S, D.T], [-M, D, M]]))
 
     def cell(self, line: int, width: float) -> Piece:
         """Return the shear of a cell."""
-        G = self.material.modulus
-        M, D, S = self.across.mass * G / width, self.across.mixed * G, self.across.slope * G
-        blocks = np.block([[M, -D, -M], [-D.T, width * S, D.T], [-M, D, M]])
-        return self._piece((line - 1, line, line + 1), blocks)
+        (_, M, D, S), G = self.across, self.material.modulus
+        return self._coupled([line - 1, line, line + 1], M * G / width, D * G, S * G * width)
 
     def edge(self, line: int, width: float, stop: bool = False) -> Piece:
         """Return the extension between two cells whose middles are `width` apart (m).
 
         With a stop, the place of the second cell is taken by a frictionless wall.
         """
-        lame, stiff = self.material.lame, self.material.lame + 2.0 * self.material.modulus
-        M, D = self.across.mass * stiff / width, self.across.mixed * lame
-        S = self.across.slope * stiff * width
-        blocks = np.block([[M, -D, -M], [-D.T, S, D.T], [-M, D, M]])
-        lines, size = (line - 1, line, line + 1)[: 3 - stop], (3 - stop) * len(M)
-        return self._piece(lines, blocks[:size, :size])
+        (_, M, D, S), P = self.across, self.material.longitudinal
+        lines = [line - 1, line, line + 1][: 3 - stop]
+        return self._coupled(lines, M * P / width, D * self.material.lame, S * P * width)
 
-    def end(self, line: int, width: float, push: Interval | None = None) -> Piece:
-        """Return the half cell at an end, which is free, or pushed along x by a unit force."""
-        G, lame, count = self.material.modulus, self.material.lame, self.across.n_points
-        stiff = lame + 2.0 * G
-        free = 2.0 * G * (lame + G) / stiff * width * self.across.slope
-        if push is None:
-            return self._piece((line,), free)
-        low, high = (int(np.argmin(np.abs(self.across.edges - edge))) for edge in push)
-        extent = push[1] - push[0]
-        v, u = np.zeros((2, count))
-        for i in range(low, high):
-            size = self.across.edges[i + 1] - self.across.edges[i]
-            u[DEGREE * i : DEGREE * (i + 1) + 1] += size * LOBATTO_WEIGHTS / extent
-        v[[DEGREE * low, DEGREE * high]] = (
-            0.5 * width * lame / stiff / extent * np.array([-1, 1])
-        )
-        matrix = block_diag(free, np.zeros_like(free), -0.5 * width / (stiff * extent))
-        matrix[-1, :-1] = matrix[:-1, -1] = -np.concatenate([v, u])
-        return self._piece((line, line + 1), matrix, [PUSH])
+    def end(self, line: int, width: float) -> Piece:
+        """Return the half cell at a free end."""
+        G, (lame, P) = self.material.modulus, (self.material.lame, self.material.longitudinal)
+        return self._piece([line], 2.0 * G * (lame + G) / P * width * self.across.slope)
+
+    def push(self, width: float, push: Interval) -> Piece:
+        """Return minus the loads of a unit force along x on the end of the first cell."""
+        points, _, mixed, slope = self.across
+        lame, P = self.material.lame, self.material.longitudinal
+        extent, count = push[1] - push[0], len(points)
+        ramp = np.clip(points, *push) / extent  # its derivative is the traction
+        matrix = np.zeros((2 * count + 1, 2 * count + 1))
+        matrix[-1, :count] = -0.5 * width * lame / P * slope @ ramp
+        matrix[-1, count:-1] = -mixed @ ramp
+        matrix += matrix.T
+        matrix[-1, -1] = -0.5 * width / (P * extent)
+        return Piece(np.append(self._piece([0, 1], matrix).labels, PUSH), matrix)
 
 
 def _repeated(period: Piece, count: int, keep: Callable[[int], Keep]) -> Piece:
     """Step 4: merge the first periods of a body. A period is two lines long."""
-    chain, length, power, size = None, 0, period, 1
-    while True:
-        if count & size:
-            shifted = Piece(power.labels + 2 * length * STRIDE, power.matrix)
-            length += size
-            chain = shifted if chain is None else merge([chain, shifted], keep(length))
-        if chain is not None and length == count:
-            return chain
-        shifted = Piece(power.labels + 2 * size * STRIDE, power.matrix)
-        size *= 2
-        power = merge([power, shifted], keep(size))
+    if count == 1:
+        return period
+    half = _repeated(period, count // 2, keep)
+    parts = [half, half.shifted(2 * (count // 2))]
+    parts += [period.shifted(2 * (count - 1))] * (count % 2)
+    return merge(parts, keep(count))
+
+
+def widths_beyond(length: float, first: float) -> list[float]:
+    """Step 5: return the widths, m, of columns over a free length, outwards."""
+    widths: list[float] = []
+    largest = MAX_COLUMN * length + first
+    while sum(widths) < length:
+        before = widths[-1] if widths else first
+        widths.append(min(before * COLUMN_GROWTH, largest))
+    return [width * length / sum(widths) for width in widths]
 
 
 def _on_lines(*kept: int) -> Keep:
     return lambda labels: np.isin(labels // STRIDE, kept)
 
 
-def widths_beyond(length: float, first: float) -> list[float]:
-    """Step 5: return the widths, m, of columns over a free length, outwards."""
-    if length <= 0.0:
-        return []
-    widths = [first * COLUMN_GROWTH]
-    largest = MAX_COLUMN * length + first
-    while sum(widths) < length:
-        widths.append(min(widths[-1] * COLUMN_GROWTH, largest))
-    return [width * length / sum(widths) for width in widths]
-
-
 def _beyond(
-    columns: Columns, edge: int, outwards: Literal[-1, 1], widths: list[float], stop: bool
+    columns: Columns, edge: int, outwards: Literal[-1, 1], widths: list[float]
 ) -> Piece:
     """Step 5: return the columns beyond the last edge of the contact, and this edge.
 
     `widths` (m) begins with the last cell of the contact.
     """
     line = edge + 2 * outwards * (len(widths) - 1)
-    if stop:
+    if columns.far == "rollers" and outwards > 0:
         piece = columns.edge(line, 0.5 * widths[-1], stop=True)
     else:
         piece = columns.end(line, widths[-1])
@@ -266,34 +252,26 @@ def _beyond(
 
 
 def block(
-    height: float,
-    cell: float,
-    n_cells: int,
-    material: Material,
-    *,
-    far: Far = "free",
-    push: Interval | None = None,
-    behind: float = 0.0,
-    ahead: float = 0.0,
-    stop: bool = False,
-) -> Array:
+    height: float, cell: float, n_cells: int, material: Material, *, far: Far = "free",
+    push: Interval | None = None, behind: float = 0.0, ahead: float = 0.0,
+) -> Array:  # fmt: skip
     """Return the stiffness of a body per unit depth, Pa, on its surface and its far side.
 
     Lengths are in m. The rows are u at the cells and v at the edges of the surface, u and v of
     the far side if it is free, and the push, if any. The row of the push holds minus the loads of
-    a unit force. The body is longer than the surface in contact by `behind` and `ahead`. With
-    `stop`, a frictionless wall holds its leading end.
+    a unit force. The body is longer than the surface in contact by `behind` and `ahead`. If it
+    lies on rollers, a frictionless wall holds its leading end.
     """
-    across = elements(height, FIRST_ELEMENT * cell, push)
-    columns, last = Columns(across, material, far), 2 * n_cells
+    columns = Columns(elements(height, FIRST_ELEMENT * cell, push), material, far)
+    last, last_point = 2 * n_cells, len(columns.across.points) - 1
 
     def keep(length: int, borders: bool = True) -> Keep:
         def kept(labels: Labels) -> Mask:
             lines, points = labels // STRIDE, labels % STRIDE
-            outside = (points == 0) | ((points == across.n_points - 1) & (far == "free"))
+            outside = (points == 0) | ((points == last_point) & (far == "free"))
             outside &= (lines >= 0) & (lines <= last)
-            border = (lines < 2) | (lines // 2 == length)
-            result: Mask = outside | (labels == PUSH) | (border & borders)
+            border = borders & ((lines < 2) | (lines // 2 == length))
+            result: Mask = outside | border | (labels == PUSH)
             return result
 
         return kept
@@ -302,12 +280,10 @@ def block(
     period = merge([columns.cell(1, cell), columns.edge(2, cell)], keep(1))
     parts = [_repeated(period, n_cells - 1, keep), columns.cell(last - 1, cell)]
     # 5.
-    left, right = ([cell, *widths_beyond(length, cell)] for length in (behind, ahead))
+    parts.append(_beyond(columns, 0, -1, [cell, *widths_beyond(behind, cell)]))
+    parts.append(_beyond(columns, last, 1, [cell, *widths_beyond(ahead, cell)]))
     if push is not None:
-        parts.append(columns.end(0, cell, push))
-    else:
-        parts.append(_beyond(columns, 0, -1, left, False))
-    parts.append(_beyond(columns, last, 1, right, stop))
+        parts.append(columns.push(cell, push))
     # 6.
     labels, matrix = merge(parts, keep(n_cells, borders=False))
     lines, points = labels // STRIDE, labels % STRIDE

@@ -34,10 +34,10 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
 from stiction.base.arrays import Array, one_blas_thread
-from stiction.elasticity.columns import Far, Interval, Material, block
+from stiction.elasticity.columns import Far, Interval, Material, block, eliminated
 
 
 class Body(NamedTuple):
@@ -75,19 +75,10 @@ def on_cells(edges: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def contact_rig(
-    length: float,
-    nodes: int,
-    slider: Body,
-    base: Body,
-    *,
-    push: Interval | None,
-    pressing: Literal["soft", "plate"] = "soft",
-    tilt: float = 0.0,
-    behind: float = 0.0,
-    ahead: float = 0.0,
-    bottom: Far = "fixed",
-    towards: Literal[-1, 1] = 1,
-) -> Rig:
+    length: float, nodes: int, slider: Body, base: Body, *, push: Interval | None,
+    pressing: Literal["soft", "plate"] = "soft", tilt: float = 0.0, behind: float = 0.0,
+    ahead: float = 0.0, bottom: Far = "fixed", towards: Literal[-1, 1] = 1,
+) -> Rig:  # fmt: skip
     """Return the stiffness and the loads of a slider on a base.
 
     Lengths are in m. `push` holds the lowest and the highest point of the pusher. Without a push,
@@ -97,71 +88,62 @@ def contact_rig(
     end. If its bottom lies on rollers, a frictionless stop holds its leading end. The
     push acts along +x or -x (`towards`).
     """
+    size, cell = 2 * nodes + 1, length / nodes
+    signs = np.repeat([1.0, -1.0], [nodes, nodes + 1])
     with one_blas_thread():
-        cell, n = length / nodes, nodes
         # 1.
-        top = block(slider.height, cell, n, slider.material, push=push)
-        base_stiffness = block(
-            base.height, cell, n, base.material,
-            far=bottom, behind=behind, ahead=ahead, stop=bottom == "rollers",
-        )  # fmt: skip
-        size, signs = 2 * n + 1, np.repeat([1.0, -1.0], [n, n + 1])
-        base_stiffness *= np.outer(signs, signs)
-        # 2. and 3.
-        slider_stiffness, forces, travels = _loaded(top, n, push is None, pressing, tilt)
-        # 4.
-        factor = cholesky(slider_stiffness + base_stiffness, lower=True)
-        half, loads = (
-            solve_triangular(factor, part, lower=True) for part in (slider_stiffness, forces)
+        bodies = block(slider.height, cell, nodes, slider.material, push=push)
+        S_B = np.outer(signs, signs) * block(
+            base.height, cell, nodes, base.material, far=bottom, behind=behind, ahead=ahead
         )
-        K = slider_stiffness - half.T @ half
-        T = forces - half.T @ loads
-        C = 1.0 / (loads[:, 0] @ loads[:, 0] - travels)
+        # 2. and 3.
+        S, g, S_gg = loaded(bodies, nodes, pressing, tilt)
+        # 4.
+        factor = cholesky(S + S_B, lower=True)
+        half, loads = (solve_triangular(factor, part, lower=True) for part in (S, g))
+        K, T = S - half.T @ half, g - half.T @ loads
+        C = 1.0 / (loads[:, 0] @ loads[:, 0] - S_gg)
     # 5.
     order = np.arange(size)
     if towards < 0:
-        order = np.concatenate([order[:n][::-1], order[n:][::-1]])
+        order = np.concatenate([order[:nodes][::-1], order[nodes:][::-1]])
     K, T = K[np.ix_(order, order)], T[order]
     for array in (K, T):
         array.flags.writeable = False
     return Rig(K, T[:, 0], T[:, 1], float(C))
 
 
-def _loaded(
-    block: Array, n: int, sheared: bool, pressing: str, tilt: float
-) -> tuple[Array, Array, float]:
+def loaded(block: Array, n: int, pressing: str, tilt: float) -> tuple[Array, Array, float]:
     """Steps 2 and 3: return S_S, g for the push and for the normal force, and S_gg of the push."""
     size = 2 * n + 1
-    surface, far, push = block[:size], block[size : 2 * size], block[2 * size :]
-    # Pressure is linear, so that its forces on linear functions are exact.
-    places = np.linspace(-1.0, 1.0, n + 1)
-    weights = np.full(n + 1, 1.0 / n)
+    whole = np.zeros((2 * size + 2, 2 * size + 2))
+    whole[: len(block), : len(block)] = block
+    if len(block) == 2 * size:  # no pusher
+        whole[-2, size : size + n] = -1.0 / n
+    # The pressure is linear in each cell, so that forces on linear functions are exact.
+    places, weights = np.linspace(-1.0, 1.0, n + 1), np.full(n + 1, 1.0 / n)
     weights[[0, -1]] *= 0.5
-    moments = weights * places
-    moments[[0, -1]] *= 1.0 - 2.0 / (3.0 * n)
-    loads = np.zeros((2 * size, 2))
-    loads[size + n :, 1] = -(weights + tilt * moments)
-    if sheared:
-        loads[size : size + n, 0] = 1.0 / n
-    else:
-        loads[:, 0] = -push[0, : 2 * size]
+    ends = np.ones(n + 1)
+    ends[[0, -1]] -= 2.0 / (3.0 * n)
+    whole[-1, size + n : -2] = weights * (1.0 + tilt * places * ends)
+    whole[:-2, -2:] = whole[-2:, :-2].T
     # 2.
-    basis = np.eye(size)
+    basis, top = np.eye(2 * size + 2), np.arange(size + n, 2 * size)
     if pressing == "plate":
-        basis = np.append(basis[:, :n], np.repeat([[0.0], [1.0]], [n, n + 1], axis=0), axis=1)
-    factor = cho_factor(basis.T @ far[:, size : 2 * size] @ basis)
-    between, on_top = basis.T @ far[:, :size], basis.T @ loads[size:]
+        basis[top, top[0]] = 1.0
+        basis = np.delete(basis, top[1:], axis=1)
     # 3.
-    solved = cho_solve(factor, np.column_stack([between, on_top]))
-    stiffness = surface[:, :size] - between.T @ solved[:, :size]
-    forces = loads[:size] - between.T @ solved[:, size:]
-    travel = -on_top[:, 0] @ solved[:, size] + (0.0 if sheared else push[0, -1])
+    matrix = basis.T @ whole @ basis
+    kept = np.ones(len(matrix), dtype=bool)
+    kept[size:-2] = False
+    matrix = eliminated(matrix, kept)
+    S, g, S_gg = matrix[:size, :size], -matrix[:size, size:], matrix[size, size]
     # Translation, lift and (without a plate) rotation cause no force. The sums of merging leave
     # up to 1e-13 of the diagonal, which A^-1 would amplify.
     motions = np.zeros((size, 3 - (pressing == "plate")))
     motions[:n, 0] = motions[n:, 1] = 1.0
     motions[n:, 2:] = places[:, None]
     motions = np.linalg.qr(motions)[0]
-    stiffness -= motions @ (motions.T @ stiffness)
-    stiffness -= (stiffness @ motions) @ motions.T
-    return 0.5 * (stiffness + stiffness.T), forces, float(travel)
+    S = S - motions @ (motions.T @ S)
+    S -= (S @ motions) @ motions.T
+    return 0.5 * (S + S.T), g, float(S_gg)
