@@ -28,7 +28,7 @@ subset.setMaximumOuterSampling(20)  # 2000 draws a level
 subset.run()
 found = subset.getResult()
 print(
-    f"OpenTURNS: P = {found.getProbabilityEstimate():.3g}, c.o.v."
+    f"OpenTURNS: P = {found.getProbabilityEstimate():.3g}, cv"
     f" {found.getCoefficientOfVariation():.2g}, {limit_state.dimension} dimensions"
 )
 

@@ -39,7 +39,7 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
     held = np.mean([one.interval[0] <= reference <= one.interval[1] for one in found])
     print(
         f"  {method.type:16s} {algorithm:11s} mean {ratio.mean():.3f}"
-        f" +- {ratio.std(ddof=1) / math.sqrt(REPEATS):.3f}, c.o.v. observed"
+        f" +- {ratio.std(ddof=1) / math.sqrt(REPEATS):.3f}, cv observed"
         f" {ratio.std(ddof=1) / ratio.mean():.3f}, reported {error:.3f}, held {held:.0%},"
         f" {np.mean([one.evaluations for one in found]):,.0f} evaluations,"
         f" {(time.perf_counter() - start) / REPEATS:.2f} s a run",

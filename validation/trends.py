@@ -17,7 +17,7 @@ MACHINE = 2e7  # N/m
 FIELD = st.RandomField(
     st.Beta(alpha=1.5, beta=3.0, low=0.132, high=0.332),
     st.PowerLawSpectrum(correlation_length=1.75e-3),
-    of="friction_coefficient",
+    quantity="friction_coefficient",
 )
 PUSHERS = (0.025, 0.015, 0.01, 0.005)  # heights, m
 

@@ -182,7 +182,7 @@ def test_friction_coefficients_are_taken_times_the_pressure(problem):
         st.RandomField(
             st.Beta(alpha=2.0, beta=3.0, low=low, high=3.0 * low),
             st.PowerLawSpectrum(correlation_length=5e-3),
-            of=of,
+            quantity=of,
         )
         for low, of in ((0.4e6, None), (0.2, "friction_coefficient"))
     )

@@ -61,7 +61,7 @@ WEIBULL = with_marginal(scipy.stats.weibull_min(4.0, scale=1e6))
 COEFFICIENTS = dataclasses.replace(
     STRENGTH,
     marginal=st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6),
-    of="friction_coefficient",
+    quantity="friction_coefficient",
 )
 
 SCALING = {

@@ -101,7 +101,7 @@ def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
 def test_quantiles_of_pooled_runs_and_where_the_interval_of_a_probability_ends():
     tail = Tail(descents()[0])
     for beta in (1.0, 3.0, 4.5):
-        # dP/P = beta d(beta): the pooled c.o.v. is below 0.06, so the quantile is good to 0.02.
+        # dP/P = beta d(beta): the pooled cv is below 0.06, so the quantile is good to 0.02.
         cv = tail.cv(-beta)
         assert cv < 0.07
         assert tail.quantile(norm.cdf(-beta)) == pytest.approx(-beta, abs=3.0 * cv / beta)

@@ -342,7 +342,7 @@ def test_pressure():
     assert p[0] < 0.95 * p[48]
     drawn = st.RandomInterface(
         strength=st.RandomField(
-            st.Lognormal(mean=0.5, cv=0.1), spectrum, of="friction_coefficient"
+            st.Lognormal(mean=0.5, cv=0.1), spectrum, quantity="friction_coefficient"
         ),
         normal_pressure=st.RandomField(
             st.Beta(alpha=1.3, beta=1.95, low=1.5e6, high=2.4e6), spectrum

@@ -25,7 +25,7 @@ def problem(nodes=128, share=0.1, residual_ratio=None, **load):
 
 def beta(low, high=1.6e6, of=None):
     marginal = st.Beta(alpha=2.0, beta=3.0, low=low, high=high)
-    return st.RandomField(marginal, st.PowerLawSpectrum(8e-3), True, of=of)
+    return st.RandomField(marginal, st.PowerLawSpectrum(8e-3), True, quantity=of)
 
 
 def coefficient(low):

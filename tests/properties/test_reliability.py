@@ -131,7 +131,7 @@ def random_of(low, tail, initial, pressed, between):
         marginal = st.Beta(alpha=0.6, beta=shape, low=low, high=high)
         return st.RandomField(marginal, spectrum, True, **options)
 
-    of_what = {"of": "friction_coefficient"} if pressed else {}
+    of_what = {"quantity": "friction_coefficient"} if pressed else {}
     found = {"strength": field(low / unit, (low + 8e5) / unit, tail, **of_what)}
     if pressed:
         found["normal_pressure"] = field(1.6e6, 3.1e6, 1.3)

@@ -50,7 +50,7 @@ def field(marginal=FIELD.marginal, spectrum=FIELD.spectrum, **options):
     return st.RandomField(marginal, spectrum, **options)
 
 
-COEFFICIENT = field(st.Lognormal(mean=0.5, cv=0.15), of="friction_coefficient")
+COEFFICIENT = field(st.Lognormal(mean=0.5, cv=0.15), quantity="friction_coefficient")
 LOGNORMAL = field(st.Lognormal(mean=1.1e6, cv=0.2))
 FINE = field(LOGNORMAL.marginal, st.PowerLawSpectrum(2e-9))
 

@@ -104,7 +104,7 @@ def loaded(profile):
 
 def scanned(**given):
     known = {"profile": "tau_r.csv", "noise": 1e3} | given
-    return studied(random__strength__given={k: v for k, v in known.items() if v})
+    return studied(random__strength__conditions={k: v for k, v in known.items() if v})
 
 
 BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}

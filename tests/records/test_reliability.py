@@ -27,7 +27,7 @@ WIDE = of_width(SMALL, 0.0117)
 EXPONENTIAL = st.ExponentialSpectrum(3e-3, power_kept=0.95)
 PRESSED = st.RandomInterface(
     strength=st.RandomField(
-        st.Lognormal(mean=0.43, cv=0.14), EXPONENTIAL, of="friction_coefficient"
+        st.Lognormal(mean=0.43, cv=0.14), EXPONENTIAL, quantity="friction_coefficient"
     ),
     normal_pressure=st.RandomField(
         st.Gamma(mean=2.3e6, cv=0.1), st.SquaredExponentialSpectrum(4e-3)
@@ -171,7 +171,7 @@ def shares_of_the_strength_below_the_residual():
             name: st.RandomField(
                 scipy.stats.uniform(low / unit, 4e5 / unit),
                 BOUNDED.spectrum,
-                of=None if unit == 1.0 else "friction_coefficient",
+                quantity=None if unit == 1.0 else "friction_coefficient",
             )
             for name, low, unit in zip(both, (3e5, 0.0), units, strict=True)
         }

@@ -61,7 +61,7 @@ def glued_pressing_of_friction_coefficients():
     field = st.RandomField(
         st.Lognormal(mean=0.43, cv=0.19),
         st.ExponentialSpectrum(6e-3, power_kept=0.95),
-        of="friction_coefficient",
+        quantity="friction_coefficient",
     )
     return st.monte_carlo(problem, field, method=st.Equilibrium(events=2), samples=3, seed=2)
 

@@ -15,7 +15,7 @@ from stiction.cli.commands import app
 
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
-STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), of=None)
+STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), quantity=None)
 SLIP = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
 
 
@@ -49,7 +49,11 @@ def test_a_factor_multiplies_a_constant_of_the_problem(problem, name, strength, 
         changed = dataclasses.replace(
             problem, **{table: dataclasses.replace(part, **{key: value})}
         )
-        of = {"friction_coefficient": profiles[number]} if strength.of else profiles[number]
+        of = (
+            {"friction_coefficient": profiles[number]}
+            if strength.quantity
+            else profiles[number]
+        )
         exact = st.onset(changed, of, method=method)
         assert float(found.critical_stress[number]) == pytest.approx(
             float(exact.critical_stress[0]), rel=1e-9
@@ -176,8 +180,8 @@ def test_a_page_of_a_design(tmp_path):
     likely = [
         st.RandomInterface(
             strength=st.RandomField(
-                st.Gamma(mean=mean, cv=0.15), RANDOM.strength.spectrum, of="friction_coefficient",
-                mean_mode=True,
+                st.Gamma(mean=mean, cv=0.15), RANDOM.strength.spectrum,
+                quantity="friction_coefficient", mean_mode=True,
             ),
             between=RANDOM.between,
         )

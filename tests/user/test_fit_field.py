@@ -87,7 +87,7 @@ def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():
         quantity="friction_coefficient",
     )  # fmt: skip
     # Taken for a strength of 0.3 Pa, everything that it is used in would be wrong.
-    assert {one.of for one in (fit.field, *fit.repetitions)} == {"friction_coefficient"}
+    assert {one.quantity for one in (fit.field, *fit.repetitions)} == {"friction_coefficient"}
     members = [one.strength.marginal for one in fit.interfaces(40)]
     assert sum(one.low == 0.0 for one in members) > 5
     means, deviations = np.array(

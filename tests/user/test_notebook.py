@@ -33,7 +33,9 @@ def objects():
     how = {"method": st.LocalCriterion(), "progress": False}
     onsets = st.monte_carlo(problem, strength, samples=200, seed=0, **how).critical_stress
     coefficient = st.RandomField(
-        st.Lognormal(mean=0.2, cv=0.12), st.PowerLawSpectrum(5e-3), of="friction_coefficient"
+        st.Lognormal(mean=0.2, cv=0.12),
+        st.PowerLawSpectrum(5e-3),
+        quantity="friction_coefficient",
     )
     pressed = st.Problem(
         problem.solid, st.Interface(0.1, 256, width=0.01), problem.friction,

@@ -156,7 +156,7 @@ def test_a_study_of_a_slider():
     base = st.Base(height=0.02, solid=STIFF, bottom="rollers", ahead=0.02)
     field = st.RandomField(
         st.Lognormal(mean=0.7, cv=0.1), st.ExponentialSpectrum(correlation_length=0.02),
-        of="friction_coefficient",
+        quantity="friction_coefficient",
     )  # fmt: skip
     for slider in (SLIDER, dataclasses.replace(SLIDER, base=base, drive=st.TopShear())):
         problem = rig_problem(problem={"specimen": slider})

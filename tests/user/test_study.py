@@ -142,7 +142,9 @@ def test_laws_in_a_study_file(tmp_path):
 def test_a_pressing_force_is_a_pressure_over_the_area():
     """Of a sweep of the force and of the width, and between glued plates."""
     marginal = st.Lognormal(mean=0.5, cv=0.15)
-    field = st.RandomField(marginal, BASE.random.strength.spectrum, of="friction_coefficient")
+    field = st.RandomField(
+        marginal, BASE.random.strength.spectrum, quantity="friction_coefficient"
+    )
     problem = dataclasses.replace(
         BASE.problem,
         interface=st.Interface(length=0.1, nodes=128, width=0.03),
@@ -226,8 +228,8 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
     field = {
         "marginal": {"type": "lognormal", "mean": unit, "cv": 0.15},
         "spectrum": STUDY["random"]["strength"]["spectrum"],
-        "given": {"profile": "scan.csv", "noise": 0.02 * unit},
-    } | ({"of": "friction_coefficient"} if heading == "mu" else {})
+        "conditions": {"profile": "scan.csv", "noise": 0.02 * unit},
+    } | ({"quantity": "friction_coefficient"} if heading == "mu" else {})
     options = {"problem__load": {"normal_pressure": 2e6}, f"random__{name}": field}
     if name != "strength":  # the law has no scale of slip beside a random one
         options["problem__friction"] = {}
@@ -242,7 +244,7 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
     called = st.monte_carlo(read.problem, given, method=read.method, samples=30, seed=3)
     assert np.array_equal(result.critical_stress, called.critical_stress)
     assert st.Study.from_result(result) == read == st.open_run(tmp_path / "run").study
-    sweep = [{"random.strength.given.noise": [5e3, 20e3]}]
+    sweep = [{"random.strength.conditions.noise": [5e3, 20e3]}]
     found = loaded(tmp_path, **options, samples=3, sweep=sweep).run()
     assert found.critical_stress.sizes == {"noise": 2, "sample": 3}
 

@@ -98,7 +98,7 @@ DOUBTED = {
     "other units": changed(
         random__strength__marginal__low=0.66e3, random__strength__marginal__high=1.66e3
     ),
-    "refused": changed(random__strength__of="friction_coefficient"),
+    "refused": changed(random__strength__quantity="friction_coefficient"),
 }
 
 

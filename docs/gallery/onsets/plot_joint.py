@@ -14,7 +14,7 @@ problem = st.Problem(
     load=st.Load(normal_pressure=80e6),
 )
 mu = st.RandomField(
-    st.Lognormal(mean=0.2, cv=0.12), st.PowerLawSpectrum(5e-3), of="friction_coefficient"
+    st.Lognormal(mean=0.2, cv=0.12), st.PowerLawSpectrum(5e-3), quantity="friction_coefficient"
 )
 tau_p = 80e6 * mu.sample(problem.interface, seed=0)
 onsets = [st.onset(problem, tau_p, method=m) for m in (st.LocalCriterion(), st.Equilibrium())]

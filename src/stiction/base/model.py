@@ -261,11 +261,9 @@ def describe(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def keys_of(cls: Any) -> dict[str, str]:
-    """Return the keys for a model in a study file, and the field for each key."""
-    known = getattr(cls, "__pydantic_fields__", {})
-    names = [field.name for field in dataclasses.fields(cls) if field.init]
-    return {(name in known and known[name].alias) or name: name for name in names}
+def keys_of(cls: Any) -> list[str]:
+    """Return the keys for a model in a study file, which are the names of its fields."""
+    return [field.name for field in dataclasses.fields(cls) if field.init]
 
 
 def valid_keys(cls: Any) -> list[str]:
@@ -416,7 +414,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     wrapped.__init__, wrapped.__repr__, wrapped._repr_html_ = init, brief, html_of
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of
     hints = typing.get_type_hints(cls, include_extras=True)
-    keys = {key: hints[name] for key, name in keys_of(wrapped).items()}
+    keys = {name: hints[name] for name in keys_of(wrapped)}
     wrapped.__signature__ = plain_signature(wrapped, keys)
     door = Door(cls.__name__, wrapped.__signature__, cls.__name__)
     door.names = valid_keys(wrapped)
@@ -433,7 +431,7 @@ def to_plain(value: Any) -> Any:
         return value.plain()
     try:
         return pydantic.TypeAdapter(type(value)).dump_python(
-            value, mode="json", exclude_none=True, by_alias=True
+            value, mode="json", exclude_none=True
         )
     except pydantic_core.PydanticSerializationError as error:
         words = "cannot be written down: "  # the innermost reason, without names of exceptions

@@ -188,7 +188,7 @@ class Result:
     def to_dict(self) -> dict[str, Any]:
         """Return the public fields as dicts, lists and numbers for JSON. NaN becomes None."""
         plain: dict[str, Any] = to_jsonable_python(
-            _public(self), by_alias=True, inf_nan_mode="null", fallback=_plain
+            _public(self), inf_nan_mode="null", fallback=_plain
         )
         return plain
 

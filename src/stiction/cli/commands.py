@@ -333,7 +333,7 @@ def description(study: Any) -> dict[str, str]:
 def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     """Return key numbers for a point and its random properties, with titles and units."""
     field = random.strength
-    unit = "Pa" if field.of is None else "(friction coefficient)"
+    unit = "Pa" if field.quantity is None else "(friction coefficient)"
     numbers = {
         ("mean strength", unit): field.mean,
         ("standard deviation", unit): field.standard_deviation,

@@ -124,7 +124,11 @@ class BestFit:
         anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
         of: Any = quantity if quantity == "friction_coefficient" else None
         return RandomField(
-            self.marginal, self.model.spectrum, mean_mode=True, anisotropy=anisotropy, of=of
+            self.marginal,
+            self.model.spectrum,
+            mean_mode=True,
+            anisotropy=anisotropy,
+            quantity=of,
         )
 
     def simulate(self, rng: np.random.Generator) -> list[Array]:

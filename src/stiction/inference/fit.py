@@ -403,7 +403,7 @@ def fit_field(
     quantity : str
         Measured quantity, which sets the unit: 'strength',
         'normal_pressure', 'friction_coefficient', ... A fitted field of
-        friction coefficients has ``of="friction_coefficient"``.
+        friction coefficients has ``quantity="friction_coefficient"``.
     bootstrap : int
         Number of repetitions, at least 20, for each of three fields:
         the fitted field, and two fields whose correlation lengths are

@@ -240,7 +240,7 @@ class Posterior(Result):
 
     def _summary(self) -> Summary:
         strength, rows = self.at(0)[1].strength, []
-        of_field = "Pa" if strength is None or strength.of is None else "1"
+        of_field = "Pa" if strength is None or strength.quantity is None else "1"
         for name in self.names:
             unit = unit_of_key(name, of_field)
             before = np.quantile(self.before[name], [0.05, 0.95]).tolist()

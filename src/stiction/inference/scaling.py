@@ -86,7 +86,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     }
     slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
     # 6.
-    varies = field.of is not None and np.ndim(pressure) > 0
+    varies = field.quantity is not None and np.ndim(pressure) > 0
     varies = varies or np.ptp(problem.load_profile) > 0.0
     # 1. to 3.
     affine = optional_member(method, "scaling") == "affine" and not varies
@@ -97,5 +97,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     slopes[:, 0] -= location * slopes[:, 1]
     # Onsets are stresses, or coefficients if the peaks are coefficients.
     mean = 1.0 if pressure is None else float(np.mean(pressure))
-    slopes[:, 0] *= mean ** ((field.of is not None) - (variable == "friction_coefficient"))
+    slopes[:, 0] *= mean ** (
+        (field.quantity is not None) - (variable == "friction_coefficient")
+    )
     return Scaling(tuple(places), middle, slopes)

@@ -84,7 +84,7 @@ def field(
     interface = where.interface if isinstance(where, Problem) else where
     of_field = isinstance(profile, RandomField)
     if quantity is None:
-        pure = profile.of if of_field else is_coefficient(profile)
+        pure = profile.quantity if of_field else is_coefficient(profile)
         quantity = "friction_coefficient" if pure else "strength"
     if quantity not in (known := (*PROFILES, "friction_coefficient")):
         raise InputError(f"quantity: must be in {', '.join(known)}, got {quantity!r}")

@@ -60,7 +60,7 @@ def doubt_strengths(
     doubts = [
         Doubt(
             f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check the"
-            " units of both (Pa). Friction coefficients need of='friction_coefficient'",
+            " units of both (Pa). Friction coefficients need quantity='friction_coefficient'",
             mean / of,
             *limits,
         )

@@ -178,12 +178,12 @@ class Conditions:
         names, places = interface.dims, self.places
         if len(places) != len(names):
             raise InputError(
-                f"given.profile: must have the {len(names)} coordinates {', '.join(names)} of the"
-                f" interface, got {len(places)}"
+                f"conditions.profile: must have the {len(names)} coordinates {', '.join(names)} of"
+                f" the interface, got {len(places)}"
             )
         problems = [
-            f"given.profile: {name} reaches from {row.min():g} to {row.max():g} m, the interface is"
-            f" {length:g} m long"
+            f"conditions.profile: {name} reaches from {row.min():g} to {row.max():g} m, the"
+            f" interface is {length:g} m long"
             for name, row, length in zip(names, places, interface.lengths, strict=True)
             if row.min() < -1e-9 * length or row.max() > length * (1.0 + 1e-9)
         ]
@@ -193,7 +193,7 @@ class Conditions:
             *place, value = self.profile[:, outside.argmax()]
             at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
             problems.append(
-                f"given.profile: {value:g} at {at} lies outside the marginal, from {low:g} to"
+                f"conditions.profile: {value:g} at {at} lies outside the marginal, from {low:g} to"
                 f" {high:g}, by more than {MAX_ERRORS_OUTSIDE:g} times its error of {self.noise:g}"
             )
         if problems:
@@ -322,14 +322,14 @@ class Conditioning(NamedTuple):
         """Warn about measured values that do not suit the field."""
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
-                "given: the measured values are unlikely for this field (chi-square"
+                "conditions: the measured values are unlikely for this field (chi-square"
                 f" {self.misfit:.4g} for {self.points}). Check marginal, length and noise"
             )
         if max(self.error) > MAX_POSTERIOR_ERROR:
             mean, deviation = self.error
             warn_accuracy(
-                "given: the field is approximate where it was measured: its mean is off by up to"
-                f" about {mean:.2g} of its standard deviation, which is off by"
+                "conditions: the field is approximate where it was measured: its mean is off by up"
+                f" to about {mean:.2g} of its standard deviation, which is off by"
                 f" {100.0 * deviation:.2g} %. Average neighbouring values, and give their noise"
             )
 
@@ -481,19 +481,19 @@ def conditionings(
         members, measured = np.flatnonzero(group), []
         of_group = np.concatenate([columns[j] for j in members])
         for i in members:
-            name, given = random.names[i], fields[i].conditions
-            if given is None:
+            name, conditions = random.names[i], fields[i].conditions
+            if conditions is None:
                 continue
-            given.check(fields[i].marginal, interface)
-            size = given.values.size * random.dimension(interface)
-            check_memory(f"{name}.given.profile", 24.0 * size, "give fewer places")
+            conditions.check(fields[i].marginal, interface)
+            size = conditions.values.size * random.dimension(interface)
+            check_memory(f"{name}.conditions.profile", 24.0 * size, "give fewer places")
             # z combines the property's own draws with the draws of
             # earlier properties.
-            basis = fields[i].modes(interface).basis(given.places)
+            basis = fields[i].modes(interface).basis(conditions.places)
             phi = np.zeros((len(basis), random.dimension(interface)))
             for j in np.flatnonzero(factor[i]):
                 phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
-            measured.append(Measured(given, fields[i].marginal, phi[:, of_group]))
+            measured.append(Measured(conditions, fields[i].marginal, phi[:, of_group]))
         if measured:
             groups.append((of_group, conditioned(measured)))
     return groups

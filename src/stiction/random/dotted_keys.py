@@ -13,7 +13,7 @@ from stiction.base.variables import PROFILES
 from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
 
 INTERFACE_KEYS = (*PROFILES, "correlation", "between")
-FIELD_KEYS = ("marginal", "spectrum", "anisotropy", "given")
+FIELD_KEYS = ("marginal", "spectrum", "anisotropy", "conditions")
 """Keys of a random interface, and of a field."""
 MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 """Parameters of a marginal, whose keys begin with its name."""
@@ -41,19 +41,18 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
     if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
         raise InputError(f"{path}: has no keys, because it is {describe(owner)}")
-    names = {} if table else keys_of(type(owner))
+    names = [] if table else keys_of(type(owner))
     unknown = [name for name in {**changes, **inside} if not table and name not in names]
     if unknown:
         raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
     # Values below a key replace the object there, from the inside outwards.
     for name, below in inside.items():
-        inner = owner.get(name) if table else getattr(owner, names[name])
+        inner = owner.get(name) if table else getattr(owner, name)
         changes[name] = with_values({} if inner is None else inner, below, begin + name)
     if table:
         return {**owner, **changes}
     try:
-        fields = {names[key]: value for key, value in changes.items()}
-        return dataclasses.replace(owner, **fields)
+        return dataclasses.replace(owner, **changes)
     except InputError as error:
         # The path replaces the name of the class, which a user of keys
         # does not know.

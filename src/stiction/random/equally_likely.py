@@ -245,7 +245,9 @@ def _numbered(entries: Sequence[Any]) -> tuple[list[Any], NDArray[np.int64]]:
 
 def _named(member: RandomInterface) -> str:
     fields = member.properties.items()
-    return " and ".join(f"{name} ({field.of})" if field.of else name for name, field in fields)
+    return " and ".join(
+        f"{name} ({field.quantity})" if field.quantity else name for name, field in fields
+    )
 
 
 def form_of(field: RandomField) -> Any:
@@ -254,7 +256,7 @@ def form_of(field: RandomField) -> Any:
         return field
     relative = field.marginal.distribution.ppf(FORM_SHARES) / field.mean
     shape = tuple(f"{value:.10g}" for value in relative)
-    return shape, field.spectrum, field.mean_mode, field.anisotropy, field.of
+    return shape, field.spectrum, field.mean_mode, field.anisotropy, field.quantity
 
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:

@@ -82,13 +82,13 @@ class RandomField:
         On a plane, the correlation length along y
         divided by the length along x, by default 1. The
         spectrum gives the correlation length along x.
-    of : {"friction_coefficient"}, optional
+    quantity : {"friction_coefficient"}, optional
         Declares that the field holds friction coefficients. The stress
         (strength, residual strength or initial stress) is their product
         with the normal pressure.
     conditions : Conditions, optional
-        Measured values, as set by `given`, or in a study file by the
-        table ``given``.
+        Measured values, as `given` sets them, or a table with
+        ``profile`` and ``noise``.
 
     Notes
     -----
@@ -112,8 +112,8 @@ class RandomField:
     spectrum: Spectrum
     mean_mode: Flag = False
     anisotropy: Positive | None = None
-    of: Literal["friction_coefficient"] | None = None
-    conditions: Annotated[Conditions | None, Field(alias="given")] = None
+    quantity: Literal["friction_coefficient"] | None = None
+    conditions: Conditions | None = None
     specimens_of_fit: ClassVar[int | None] = None
     """Set for `FieldFit.field`: `specimens` of its fit, so that a call can ask for the fit."""
 
@@ -169,10 +169,10 @@ class RandomField:
         if self.conditions is not None:
             raise InputError("profile: the field already has a profile. Combine both profiles")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
-        if stated and is_in(stated, "1") != (self.of is not None):
+        if stated and is_in(stated, "1") != (self.quantity is not None):
             raise InputError(
-                f"profile: has the unit {stated}. Only a field with of='friction_coefficient' takes"
-                " coefficients (unit 1), and it does not take other units"
+                f"profile: has the unit {stated}. Only a field with quantity='friction_coefficient'"
+                " takes coefficients (unit 1), and it does not take other units"
             )
         conditions: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=conditions)
@@ -312,7 +312,7 @@ class RandomInterface:
     ----------
     strength : RandomField
         Peak strength, Pa, or with
-        ``of="friction_coefficient"`` a friction coefficient,
+        ``quantity="friction_coefficient"`` a friction coefficient,
         which is multiplied by the normal pressure.
     residual_strength, initial_stress, normal_pressure : RandomField, optional
         Other stresses, Pa. The first two may also be coefficients.
@@ -370,16 +370,16 @@ class RandomInterface:
     def _name_quantity(cls, field: Any, info: ValidationInfo) -> Any:
         """Pass the quantity of a measured profile to the reader of a study file."""
         if info.context is not None and isinstance(field, dict):
-            of_stress = field.get("of") is None
+            of_stress = field.get("quantity") is None
             info.context["quantity"] = info.field_name if of_stress else "friction_coefficient"
         return field
 
     @model_validator(mode="after")
     def _consistent(self) -> RandomInterface:
         problems = [
-            f"{name}: leave out of = 'friction_coefficient', which is for stresses"
+            f"{name}: leave out quantity = 'friction_coefficient', which is for stresses"
             for name, field in self.properties.items()
-            if field.of is not None and name not in MAY_BE_COEFFICIENTS
+            if field.quantity is not None and name not in MAY_BE_COEFFICIENTS
         ]
         scales = [name for name in SCALES if name in self.properties]
         if len(scales) > 1:
@@ -398,8 +398,8 @@ class RandomInterface:
         for name, marginal in between.items():
             if getattr(self.properties.get(name), "conditions", None) is not None:
                 problems.append(
-                    f"between.{name}: scatters between specimens, but {name}.given was measured on"
-                    " a single specimen. Leave one of them out"
+                    f"between.{name}: scatters between specimens, but {name}.conditions were"
+                    " measured on a single specimen. Leave one of them out"
                 )
             # The field has the mean of the property, and the factor
             # only scatters about it.

@@ -36,7 +36,7 @@ RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
 
 def coefficients_of(random: RandomInterface) -> list[str]:
     """Return the names of the properties that are given as coefficients."""
-    return [name for name, field in random.properties.items() if field.of is not None]
+    return [name for name, field in random.properties.items() if field.quantity is not None]
 
 
 def check_pressure(problem: Problem, random: RandomInterface) -> None:
@@ -114,7 +114,7 @@ def support_in_stress(
     factors = [np.maximum(extremes(between[key]), 0.0) for key in pressed if key in between]
     if field is not None and name == "normal_pressure":
         factors.append((np.min(pressing_of(problem)), np.max(pressing_of(problem))))
-    if field is not None and field.of is not None:
+    if field is not None and field.quantity is not None:
         factors.append(support_in_stress(problem, random, "normal_pressure", chance))
     for factor in factors:  # factors are positive, and 0 times infinity counts as 0
         ends = [a * b if a and b else 0.0 for a in (low, high) for b in factor]
@@ -145,7 +145,9 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
 def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
     """Return the mean of a property, Pa."""
     field = random.properties[name]
-    return field.mean * (1.0 if field.of is None else float(_pressures(problem, random).mean()))
+    return field.mean * (
+        1.0 if field.quantity is None else float(_pressures(problem, random).mean())
+    )
 
 
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:

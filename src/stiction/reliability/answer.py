@@ -345,7 +345,7 @@ class Answer(Result):
             result += f" (95 %: {ends}) at P = {self.probability:g}"
         else:
             chance = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
-            result = f"{chance} c.o.v. {self.cv:.2g}) below {result}"
+            result = f"{chance} cv {self.cv:.2g}) below {result}"
         finite = [name for name in known if math.isfinite(getattr(self, name))]
         equivalents = [known[name] for name in finite]
         result += f" ({', '.join(equivalents)})" if equivalents else ""
@@ -361,7 +361,7 @@ class Answer(Result):
             result += f", of which {' and '.join(parts)}" if parts else ""
         if self.members_cv:
             sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
-            result += f" (c.o.v. by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
+            result += f" (cv by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
         if self.algorithm == "exact":
             result += f"; {self.reason}"
         else:
@@ -530,7 +530,7 @@ def with_enough_members(
         solution, known = solve(experiment, meter), experiment.random
         if not (count := wanted_members(known, solution.members_cv, target_cv)):
             return experiment, solution
-        meter.note = f"{count:,} interfaces, c.o.v. by the list {solution.members_cv:.2g}"
+        meter.note = f"{count:,} interfaces, cv by the list {solution.members_cv:.2g}"
         larger = known.larger(count, experiment.seed)
         # A posterior over a list has hardly more different members,
         # however many are drawn.

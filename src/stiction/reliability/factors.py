@@ -192,7 +192,7 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
         # single specimen.
         if counts.values.shape[1] == 1 and goal.probability:
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
-        state.meter.note = f"c.o.v. {cv:.2g} (target {goal.cv:g})"
+        state.meter.note = f"cv {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
             return counts
         # 5. Compare the costs of counting to

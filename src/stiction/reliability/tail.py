@@ -343,7 +343,7 @@ def repeat_until_precise(
         if cv <= target_cv:
             break
         # 4. The error falls with the square root of the number of samples.
-        meter.note = f"repetition {len(repetitions)}, c.o.v. {cv:.2g} (target {target_cv:g})"
+        meter.note = f"repetition {len(repetitions)}, cv {cv:.2g} (target {target_cv:g})"
         total = wanted = sum(repetition.samples for repetition in repetitions)
         price = sum(repetition.evaluations for repetition in repetitions) / total
         if math.isfinite(cv):

@@ -120,7 +120,7 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     check_law(problem)
     refuse_specimen(problem, "this", "sample the nucleation stress with st.monte_carlo")
     load, initial = problem.load_profile, problem.load.initial_stress
-    pressure = 1.0 if strength.of is None else problem.given_pressure
+    pressure = 1.0 if strength.quantity is None else problem.given_pressure
     varying = {
         "load.profile: varies": np.ptp(load) > 0.0,
         "load.initial_stress: varies": np.ptp(initial) > 0.0,

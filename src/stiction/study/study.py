@@ -344,7 +344,7 @@ class Study(_Parts):
         """The axes of the sweep as dimensions of the result."""
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
         fields = {} if self.profiles else self.experiments[0].random.properties
-        coefficients = [name for name, field in fields.items() if field.of]
+        coefficients = [name for name, field in fields.items() if field.quantity]
         return grid_axes(self.sweep, taken, coefficients)
 
     @property
