@@ -38,6 +38,14 @@ Algorithm of the correlation (`hermite_coefficients`)
    the variance is small.
 6. Append a coefficient for the remaining variance, so that the
    correlation is 1 at zero lag.
+
+Example
+-------
+z = 0 is the median. A uniform marginal on [0, 1] maps z = 1 to Phi(1):
+
+>>> import scipy.stats
+>>> quantile_of_normal(scipy.stats.uniform(), np.array([0.0, 1.0])).round(4).tolist()
+[0.5, 0.8413]
 """
 
 from functools import lru_cache

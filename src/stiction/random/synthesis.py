@@ -29,6 +29,17 @@ Field (`synthesise`)
    exact on any grid.
 4. Transform back, sample by sample, so that the numbers do not depend
    on the batch.
+
+Example
+-------
+A line of four nodes has a single mode with sigma = 1, A = 1 and B = 0.
+The field is cos(2 pi x/L):
+
+>>> draws, sigma, numbers = np.array([[1.0, 0.0]]), np.array([0.0, 1.0]), np.array([[0, 0], [0, 1]])
+>>> field = np.empty((1, 1, 4))
+>>> synthesise(draws, sigma, numbers, False, field)
+>>> field.round(12).tolist()
+[[[1.0, 0.0, -1.0, 0.0]]]
 """
 
 from functools import lru_cache, reduce

@@ -3,6 +3,13 @@
 Nodes on a plane are connected if their cells share an edge (four
 neighbours), also across the borders. In these functions, `interface` is
 an `Interface`. Kernels do not depend on the file that defines it.
+
+Example
+-------
+Slip at nodes 0, 3 and 4 of a periodic line of five nodes is one patch:
+
+>>> count_patches(np.array([1.0, 0.0, 0.0, 2.0, 1.0]))
+1
 """
 
 from typing import Any, NamedTuple

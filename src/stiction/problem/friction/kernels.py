@@ -4,6 +4,13 @@ A law passes its parameters to kernels as a NamedTuple of its own type.
 When a kernel is compiled, this type selects the formula for the
 strength. A new law therefore changes no kernel, and it costs only as
 much as its own formula.
+
+Example
+-------
+tau_p = 5 Pa falls at W = 2 Pa/m to tau_r = 1 Pa, so d_c = 2 m:
+
+>>> [strength_at(Linear(), 5.0, 1.0, 2.0, slip) for slip in (0.0, 1.0, 2.0, 3.0)]
+[5.0, 3.0, 1.0, 1.0]
 """
 
 from collections.abc import Callable

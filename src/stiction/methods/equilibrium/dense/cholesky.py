@@ -44,6 +44,19 @@ Departures from the textbook, for speed:
 
 Node numbers are called `i`, `node` or `nodes`, and rows of L `r`, `t`
 and `position`.
+
+Example
+-------
+A has 1 on its diagonal and -1 elsewhere. The first pivot is 1. The
+second node has the row l = -1, and its pivot 1 - l'l is zero, so only
+one row is appended:
+
+>>> from stiction.elasticity.protocol import DenseEntries
+>>> K = np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+>>> workspace = make_workspace(DenseEntries(K.ravel(), 3, 0.0), 3)
+>>> workspace.diagonal[:3], workspace.is_slipping[:3], workspace.queue[:2] = 1.0, False, (0, 1)
+>>> append(workspace, 0, 2)
+1
 """
 
 import math

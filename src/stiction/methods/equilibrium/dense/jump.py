@@ -47,6 +47,27 @@ such a node leaves S, and rests until it is overstressed again. In step
 arrested as long as the node is overstressed. Every step lowers the
 energy. Therefore the steps end, at a state in which no stress exceeds
 its strength.
+
+Example
+-------
+Three nodes have the strengths 1, 2 and 4 Pa, W = 1 Pa/m, no residual
+strength, and each pair is coupled by 1 Pa/m. At load 1.5, slip (0.5, 0,
+0) jumps along (1, 1, 0). It moves first until node 0 has lost its
+strength, to (1, 0.5, 0). K d is then (1.5, 0, -1.5): node 0 carries no
+stress, node 1 carries its strength 1.5, and node 2 carries 3 of 4 Pa.
+The patch is arrested:
+
+>>> import numpy as np
+>>> from stiction.elasticity.protocol import DenseEntries
+>>> from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
+>>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+>>> K = np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+>>> entries = DenseEntries(K.ravel(), 3, 0.0)
+>>> sample = make_sample(np.array([1.0, 2, 4]), np.zeros(3), np.ones(3), np.ones(3), LINEAR)
+>>> slip = np.array([1.0, 0.5, 0.0])
+>>> state = SlipState(sample, slip, K @ slip, make_workspace(entries, 3), False)
+>>> Outcome(jump(state, 1.5, np.inf, make_workspace(entries, 3))).name, slip.tolist()
+('ARRESTED', [1.0, 0.5, 0.0])
 """
 
 from enum import IntEnum

@@ -42,6 +42,27 @@ weakest window, and from a load below this bound.
 The order of the nodes in step 1 and the share in step 4 are for speed.
 In a different order the search stalls near the solution. If the load is
 too high, far too many nodes join before a pivot fails.
+
+Example
+-------
+Three nodes have the strengths 1, 2 and 4 Pa, W = 1 Pa/m, and each pair
+is coupled by 1 Pa/m. With y = (1/2, 1/2, 0), A y = (0, 0, -1) is not
+positive, so no load above <excess, y> = 1.5 Pa has an equilibrium. Slip
+of 0.5 m at node 0 is an equilibrium at this load:
+
+>>> import numpy as np
+>>> from stiction.elasticity.protocol import DenseEntries
+>>> from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
+>>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+>>> K = np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+>>> entries = DenseEntries(K.ravel(), 3, 0.0)
+>>> sample = make_sample(np.array([1.0, 2, 4]), np.zeros(3), np.ones(3), np.ones(3), LINEAR)
+>>> slip, Kd, y = np.zeros((3, 3))
+>>> state = SlipState(sample, slip, Kd, make_workspace(entries, 3), False)
+>>> solve_program(state, 1.0, 4.0, np.inf, y)
+(1.5, True)
+>>> slip.tolist(), y.tolist()
+([0.5, 0.0, 0.0], [0.5, 0.5, 0.0])
 """
 
 import numpy as np

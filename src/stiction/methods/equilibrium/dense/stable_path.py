@@ -59,6 +59,27 @@ method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
 
 Node numbers are called `i` or `node`, positions in S (the rows of L)
 `t` or `position`.
+
+Example
+-------
+Three nodes have the strengths 1, 2 and 4 Pa, W = 1 Pa/m, and each pair
+is coupled by 1 Pa/m. Node 0 starts at load 1 with the rate 1/A_00 = 1.
+Its slip adds load - 1 to the stress of node 1, which therefore starts
+at 2 load - 1 = 2, load 1.5. A_SS = [[1, -1], [-1, 1]] is then singular,
+and slip jumps along (1, 1, 0):
+
+>>> import numpy as np
+>>> from stiction.elasticity.protocol import DenseEntries
+>>> from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
+>>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+>>> K = np.array([[2.0, -1, -1], [-1, 2, -1], [-1, -1, 2]])
+>>> entries = DenseEntries(K.ravel(), 3, 0.0)
+>>> sample = make_sample(np.array([1.0, 2, 4]), np.zeros(3), np.ones(3), np.ones(3), LINEAR)
+>>> slip, Kd, direction = np.zeros((3, 3))
+>>> state = SlipState(sample, slip, Kd, make_workspace(entries, 3), False)
+>>> end = follow_stable_path(state, 1.0, np.inf, direction)
+>>> end.load, end.status.name, slip.tolist(), direction.tolist()
+(1.5, 'UNSTABLE', [0.5, 0.0, 0.0], [1.0, 1.0, 0.0])
 """
 
 from typing import Any, NamedTuple
