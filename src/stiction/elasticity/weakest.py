@@ -29,7 +29,7 @@ four nodes with strengths 3, 1, 2 and 4 Pa. The mean of 1 and 2 is the
 lowest bound, and y = 1/2 at these nodes:
 
 >>> import numpy as np
->>> windows = Windows(np.ones(1), np.array([2]), np.array([-1]), np.ones((1, 2)))
+>>> windows = Windows(np.ones(1), np.array([-1]), np.array([2]), np.ones((1, 2)))
 >>> y, strength, unit = np.empty(4), np.array([3.0, 1.0, 2.0, 4.0]), np.ones(4)
 >>> window_bound(strength, unit, unit, windows, np.empty(4), y), y.tolist()
 (1.5, [0.0, 0.5, 0.5, 0.0])
