@@ -26,11 +26,11 @@ def coefficient(value):
 
 REFUSED = {
     "a push above the slider": (
-        "drive ... 0.075 to 0.085 ... at most 0.07 m high",
+        "drive ... 0.075 to 0.085 ... largest height 0.07 m fits",
         sampled(drive=st.Pusher(height=0.08, width=0.01)),
     ),
     "a push wider than the slider": (
-        "drive ... width is at most 0.01 m",
+        "drive ... largest width 0.01 m fits",
         sampled(drive=st.Pusher(height=0.07, width=0.02)),
     ),
     "two pushers": (
@@ -46,11 +46,11 @@ REFUSED = {
     "a plate that tilts": ("tilt ... plate", sampled(pressing="plate", tilt=0.1)),
     "a press that pulls": ("tilt", sampled(tilt=1.2)),
     "a base that ends first": (
-        "behind ... ends 0.01 m before ... 0 or more",
+        "behind ... -0.01",
         lambda: st.Base(height=0.03, behind=-0.01),
     ),
     "a coarse mesh for the pusher": (
-        "interface.nodes ... pusher ... 20 or more",
+        "specimen.drive.width ... interface.nodes = 20 or more",
         sampled(nodes=16, drive=st.Pusher(height=0.02, width=0.007)),
     ),
     "a coarse mesh for the nucleation length": (

@@ -134,14 +134,13 @@ def _beyond_side(drive: Any, height: float) -> list[str]:
     low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
     if low >= -1e-9 * height and high <= (1.0 + 1e-9) * height:
         return []
+    width = 2.0 * min(drive.height, height - drive.height)
     fitting = (
-        f"Its width is at most {2.0 * min(drive.height, height - drive.height):.6g} m there"
-        if drive.height < height
-        else f"Its middle is at most {height - 0.5 * drive.width:.6g} m high"
+        f"width {width:.6g}" if width > 0.0 else f"height {height - 0.5 * drive.width:.6g}"
     )
     return [
         f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the side from"
-        f" 0 to {height:g} m. {fitting}"
+        f" 0 to {height:g} m. The largest {fitting} m fits"
     ]
 
 
@@ -241,22 +240,10 @@ class Base:
     """
 
     height: Positive
-    behind: Real = 0.0
-    ahead: Real = 0.0
+    behind: NotNegative = 0.0
+    ahead: NotNegative = 0.0
     solid: Solid | None = None
     bottom: Literal["fixed", "rollers"] = "fixed"
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Base:
-        ends = {"behind": self.behind, "ahead": self.ahead}
-        problems = [
-            f"{name}: the base ends {-length:g} m before the slider. Give 0 or more"
-            for name, length in ends.items()
-            if length < 0.0
-        ]
-        if problems:
-            raise InputError(problems)
-        return self
 
 
 @model(kw_only=True)
@@ -374,26 +361,21 @@ class Slider:
 
     def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
         """Return why a slider does not fit an interface (m) and a material, or an empty list."""
-        problems, base, drive = [], self.base, self.drive
+        problems = []
         if mode != "II":
             problems.append("mode: a slider is sheared in its plane. Leave 'II'")
-        if (base.solid or solid).plane != solid.plane:
-            problems.append(
-                f"specimen.base.solid.plane: must be the plane state of the slider, {solid.plane!r}"
-            )
-        heights = {"specimen.height": self.height, "specimen.base.height": base.height}
-        for name, height in heights.items():
-            if height < 2.0 * spacing:
-                nodes = math.ceil(2.0 * length / height)
-                problems.append(
-                    f"{name}: {height:g} m is less than two spacings of the nodes. Give"
-                    f" interface.nodes = {nodes} or more"
-                )
-        if isinstance(drive, Pusher) and drive.width < spacing * (1.0 - 1e-9):
-            problems.append(
-                f"interface.nodes: the spacing {spacing:.3g} m is larger than the width of the"
-                f" pusher, {drive.width:g} m. Give {math.ceil(length / drive.width)} or more"
-            )
+        if self.base.solid is not None and self.base.solid.plane != solid.plane:
+            text = "specimen.base.solid.plane: must be the plane state of the slider"
+            problems.append(f"{text}, {solid.plane!r}")
+        sizes = {"height": 0.5 * self.height, "base.height": 0.5 * self.base.height}
+        if isinstance(self.drive, Pusher):
+            sizes["drive.width"] = self.drive.width
+        problems += [
+            f"specimen.{name}: is not resolved by nodes {spacing:.3g} m apart. Give"
+            f" interface.nodes = {math.ceil(length / size)} or more"
+            for name, size in sizes.items()
+            if size < (1.0 - 1e-9) * spacing
+        ]
         return problems
 
     def checked_pressing(self, rig: Rig, length: float, peak: Array, residual: Array) -> Array:
