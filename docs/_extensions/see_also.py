@@ -1,12 +1,13 @@
 """Related functions below each docstring: everything that shares a row with it in `ROWS`."""
 
+from stiction.methods.protocol import METHODS
+
 ROWS = """
     Problem Solid Interface Load LinearWeakening
     LinearWeakening ExponentialWeakening PiecewiseWeakening
     RandomField RandomInterface read_profile fit_field plot.field
     Beta Lognormal Weibull Gamma TruncatedNormal
     PowerLawSpectrum SquaredExponentialSpectrum ExponentialSpectrum CustomSpectrum
-    LocalCriterion Equilibrium Rupture
     onset monte_carlo equilibrium_path simulate_rupture
     onset plot.onset
     monte_carlo Study plot.monte_carlo plot.quantiles
@@ -22,6 +23,7 @@ ROWS = """
     Study open_run monte_carlo
 """
 _RELATED = [[f"stiction.{name}" for name in row.split()] for row in ROWS.splitlines()]
+_RELATED.append([f"stiction.{kind.__name__}" for kind in METHODS.values()])
 
 
 def _append(app, what, name, obj, options, lines):

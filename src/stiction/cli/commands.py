@@ -9,9 +9,10 @@ import logging
 import os
 import signal
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +20,7 @@ import typer
 from typer import Argument, Option
 
 import stiction as st
-from stiction.base.errors import InputError, RunError, printable
+from stiction.base.errors import InputError, RunError, collect_warnings, printable
 from stiction.base.progress import Meter, duration, interrupted
 from stiction.problem.resolution import nodes_in_nucleation_length
 
@@ -42,6 +43,9 @@ Scheduler = Annotated[
 Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
 ]
+TIMED_POINTS, TIMING_SECONDS, SLOW_SECONDS = 5, 0.2, 3.0
+"""Points of a sweep that `check` times, processor time of each, s, and estimate of the seconds
+of a sample above which it does not time."""
 COMPARED_SAMPLES = 1_000
 """Samples with which measured peaks are compared."""
 
@@ -349,18 +353,37 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
 
 
 def _cost(study: Any) -> dict[str, str]:
-    """Return the approximate computing time for a study, and the size of its result."""
+    """Return the computing time for a study, from a few samples, and the size of its result."""
+    import numpy as np
+
     from stiction.ensemble.batches import usable_cores
 
     points, samples, cores = study.experiments, study.samples, usable_cores()
-    costs = [point.seconds for point in points]
-    seconds, size = sum(costs) * samples, sum(point.sample_bytes for point in points) * samples
+    places = np.unique(np.linspace(0, len(points) - 1, TIMED_POINTS).astype(int))
+    ratios = [_seconds(points[place], study.first) / points[place].seconds for place in places]
+    # Other points are as much slower than their estimates as the nearest timed points.
+    factors = np.exp(np.interp(np.arange(len(points)), places, np.log(ratios)))
+    costs = factors * [point.seconds for point in points]
+    seconds, size = costs.sum() * samples, sum(point.sample_bytes for point in points) * samples
     ends = " to ".join(dict.fromkeys((duration(min(costs)), duration(max(costs)))))
     return {
         "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
-        f" here ({ends} a sample), to a factor of three",
+        f" here ({ends} a sample, from a few samples)",
         "size": f"about {size / 1e6:.3g} MB",
     }
+
+
+def _seconds(point: Any, first: int) -> float:
+    """Return the processor time of a sample, s, or its estimate if samples are slow or fail."""
+    seconds: list[float] = []
+    with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():
+        if point.seconds < SLOW_SECONDS:
+            point.results(first, 1)  # compiles
+        while point.seconds < SLOW_SECONDS and sum(seconds) < TIMING_SECONDS:
+            begin = time.thread_time()
+            point.results(first + len(seconds), 1)
+            seconds.append(time.thread_time() - begin)
+    return max(sum(seconds) / len(seconds), 1e-9) if seconds else point.seconds
 
 
 # -- failure probabilities -----------------------------------------------------------------------

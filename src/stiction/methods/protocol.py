@@ -139,8 +139,9 @@ def as_method(value: Any) -> Any:
     missing = [name for name in MEMBERS if not hasattr(value, name)]
     if missing:
         raise ValueError(
-            "must be a method object such as st.LocalCriterion(), st.Equilibrium() or"
-            f" st.Rupture(loading_rate=...), but lacks {', '.join(missing)}"
+            "must be a method object such as"
+            f" {' or '.join(f'{kind.__name__}(...)' for kind in METHODS.values())}, but lacks"
+            f" {', '.join(missing)}"
         )
     return value
 
