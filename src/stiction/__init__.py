@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 # The stub lists the public names, and editors read it, too. Each name
 # is imported on first use, so that `import stiction` is quick.

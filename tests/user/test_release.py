@@ -61,6 +61,12 @@ def test_every_public_name_is_there_documented_and_completed():
     assert python("-c", code).split() == sorted(st.__all__)
 
 
+def test_the_public_interface_is_the_stored_list():
+    """`python tests/public.py > tests/public.txt` stores it anew; CHANGELOG.md tells users."""
+    stored = (ROOT / "tests" / "public.txt").read_text()
+    assert python(ROOT / "tests" / "public.py") == stored
+
+
 def test_no_module_bears_the_name_of_a_public_function():
     modules = {path.stem for path in PACKAGE.glob("*.py")}
     folders = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
