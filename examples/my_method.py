@@ -5,12 +5,13 @@ that the interface slides when the mean strength over a window of given length i
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 import stiction as st
-from stiction.extensions import Sample, Solver, Variable, onset_variables
+from stiction.extensions import Solver, Variable, onset_variables
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class WeakestWindow:
     def prepare(self, problem: st.Problem) -> Solver:
         width = max(1, round(self.length / problem.interface.spacing))
 
-        def solve(sample: Sample) -> dict[str, np.ndarray]:
+        def solve(sample: Any) -> dict[str, np.ndarray]:
             excess = (sample.strength - sample.initial_stress) / sample.load_profile
             average = uniform_filter1d(excess, width, axis=1, mode="wrap")
             stress = sample.mean_stress(average.min(axis=1))

@@ -10,7 +10,6 @@ import numpy as np
 from scipy import stats
 from scipy.special import ndtr
 
-import stiction as st
 from reproduction import PARAMETERS, TEXTS, setting
 from reproduction import numbers_with_errors as estimates
 from reproduction.modulus import compare, odds  # noqa: F401  # named in statements.toml
@@ -18,6 +17,7 @@ from reproduction.numbers_with_errors import Number, lower_spread, mean, share
 from reproduction.runner import Data, LeftOut
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
 from reproduction.studies import NORMAL, infinite_variance_ratio
+from stiction.statistics.estimates import density
 
 KPA, MPA = 1e-3, 1e-6
 SPACING = setting.PROBLEM.interface.spacing
@@ -131,7 +131,7 @@ def towards_bound(stress, weakest=None) -> Number:
 
 def stress_density(d: Data, ratio: float):
     """Return the density of tau_cr."""
-    return st.statistics.density(d.stress(ratio), bounds=setting.DENSITY_BOUNDS)
+    return density(d.stress(ratio), bounds=setting.DENSITY_BOUNDS)
 
 
 # Theory against simulation

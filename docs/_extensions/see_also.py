@@ -17,9 +17,7 @@ ROWS = """
     fit_field plot.fit
     read_curve read_peaks statistics.agreement plot.force_travel plot.precursors
     infer read_peaks design_of_tests external.simulator
-    statistics.density statistics.quantiles
     theory.nucleation_stress theory.nucleation_statistics
-    theory.griffith_length theory.energy_release_rate
     Study open_run monte_carlo
 """
 _RELATED = [[f"stiction.{name}" for name in row.split()] for row in ROWS.splitlines()]

@@ -12,6 +12,7 @@ from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_de
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
+from stiction.statistics import estimates
 
 LAW = setting.MARGINAL.distribution
 X = PROBLEM.interface.x / L
@@ -208,7 +209,7 @@ def figure_5(d: Data):
         density = counts / counts.sum() / (edges[1] - edges[0])
         densities.plot(density, 0.5 * (edges[1:] + edges[:-1]), **look)
         weakest = d.at("moments", "weakest_strength", ratio)
-        least = st.statistics.density(weakest, bounds=setting.DENSITY_BOUNDS)
+        least = estimates.density(weakest, bounds=setting.DENSITY_BOUNDS)
         minima.plot(least.value / least.value.max(), least.x / MEAN, **look)
         onset = stress_density(d, ratio)
         stress.plot(onset.x / MEAN, onset.value * MEAN, **look)

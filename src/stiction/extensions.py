@@ -10,7 +10,6 @@ from stiction.base.variables import Variable
 from stiction.methods.protocol import Method, Solver
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.results import onset_variables
-from stiction.problem.sample import Sample
 from stiction.random.marginals import Marginal
 from stiction.random.spectra import ScaledSpectrum, SpectralDensity
 
@@ -20,7 +19,6 @@ __all__ = [
     "Method",
     "Positive",
     "Real",
-    "Sample",
     "ScaledSpectrum",
     "Solver",
     "SpectralDensity",

@@ -1,11 +1,10 @@
 """Theory of the local criterion and of cracks: results that do not need an ensemble."""
 
-from stiction.methods.criterion.griffith import energy_release_rate, griffith_length
+from stiction.methods.criterion.griffith import griffith_length
 from stiction.methods.criterion.local import nucleation_stress
 from stiction.statistics.moments import nucleation_statistics
 
 __all__ = [
-    "energy_release_rate",
     "griffith_length",
     "nucleation_statistics",
     "nucleation_stress",

@@ -15,9 +15,10 @@ from stiction.methods.criterion.eigenfunction import (
     multiplier,
     weight,
 )
+from stiction.methods.criterion.griffith import energy_release_rate
 from stiction.methods.criterion.windows import windows_of
 from stiction.statistics.moments import nucleation_statistics
-from stiction.theory import energy_release_rate, griffith_length
+from stiction.theory import griffith_length
 
 
 def first_onset(problem, tau_p):

@@ -13,6 +13,7 @@ import xarray as xr
 from recording import read
 
 import stiction as st
+from stiction.statistics import estimates
 
 CELL = """
 import stiction as st
@@ -55,8 +56,8 @@ def objects():
             progress=False,
         ),
         "sample": problem.sample(rows),
-        "quantiles": st.statistics.quantiles(onsets, [0.05, 0.5]),
-        "density": st.statistics.density(onsets),
+        "quantiles": estimates.quantiles(onsets, [0.05, 0.5]),
+        "density": estimates.density(onsets),
         "moments": st.theory.nucleation_statistics(problem, strength),
         "curve": st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m")[0],
         "curves": st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m"),
@@ -102,7 +103,7 @@ def test_results_that_differ_are_not_equal():
     assert sample != sample.part(slice(1))
     assert design.to_dict()["stress"] == design.stress
     values = xr.DataArray(np.arange(12.0), attrs={"units": "N"})
-    ten, eleven = (st.statistics.quantiles(values, np.arange(1, n + 1) / 12) for n in (10, 11))
+    ten, eleven = (estimates.quantiles(values, np.arange(1, n + 1) / 12) for n in (10, 11))
     assert ten != eleven
     assert "5.5" in repr(ten)
 

@@ -12,11 +12,9 @@ from typing import Any
 
 _HOMES = {
     "agreement": "stiction.inference.agreement",
-    "density": "stiction.statistics.estimates",
-    "quantiles": "stiction.statistics.estimates",
 }
 
-__all__ = ["agreement", "density", "quantiles"]
+__all__ = ["agreement"]
 
 
 def __getattr__(name: str) -> Any:

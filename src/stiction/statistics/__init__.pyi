@@ -1,5 +1,3 @@
 # What editors see; __init__.py imports each on first use.
 
 from stiction.inference.agreement import agreement as agreement
-from stiction.statistics.estimates import density as density
-from stiction.statistics.estimates import quantiles as quantiles

@@ -113,8 +113,8 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     Examples
     --------
     >>> import numpy as np
-    >>> import stiction as st
-    >>> found = st.statistics.quantiles(np.random.default_rng(0).normal(size=2000), [0.5])
+    >>> from stiction.statistics.estimates import density, quantiles
+    >>> found = quantiles(np.random.default_rng(0).normal(size=2000), [0.5])
     >>> bool(found.lower[0] < 0.0 < found.upper[0])
     True
     """
@@ -189,8 +189,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     Examples
     --------
     >>> import numpy as np
-    >>> import stiction as st
-    >>> found = st.statistics.density(np.random.default_rng(0).normal(size=2000))
+    >>> from stiction.statistics.estimates import density, quantiles
+    >>> found = density(np.random.default_rng(0).normal(size=2000))
     >>> bool(abs(found.value.max() - 0.4) < 0.03)  # 1/sqrt(2 pi)
     True
     """

@@ -80,7 +80,7 @@ def energy_release_rate(
     >>> import numpy as np
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=512)
-    >>> rate = st.theory.energy_release_rate(problem, 1e6, [0.01, 0.02])
+    >>> rate = energy_release_rate(problem, 1e6, [0.01, 0.02])
     >>> bool(rate[1, 0] > rate[0, 0] > 0.0)  # J/m²
     True
     """
