@@ -28,6 +28,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.protocol import METHODS, MethodObject, optional_member
 from stiction.problem.problem import Problem
+from stiction.problem.specimen import Slider
 from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
@@ -236,6 +237,8 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
     """Return whether the onset is proportional to the strength. See `inference.scaling`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
+    if isinstance(problem.specimen, Slider):  # its shear and pressure do not scale
+        return False
     # See the derivation in `inference.scaling`: the weakening rate is
     # given, and the initial stress is uniform. It must be zero if the
     # load varies.

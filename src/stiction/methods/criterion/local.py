@@ -165,6 +165,8 @@ class LocalCriterion:
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
         """Return why no length of patches is the same in all samples, or `None`."""
         W = problem.friction.uniform_weakening_rate
+        if isinstance(problem.specimen, Slider):
+            return "the pressure under a slider changes with the push"
         if not problem.friction.linear:
             return "strength does not fall linearly with slip"
         if W is None or varying & set(SCALES):

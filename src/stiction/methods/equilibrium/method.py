@@ -8,12 +8,18 @@ from pydantic import Field
 
 from stiction.base.model import Flag, Number, Real, model
 from stiction.base.variables import Variable
+from stiction.methods.equilibrium.contact.solver import (
+    OF_SLIDERS,
+    SliderSolver,
+    push_variables,
+)
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.sample import pieces_of, refused
 from stiction.methods.equilibrium.solver import OnsetSolver, make_search
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample
+from stiction.problem.specimen import Slider
 
 Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
@@ -132,6 +138,8 @@ class Equilibrium:
         interface = problem.interface
         if interface.is_plane:
             return 1e-5 * interface.size
+        if isinstance(problem.specimen, Slider):
+            return 2e-9 * interface.size**3.0
         # Each corner that a node passes changes the factor.
         linear, corners = problem.friction.linear, pieces_of(problem.friction).ends.size
         more = 1.0 if linear else 6.0 * corners**0.5
@@ -145,6 +153,11 @@ class Equilibrium:
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
+        if isinstance(problem.specimen, Slider) and not (reasons or problem.friction.linear):
+            reasons.append(
+                "friction: the strength of a slider falls linearly with slip. Use"
+                " st.LinearWeakening(weakening_rate=...)"
+            )
         if self.sensitivity and problem.interface.is_plane:
             reasons.append(
                 "sensitivity: applies to lines only. Leave it out, and take differences of st.onset"
@@ -165,9 +178,10 @@ class Equilibrium:
         The bound from above holds because stress is at most strength at
         every node. With a machine, the first instability need not
         happen, and has no bound. If the interface ends, slip lowers the
-        mean stress of the part that can break.
+        mean stress of the part that can break. On a slider, the
+        pressure changes the strength.
         """
-        if problem.interface.is_held:
+        if problem.interface.is_held or isinstance(problem.specimen, Slider):
             return False, False
         # A stiff machine lets the interface slide without an
         # instability, which is then NaN.
@@ -181,10 +195,13 @@ class Equilibrium:
         # a component along each direction.
         variables = onset_variables(interface) | VARIABLES
         variables |= OF_PLANES if interface.is_plane else OF_LINES
+        slides = isinstance(problem.specimen, Slider)
+        variables |= OF_SLIDERS if slides else {}
         for name in {"sliding_position", "critical_patch_extent"} & variables.keys():
             variables[name] = position(interface, variables[name])
         if self.events:
-            variables |= of_samples(event_variables(interface))
+            of_events = push_variables if slides else event_variables
+            variables |= of_samples(of_events(interface))
         for name, variable in ON_NODES.items():
             if getattr(self, name):
                 variables[name] = along(interface, variable)
@@ -192,4 +209,6 @@ class Equilibrium:
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
         """Return a solver for samples of a problem."""
+        if isinstance(problem.specimen, Slider):
+            return SliderSolver(problem, self)
         return OnsetSolver(problem, self, make_search(problem, self.gap))

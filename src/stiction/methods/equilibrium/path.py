@@ -27,6 +27,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import RealArray, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
+from stiction.methods.equilibrium.contact.solver import push_at_loads
 from stiction.methods.equilibrium.events import (
     elongation_of,
     event_table,
@@ -44,6 +45,8 @@ from stiction.methods.equilibrium.state import EquilibriumSearch, EquilibriumSta
 from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
+from stiction.problem.sample import Sample
+from stiction.problem.specimen import Slider
 from stiction.problem.unit_doubts import doubt_sample
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -204,6 +207,28 @@ def equilibrium_path(
     # Slip and stress, each of 8 bytes, at every load and node.
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
+    if isinstance(problem.specimen, Slider):
+        values, variables = push_at_loads(problem, rows, given)
+    else:
+        values, variables = _at_loads(problem, rows, given, method)
+    variables = VARIABLES | TRAVEL | variables
+    variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+    if problem.area is not None:
+        values |= forces(values, problem.area, problem.whole_area)
+        variables |= force_variables(variables)
+    coordinates = {
+        "load": (given, LOAD),
+        "event": (np.arange(values["event_load"].size), EVENT),
+    }
+    attributes = study_attributes(problem=problem, **({"method": method} if method else {}))
+    return to_dataset(values, variables, coordinates, attributes, interface)
+
+
+def _at_loads(
+    problem: Problem, rows: Sample, given: Array, method: Any
+) -> tuple[dict[str, Array], dict[str, Variable]]:
+    """Return values, and variables of events, at rising loads, Pa."""
+    interface = problem.interface
     search = make_search(problem) if method is None else method.search(problem)
     warn_of_signs(problem)
     sample = sample_of(rows, search.pieces, 0)
@@ -243,14 +268,6 @@ def equilibrium_path(
     }
     of_events = event_variables(interface, inertia=method is not None)
     values |= event_table(problem, rows, 0, events, of_events)
-    variables = VARIABLES | of_events
-    variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
     if interface.is_free:
         values |= {"travel": travel, "crosshead_travel": far}
-        variables |= TRAVEL
-    if problem.area is not None:
-        values |= forces(values, problem.area, problem.whole_area)
-        variables |= force_variables(variables)
-    coordinates = {"load": (given, LOAD), "event": (np.arange(len(events)), EVENT)}
-    attributes = study_attributes(problem=problem, **({"method": method} if method else {}))
-    return to_dataset(values, variables, coordinates, attributes, interface)
+    return values, of_events

@@ -407,6 +407,7 @@ def follow(state: Contact, load: float, force: float, peak: float, target: float
         if stopping != NOBODY:
             _remove(state, stopping)
             if state.counts[N_STACKED] > 0:
+                _find_rates(state, state.stack[state.counts[N_STACKED] - 1])
                 return PathStop(load, force, peak, Status.UNSTABLE)
             continue
         # 2.
@@ -436,6 +437,9 @@ def follow(state: Contact, load: float, force: float, peak: float, target: float
             state.stacked[i] = False
             _start(state, i)
         # 4.
-        if held != (state.counts[N_STACKED] > 0):
-            return PathStop(load, force, peak, Status.ARRESTED if held else Status.UNSTABLE)
+        if held and state.counts[N_STACKED] == 0:
+            return PathStop(load, force, peak, Status.ARRESTED)
+        if not held and state.counts[N_STACKED] > 0:
+            _find_rates(state, state.stack[state.counts[N_STACKED] - 1])  # where slip jumps
+            return PathStop(load, force, peak, Status.UNSTABLE)
     return PathStop(load, force, peak, Status.GIVEN_UP)

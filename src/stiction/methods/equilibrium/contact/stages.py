@@ -7,7 +7,7 @@ A `Rig` gives the stiffness K, and the forces T F and T_p N of the push F and th
 
 Algorithm
 ---------
-The algorithm is our own (`pressed`, `follow_push`).
+The algorithm is our own (`press`, `begin_push`).
 
 1. Pressing alone causes shear, because the two bodies expand differently. Each cell has the sign s
    of its shear T_p. With the slip s d, K becomes s K s. If no cell exceeds its strength and each
@@ -16,8 +16,8 @@ The algorithm is our own (`pressed`, `follow_push`).
    strength are on E, edges on top. Follow the path to N.
 3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
    weakening. Edges that are open begin in S.
-4. Instabilities and arrests alternate until the slider slides. The first instability is the
-   first of them during the push. Static friction is the largest force.
+4. Instabilities and arrests alternate until the slider slides (`solver.follow_push`). The first
+   instability is the first of them during the push. Static friction is the largest force.
 """
 
 from typing import NamedTuple
@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.methods.equilibrium.contact import path
 from stiction.methods.equilibrium.contact.path import (
     N_INSIDE,
@@ -64,7 +65,7 @@ def averages(edges: Array) -> Array:
     return np.asarray(cells)
 
 
-def matrices(K: Array, T: Array, relief: float = 0.0) -> Matrices:
+def make_matrices(K: Array, T: Array, relief: float = 0.0) -> Matrices:
     """Return the matrices of a rig whose force falls by `relief` T'x (Pa)."""
     n = len(T) // 2
     if relief > 0.0:
@@ -138,14 +139,17 @@ def press(rig: Matrices, friction: Friction, force: float) -> Pressed:
     while stop.status in (Status.ARRESTED, Status.UNSTABLE):
         stop = follow(state, stop.load, 0.0, 0.0, force)
     if stop.status != Status.AT_TARGET:
-        raise ArithmeticError("the slider does not come to rest under the normal force")
+        raise InputError(
+            "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
+            " coefficients and the weakening rate"
+        )
     forces = state.overstress.copy()
-    strength = _strengths(friction, state)
+    strength = strengths(friction, state)
     forces[:n] += strength
     return Pressed(forces * sign, state.moved * sign)
 
 
-def _strengths(friction: Friction, state: Contact) -> Array:
+def strengths(friction: Friction, state: Contact) -> Array:
     """Return the strength of each cell, N/m."""
     n = len(friction.peak)
     coefficient = friction.residual + state.difference
