@@ -1,0 +1,233 @@
+"""The path of a slider beside load steps, and beside solutions in closed form."""
+
+import functools
+
+import numpy as np
+import pytest
+from rigs import LoadSteps, plain_rig
+
+import stiction as st
+from stiction.methods.equilibrium.contact.path import N_BORDERED_AGAIN, PathStop, Status, follow
+from stiction.methods.equilibrium.contact.stages import (
+    Friction,
+    begin_push,
+    make_contact,
+    make_matrices,
+    press,
+)
+
+N = 1e6 * 0.14  # 1 MPa
+RIGS = {
+    "acrylic": {"push": (0.004, 0.004)},
+    "steel base": {"base_solid": (2e11, 0.3)},
+    "soft base, tilt": {"base_solid": (5e8, 0.4), "tilt": -0.6},
+    "plate": {"plate": True, "push": (0.03, 0.004)},
+    "short base, high push": {"beyond": 0, "push": (0.065, 0.004)},
+}
+
+
+@functools.lru_cache
+def rig(name, n=24, lines=12):
+    return plain_rig(n, lines=lines, **{"beyond": 8, **RIGS[name]})
+
+
+def random_friction(K, seed, residual=0.2):
+    """Friction coefficients that are rough, and then smooth over three cells."""
+    rng, n = np.random.default_rng(seed), len(K) // 2
+    mean = rng.choice([0.45, 0.7])
+    peak = mean + 0.12 * np.convolve(rng.normal(size=n + 2), np.ones(3) / 3**0.5, "valid")
+    peak = np.maximum(peak, residual + 0.01)
+    weakening = rng.choice([0.05, 0.1, 0.2]) * K[n // 2, n // 2]
+    return Friction(peak, np.full(n, residual), np.full(n, weakening))
+
+
+def to_the_end(contact):
+    """Return all stops of a path until it slides."""
+    stops = [PathStop(0.0, 0.0, 0.0, Status.ARRESTED)]
+    while stops[-1].status in (Status.ARRESTED, Status.UNSTABLE):
+        load, force, peak, _ = stops[-1]
+        stops.append(follow(contact, load, force, peak, np.inf))
+    return stops[1:]
+
+
+def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
+    """Check slip and opening at rising loads, also just before and just after each event.
+
+    Return the stops of the path. Each onset is then inside the bracket of two load steps.
+    """
+    n, matrices = len(friction.peak), make_matrices(K, T, relief)
+    stops = to_the_end(begin_push(matrices, friction, start))
+    onsets = [stop.load for stop in stops if stop.status == Status.UNSTABLE]
+    end = onsets[-1]  # there the slider slides
+    loads = np.linspace(0.0, end, steps)[1:-1]
+    loads = np.union1d(loads, np.outer(onsets, [1.0 - away, 1.0 + away]))
+    brute = LoadSteps(
+        K + relief * np.outer(T, T), T, *friction, start.forces, np.abs(start.moved[:n]),
+        start.moved[n:],
+    )  # fmt: skip
+    contact, stop = begin_push(matrices, friction, start), PathStop(0.0, 0.0, 0.0, 0)
+    for load in loads[loads < end]:
+        while True:
+            stop = follow(contact, *stop[:3], load)
+            if stop.status == Status.AT_TARGET:
+                break
+        brute.raise_to(load)
+        largest = np.abs(brute.x).max()
+        np.testing.assert_allclose(contact.moved, brute.x, rtol=0.0, atol=1e-9 * largest)
+    # Beyond the last onset no equilibrium holds the slider.
+    if relief == 0.0:
+        assert brute.raise_to(end * (1.0 + away), limit=1e3 * largest) is None
+    return stops
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_the_path_is_that_of_load_steps(name):
+    plain = rig(name)
+    for seed in (1, 2):
+        friction = random_friction(plain.K, seed)
+        start = press(make_matrices(plain.K, plain.T_p), friction, N)
+        compare(plain.K, plain.T, friction, start)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RIGS)
+def test_every_onset_is_inside_the_bracket_of_load_steps(name):
+    plain = rig(name)
+    for seed in range(60):
+        friction = random_friction(plain.K, seed, residual=[0.1, 0.2, 0.35][seed % 3])
+        start = press(make_matrices(plain.K, plain.T_p), friction, N)
+        compare(plain.K, plain.T, friction, start, steps=6)
+
+
+def test_a_machine_unloads_as_in_load_steps():
+    plain = rig("acrylic")
+    for seed in (3, 4):
+        friction = random_friction(plain.K, seed)
+        start = press(make_matrices(plain.K, plain.T_p), friction, N)
+        stops = compare(plain.K, plain.T, friction, start, 0.3 * plain.C, steps=60)
+        peaks = [stop.peak for stop in stops]
+        assert peaks[-1] >= max(stop.force for stop in stops)
+        assert peaks[-1] < stops[-1].load
+
+
+@pytest.mark.parametrize("seed", [285, 10624])
+def test_an_edge_closes_where_the_rest_is_unstable(seed):
+    # A rigid plate, a push at 30 mm and 1 MPa. The inverse has a negative entry at the edge.
+    plain, rng, n = rig("plate", 32, 16), np.random.default_rng(seed), 32
+    rough = rng.normal(size=n if seed % 2 else n + 2)
+    if seed % 2:
+        peak = 0.7 + 0.2 * rough
+    else:
+        peak = 0.7 + 0.15 * np.convolve(rough, np.ones(3) / 3**0.5, "valid")
+    weakening = np.full(n, 0.3 * plain.K[n // 2, n // 2])
+    friction = Friction(np.maximum(peak, 0.25), np.full(n, 0.2), weakening)
+    start = press(make_matrices(plain.K, plain.T_p), friction, N)
+    contact = begin_push(make_matrices(plain.K, plain.T), friction, start)
+    to_the_end(contact)
+    assert contact.counts[N_BORDERED_AGAIN] > 0
+    compare(plain.K, plain.T, friction, start)
+
+
+def test_pressing_that_slips_is_that_of_load_steps():
+    plain, n = rig("soft base, tilt"), 24
+    friction = Friction(
+        np.full(n, 0.12), np.full(n, 0.05), np.full(n, 0.1 * plain.K[n // 2, n // 2])
+    )
+    matrices = make_matrices(plain.K, plain.T_p)
+    start = press(matrices, friction, N)
+    assert start.moved[:n].max() > 0.0
+    assert start.moved[:n].min() < 0.0
+    sign = np.ones(2 * n + 1)
+    sign[:n] = np.sign(plain.T_p[:n])
+    brute = LoadSteps(
+        plain.K * sign * sign[:, None], plain.T_p * sign, *friction, 0.0 * sign, np.zeros(n),
+        np.zeros(n + 1),
+    )  # fmt: skip
+    for force in np.geomspace(1e-3, 1.0, 13) * N:
+        brute.raise_to(force)
+    largest = np.abs(brute.x).max()
+    np.testing.assert_allclose(start.moved * sign, brute.x, rtol=0.0, atol=1e-9 * largest)
+    compare(plain.K, plain.T, friction, start)
+
+
+def test_slip_and_weakening_of_one_cell_by_hand():
+    # The example at the head of `path`: two edges that do not couple carry N.
+    K, T = np.diag([3.0, 1.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    for W, expected in ((1.0, [(3.0, 0.5), (5.0, 4.0 / 3.0)]), (4.0, [(2.5, 0.5)])):
+        friction = Friction(np.array([2.0]), np.array([1.0]), np.array([W]))
+        overstress = np.array([-2.0, -0.5, -0.5])
+        contact = make_contact(make_matrices(K, T), friction, overstress, np.zeros(3))
+        stop = PathStop(0.0, 0.0, 0.0, Status.AT_TARGET)
+        for load, slip in expected:
+            while True:
+                stop = follow(contact, *stop[:3], load)
+                if stop.status == Status.AT_TARGET:
+                    break
+                assert (W, stop.load) == (4.0, 2.0)  # the jump
+            assert contact.moved[0] == pytest.approx(slip)
+
+
+def test_without_coupling_the_onset_is_that_of_equal_blocks():
+    blocks = st.Problem(
+        solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+        interface=st.Interface(length=0.1, nodes=64),
+        friction=st.LinearWeakening(weakening_rate=0.1e12, residual_strength=0.3e6),
+        specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.01, width=0.005)),
+    )
+    field = st.RandomField(
+        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
+        st.PowerLawSpectrum(correlation_length=2e-3),
+    )
+    strength = field.sample(blocks.interface, seed=1, samples=5)
+    solved = st.onset(blocks, strength, method=st.Equilibrium(), progress=False)
+    n, dx = 64, blocks.interface.spacing
+    K, T = np.eye(2 * n + 1), np.zeros(2 * n + 1)
+    K[:n, :n] = blocks.blocks.stiffness * dx
+    T[:n] = blocks.blocks.shear * dx
+    pressure = np.zeros(2 * n + 1)
+    pressure[n:] = -1.0
+    pressure[[n, -1]] *= 0.5  # N is 1 on each cell but at the ends
+    for row, tau_p in enumerate(strength):
+        on_cells = np.ones(n)
+        peak, residual = tau_p * dx / on_cells, np.full(n, 0.3e6 * dx) / on_cells
+        friction = Friction(peak, residual, np.full(n, 0.1e12 * dx))
+        overstress = pressure.copy()
+        overstress[:n] = -peak
+        contact = make_contact(make_matrices(K, T), friction, overstress, np.zeros(2 * n + 1))
+        stops = to_the_end(contact)
+        events = sum(stop.status == Status.ARRESTED for stop in stops)
+        assert events == solved.arrested_events[row]
+        assert stops[-1].load == pytest.approx(float(solved.critical_load[row]), rel=1e-12)
+        assert stops[0].load == pytest.approx(float(solved.first_instability[row]), rel=1e-12)
+
+
+def test_stick_widths_of_cattaneo():
+    # A cylinder on a half-plane of the same material, which is pressed and then pushed. The part
+    # that sticks is sqrt(1 - F/(mu N)) of the contact (Johnson, Contact Mechanics, section 7.2).
+    n, mu = 200, 0.5
+    edges = np.linspace(-1.0, 1.0, n + 1)
+    x, dx = 0.5 * (edges[:-1] + edges[1:]), 2.0 / n
+
+    def integral(z):
+        return z * np.log(np.maximum(np.abs(z), 1e-300)) - z
+
+    flexibility = -(integral(edges[1:] - x[:, None]) - integral(edges[:-1] - x[:, None])) / dx
+    G = np.linalg.inv(flexibility + 2.0)
+    total = G.sum(axis=1)
+    K, T = np.eye(2 * n + 1), np.zeros(2 * n + 1)
+    K[:n, :n] = G - np.outer(total, total) / total.sum()
+    T[:n] = total / total.sum()
+    # Pressure at the edges. It is zero at the ends of the contact.
+    P = np.sqrt(np.maximum(1.0 - edges**2, 1e-9)) * dx * 2.0 / np.pi
+    friction = Friction(np.full(n, mu), np.full(n, mu), np.zeros(n))
+    overstress = np.concatenate([np.zeros(n), -P])
+    cells = 0.5 * (P[:-1] + P[1:])
+    cells[[0, -1]] += 0.5 * P[[0, -1]]
+    overstress[:n] = -mu * cells
+    contact = make_contact(make_matrices(K, T), friction, overstress, np.zeros(2 * n + 1))
+    stop = PathStop(0.0, 0.0, 0.0, Status.AT_TARGET)
+    for push, width in ((0.2, 0.894), (0.4, 0.775), (0.6, 0.632)):
+        stop = follow(contact, *stop[:3], push * mu * P.sum())
+        assert stop.status == Status.AT_TARGET
+        stuck = np.count_nonzero(contact.moved[:n] == 0.0) * dx / 2.0
+        assert stuck == pytest.approx(width, abs=1.5 * dx)
