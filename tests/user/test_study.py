@@ -181,7 +181,7 @@ def test_whole_tables_are_values_too():
     marginals = [STUDY["random"]["strength"]["marginal"], LOGNORMAL]
     study = swept({"random.strength.marginal": marginals})
     np.testing.assert_array_equal(study.run()["marginal"], ["beta", "lognorm"])
-    assert study.experiments[1].random.strength.mean == pytest.approx(
+    assert study.experiments[1].random.members[0].strength.mean == pytest.approx(
         scipy.stats.lognorm(0.2, scale=1e6).mean()
     )
     scales = {"random.strength.marginal.scale": [1e6, 2e6]}

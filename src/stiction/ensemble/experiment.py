@@ -58,7 +58,7 @@ class Experiment:
     """
 
     problem: Problem
-    random: Any  # a RandomInterface or EquallyLikely, or an object that becomes one
+    random: Any  # EquallyLikely, or an object that becomes one
     method: Any
     keep: Sequence[str] = ()  # names of random fields that `results` contains
     seed: int = 0
@@ -103,7 +103,7 @@ class Experiment:
     def given(self) -> Any:
         """The random interface, or a list of equally likely interfaces."""
         members = self.random.members
-        return list(members) if len(members) > 1 else members[0]
+        return list(members) if self.random.several else members[0]
 
     @property
     def dimension(self) -> int:

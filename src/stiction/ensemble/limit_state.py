@@ -148,7 +148,8 @@ class LimitState:
     @property
     def several(self) -> bool:
         """Whether there are several equally likely interfaces."""
-        return len(self.experiment.random.members) > 1
+        several: bool = self.experiment.random.several
+        return several
 
     @property
     def may_survive(self) -> bool:

@@ -290,7 +290,8 @@ def _of_parameters(
     variable = variable_of(*prior.at(prior.middle), measured.unit)
     (experiment,) = experiments_at(prior, prior.middle, simulation.method)
     doubt_strengths(
-        experiment.problem, mean_in_stress(experiment.problem, experiment.random, "strength")
+        experiment.problem,
+        mean_in_stress(experiment.problem, experiment.random.members[0], "strength"),
     )
     # 2.
     _check_reach(prior, simulation.method, measured, error)

@@ -383,7 +383,7 @@ def make_likelihood(
         experiments = experiments_at(prior, thetas, method, length)
         # A grid that suits both ends of the box suits all points between.
         for end in (experiments[0], experiments[-1]):
-            end.random.warn_if_inaccurate(end.problem.interface)
+            end.random.members[0].warn_if_inaccurate(end.problem.interface)
         # 3.
         at_coarse = experiments_at(prior, coarse, method, length)
         first = number * SPECIMEN

@@ -159,7 +159,7 @@ class Family:
             a, b, low, width = parameters
             return Beta(alpha=a, beta=b, low=low, high=low + width)
         family: Any = MARGINALS[self.name]
-        mean, variance = map(float, family.scipy_family.stats(*parameters))
+        mean, variance = map(float, family._scipy_family.stats(*parameters))
         return family(mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
 
     def _by_scipy(self, values: Array) -> Any:

@@ -1,7 +1,7 @@
-"""Mixtures of equally likely random interfaces: the first draw of a sample selects the member.
+"""The random input of a computation: one random interface, or several that are equally likely.
 
-A mixture behaves as a single random interface, so that one search for
-failures covers all members.
+`EquallyLikely` is the only protocol for random inputs, so that one search
+for failures covers all members. For several members:
 
 1. Collect the draws of all members. Members share a draw for the same
    property and mode (`_columns`).
@@ -84,12 +84,13 @@ else:
 
 @dataclass(frozen=True, eq=False)
 class EquallyLikely:
-    """Mixture of equally likely random interfaces, with the protocol of a random interface.
+    """One random interface, or several that are equally likely: the random input of every method.
 
-    The first draw of a sample selects its member.
-    Members share the other draws: a property and a mode
-    have the same draw in every member. If a sample
-    changes its member, its profiles keep their form.
+    Of several, the first draw of a sample selects the member. Members
+    share the other draws: a property and a mode have the same draw in
+    every member. If a sample changes its member, its profiles keep
+    their form. A single member has no such draw, and its draws are
+    those of the interface.
     """
 
     members: tuple[RandomInterface, ...]
@@ -106,6 +107,20 @@ class EquallyLikely:
                     "random: equally likely interfaces need the same properties, all as stresses or"
                     f" coefficients: [0] has {first}, and [{number}] {named}"
                 )
+
+    def __eq__(self, other: object) -> bool:
+        """Compare a single member by its value, and several members by identity."""
+        if not isinstance(other, EquallyLikely) or self.several or other.several:
+            return self is other
+        return self.members == other.members
+
+    def __hash__(self) -> int:
+        return id(self) if self.several else hash(self.members)
+
+    @property
+    def several(self) -> bool:
+        """Whether there are several members."""
+        return len(self.members) > 1
 
     @property
     def properties(self) -> dict[str, RandomField]:
@@ -149,11 +164,16 @@ class EquallyLikely:
         """
         if None in self.factor_laws[0]:
             return None
-        column = self.members[0].factor_column(interface)
-        return int(_columns(self, interface).of[0][column])
+        member = self.members[0]
+        streams = layout(member, interface)[len(member.names) :]
+        stream = dict(zip(member.between or {}, streams, strict=True))["strength"]
+        column = stream.columns.start
+        return int(_columns(self, interface).of[0][column] if self.several else column)
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
         """Change rows of draws so that they select given members."""
+        if not self.several:
+            return
         count = len(self.members)
         place = np.argsort(self.order) if self.order else np.arange(count)
         # The middle of a member's interval, so that round-off cannot
@@ -167,16 +187,22 @@ class EquallyLikely:
 
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return the number of the member that each sample selects."""
+        if not self.several:
+            return np.zeros(len(draws), np.int64)
         count = len(self.members)
         place = np.minimum((ndtr(draws[:, 0]) * count).astype(np.int64), count - 1)
         return np.array(self.order, np.int64)[place] if self.order else place
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws in a sample."""
+        if not self.several:
+            return self.members[0].dimension(interface)
         return _columns(self, interface).dimension
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
         """Draw samples `first`, `first` + 1, ... as an array (samples, dimension)."""
+        if not self.several:
+            return self.members[0].draws(interface, samples, seed, first)
         # NaN shows a column that no member has drawn.
         draws = np.full((samples, self.dimension(interface)), np.nan)
         draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
@@ -190,6 +216,8 @@ class EquallyLikely:
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles (samples, *shape) by name."""
+        if not self.several:
+            return self.members[0].from_draws(interface, draws)
         check_draws(draws, self.dimension(interface))
         profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
         for name in self.varying - {*self.names}:  # of members without such a factor it is 1
@@ -264,19 +292,17 @@ def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
     return EquallyLikely(tuple(_known(list(source.interfaces(count, seed)))), source=source)
 
 
-def specimens_of_fit(random: Any) -> int | None:
+def specimens_of_fit(random: EquallyLikely) -> int | None:
     """Return `specimens` of the fit if the strength is its `field` alone, otherwise `None`."""
-    alone = isinstance(random, RandomInterface) and not random.between
-    return getattr(random.strength, "specimens_of_fit", None) if alone else None
+    member = random.members[0]
+    return None if random.several or member.between else member.strength.specimens_of_fit
 
 
-def as_random(given: Any, seed: int = 0) -> RandomInterface | EquallyLikely:
-    """Return a random interface. A list or a source of several interfaces gives a mixture."""
+def as_random(given: Any, seed: int = 0) -> EquallyLikely:
+    """Return one interface, or several from a list or a source."""
     if isinstance(given, EquallyLikely):
         return given
     if isinstance(given, Source):
         return drawn_from(given, FIRST_MEMBERS, seed)
-    if not isinstance(given, list | tuple):
-        return as_random_interface(given)
-    random = EquallyLikely(tuple(map(as_random_interface, given)))
-    return random if len(random.members) > 1 else random.members[0]
+    given = given if isinstance(given, list | tuple) else [given]
+    return EquallyLikely(tuple(map(as_random_interface, given)))

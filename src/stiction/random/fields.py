@@ -26,7 +26,6 @@ from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 from scipy.optimize import brentq
 from scipy.special import ndtri
@@ -428,35 +427,6 @@ class RandomInterface:
         """Names of what differs from sample to sample: random, or with a factor."""
         pressed = {"pressing_force": "normal_pressure"}
         return {*self.names, *(pressed.get(name, name) for name in self.between or ())}
-
-    @property
-    def members(self) -> tuple[RandomInterface, ...]:
-        """A tuple with this interface only, like the members of a mixture."""
-        return (self,)
-
-    def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the member that each sample selects, which is always 0."""
-        return np.zeros(len(draws), np.int64)
-
-    groups = np.zeros(1, np.int64)
-    means = np.ones(1)
-
-    @property
-    def factor_laws(self) -> tuple[list[Any], NDArray[np.int64]]:
-        """Distributions of the strength's factor, and the number of each member's distribution."""
-        return [(self.between or {}).get("strength")], np.zeros(1, np.int64)
-
-    def factor_column(self, interface: Interface) -> int | None:
-        """Return the column of the draw for the strength's factor, or `None` without a factor."""
-        if "strength" not in (self.between or {}):
-            return None
-        streams = layout(self, interface)[len(self.names) :]
-        return int(
-            dict(zip(self.between or {}, streams, strict=True))["strength"].columns.start
-        )
-
-    def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
-        """Do nothing: all draws are samples of the only member."""
 
     @property
     def names(self) -> tuple[str, ...]:

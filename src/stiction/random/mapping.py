@@ -187,7 +187,7 @@ def _standard(marginal: Any) -> tuple[Any, float, float]:
     differ by round-off. A marginal with a lower bound below zero has
     its own table, because subtraction would magnify the relative error.
     """
-    family = marginal.scipy_family
+    family = marginal._scipy_family
     if family is None or marginal.low < 0.0:
         return marginal, 0.0, 1.0
     *shapes, low, scale = marginal.distribution.args

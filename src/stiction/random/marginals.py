@@ -33,13 +33,13 @@ class Marginal(ABC):
     A class may also define ``of_normal(z)``, which returns
     F^-1(Phi(z)) in closed form and replaces the tables in
     `mapping`. Marginals of the class share tables if
-    `scipy_family` is their family in scipy, and `distribution`
+    `_scipy_family` is their family in scipy, and `distribution`
     is this family with shapes, `low` and scale in this order.
     """
 
     family: ClassVar[str] = "marginals"
     type: str
-    scipy_family: ClassVar[Any] = None
+    _scipy_family: ClassVar[Any] = None
 
     @property
     @abstractmethod
@@ -103,7 +103,7 @@ class Beta(Marginal):
     low: Bound
     high: Bound
     type: Literal["beta"] = "beta"
-    scipy_family: ClassVar[Any] = scipy.stats.beta
+    _scipy_family: ClassVar[Any] = scipy.stats.beta
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -149,7 +149,7 @@ class _ByMoments(Marginal):
         # of deviation to mean.
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
-        return frozen(self.scipy_family, shape, self.low, above / mean_over_scale)
+        return frozen(self._scipy_family, shape, self.low, above / mean_over_scale)
 
 
 @register
@@ -173,7 +173,7 @@ class Lognormal(_ByMoments):
     """
 
     type: Literal["lognormal"] = "lognormal"
-    scipy_family: ClassVar[Any] = scipy.stats.lognorm
+    _scipy_family: ClassVar[Any] = scipy.stats.lognorm
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
@@ -191,7 +191,7 @@ class Weibull(_ByMoments):
     """Weibull distribution (of minima) above `low`, with the parameters of `Lognormal`."""
 
     type: Literal["weibull"] = "weibull"
-    scipy_family: ClassVar[Any] = scipy.stats.weibull_min
+    _scipy_family: ClassVar[Any] = scipy.stats.weibull_min
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
@@ -215,7 +215,7 @@ class Gamma(_ByMoments):
     """Gamma distribution above `low`, with the parameters of `Lognormal`."""
 
     type: Literal["gamma"] = "gamma"
-    scipy_family: ClassVar[Any] = scipy.stats.gamma
+    _scipy_family: ClassVar[Any] = scipy.stats.gamma
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         return ratio**-2, ratio**-2

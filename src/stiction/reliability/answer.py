@@ -479,7 +479,7 @@ def wanted_members(random: Any, cv: float, target_cv: float) -> int:
     """Return the number of members to draw from a source, 0 if there are enough."""
     least = cv / (LIST_SHARE * target_cv)  # the error falls with the root of the number
     count = len(random.members)
-    if getattr(random, "source", None) is None or least <= 1.0 or count >= MAX_MEMBERS:
+    if random.source is None or least <= 1.0 or count >= MAX_MEMBERS:
         return 0
     return int(min(max(REQUEST_MARGIN * count * least * least, 2 * count), MAX_MEMBERS))
 
@@ -497,7 +497,7 @@ def answered(
         experiment, answer = with_enough_members(experiment, target_cv, meter, warned, solve)
         for text in few_members(experiment.random, answer, target_cv):
             warn_accuracy(text)
-    source = getattr(experiment.random, "source", None)
+    source = experiment.random.source
     return replace(
         answer,
         warnings=tuple(texts_of(warned)),

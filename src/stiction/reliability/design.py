@@ -148,8 +148,11 @@ def design_stress(
     def solve(experiment: Experiment, meter: Meter) -> Answer:
         state, budget = prepare(experiment, event, workers, meter, max_evaluations)
         answer = _quantile(state, probability, target_cv, budget, confidence)
-        source = getattr(experiment.random, "source", None)
-        wanted = source is not None if sensitivities is None else bool(sensitivities)
+        wanted = (
+            experiment.random.source is not None
+            if sensitivities is None
+            else bool(sensitivities)
+        )
         if wanted and math.isfinite(answer.stress):
             stated = sensitivities if isinstance(sensitivities, dict) else {}
             effects = sensitivities_of(state, probability, answer.stress, stated)
