@@ -1,4 +1,4 @@
-"""The figure of a slider on a base, drawn to scale, with stresses and slip at its onset."""
+"""The figure of a slider on a base, to scale, with stresses and slip at its first instability."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stiction.base.units import unit_for
 from stiction.elasticity.rig import on_cells
-from stiction.methods.equilibrium.path import equilibrium_path
+from stiction.methods.equilibrium.contact.solver import SliderPaths, follow_push
 from stiction.plot.axes import new_figure, with_unit
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
@@ -18,12 +18,10 @@ from stiction.problem.specimen import Pusher, Slider
 
 N_ARROWS = 7
 """Arrows of a pressure on the top."""
-JUST_BEFORE = 1.0 - 1e-9
-"""Load at which the state before an event is drawn, over the load of the event."""
 
 
 def draw(problem: Problem, sample: Sample | None) -> NDArray[Any]:
-    """Draw a rig, and stresses and slip of a sample before its first event.
+    """Draw a rig, and stresses and slip of a sample at its first instability.
 
     Without a sample, the stresses of the pressing alone are drawn, as if the interface were glued.
     """
@@ -35,15 +33,14 @@ def draw(problem: Problem, sample: Sample | None) -> NDArray[Any]:
         lines["shear stress"] = mean * rig.T_p[:n]
         lines["pressure"] = -mean * on_cells(rig.T_p[n:])
     else:
-        first = equilibrium_path(problem, sample, [sample.strength.mean()]).event_load.values[0]
-        path = equilibrium_path(problem, sample, [first * JUST_BEFORE])
-        lines["shear stress"], lines["pressure"] = (
-            path.stress.values[0],
-            path.pressure.values[0],
-        )
+        push = follow_push(SliderPaths(problem).begin(sample, 0))
+        state = push.first or push.last
+        lines["shear stress"] = state.shear / interface.spacing
+        lines["pressure"] = on_cells(state.pressing) / interface.spacing
         coefficient = sample.strength[0] / sample.normal_pressure[0]
         lines["peak strength"] = coefficient * lines["pressure"]
-        moved = {"slip": path.slip.values[0], "opening": path.opening.values[0]}
+        opening = 0.5 * (state.opening[:-1] + state.opening[1:])
+        moved = {"slip": state.slip, "opening": opening}
     panels = [("m", "slip", moved)] if moved else []
     figure = new_figure(1.35 * COLUMN, (1.5 + 0.5 * len(panels)) * COLUMN)
     with paper_style():

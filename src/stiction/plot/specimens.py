@@ -58,8 +58,8 @@ def specimen(
         The specimen, and below it the profiles along the interface. For
         blocks, the profiles are the shear and the pressure of the drive.
         A slider is drawn to scale. If its strength (friction
-        coefficients) is given, its shear, pressure and slip before the
-        first event are drawn, otherwise the stresses of the pressing.
+        coefficients) is given, its shear, pressure and slip at the
+        first instability are drawn, otherwise the stresses of the pressing.
 
     Examples
     --------
