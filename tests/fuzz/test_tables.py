@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as strategies
 
 import stiction as st
-from stiction.problem.profiles import files
+from stiction.problem.reading import files
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "microns": 1e-6, "Millimeter": 1e-3}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "Megapascal": 1e6, "bar": 1e5}

@@ -48,7 +48,7 @@ def friction_coefficients_and_pressures():
     )
     return {
         "coefficient": table(text, interface=SMALL, quantity="friction_coefficient"),
-        "pressure": table(pressure, interface=SMALL, quantity="normal_pressure"),
+        "pressure": table(pressure, interface=SMALL, quantity="normal_pressure", value=2),
     }
 
 

@@ -81,10 +81,12 @@ def test_files_of_testing_machines(tmp_path):
         assert [curve.name for curve in curves] == names
         assert all(is_machine(curve, 0.0) for curve in curves)
     frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine(), "F2 (N)": machine()})
-    over_time = st.read_curve(frame)
+    refuses("force='load (N)' or force='F2 (N)'", lambda: st.read_curve(frame))
+    over_time = st.read_curve(frame, force=1)
+    frame, both = frame[["time (s)", "load (N)"]], frame
     refuses("test: line ... goes back", lambda: st.read_curve(pd.concat([frame, frame])))
     assert (over_time[0].travel_unit, over_time[0].peak_travel) == ("s", pytest.approx(6.0))
-    assert is_machine(st.read_curve(frame, speed=1e-4, force=2)[0], 0.0)
+    assert is_machine(st.read_curve(both, speed=1e-4, force=2)[0], 0.0)
     with pytest.warns(st.AccuracyWarning, match="negative"):
         assert is_machine(
             st.read_curve(frame.assign(**{"load (N)": -machine()}), speed=1e-4)[0], 0.0

@@ -10,7 +10,7 @@ import pytest
 from refusals import refuses
 
 import stiction as st
-from stiction.problem.profiles import files
+from stiction.problem.reading import files
 
 X = np.array([0.0, 1.0, 2.0, 3.5])  # mm
 STRENGTH = np.array([1.0, 1.25, 0.975, 1.03])  # MPa
@@ -40,7 +40,7 @@ def test_heads_of_instruments(tmp_path):
     for head in HEADS.values():
         assert is_read(read(tmp_path, "\n".join([head, *ROWS])))
     text = "\n".join(["1;2", "speed;0.5", "x (mm);strength (MPa)", *ROWS])
-    refuses("line 3 ... is not a number", lambda: read(tmp_path, text))
+    refuses("line 2 ... is not a number", lambda: read(tmp_path, text))
     assert is_read(read(tmp_path, text, skip=2))
     trailing = "\n".join(["a,1,2,3,4,5", "Lateral mm,Raw um,", *(f"{r},,," for r in ROWS)])
     heights = read(tmp_path, trailing.replace(";", ","), quantity="height")
@@ -71,8 +71,9 @@ def test_a_number_chooses_the_column_where_headings_are_equal(tmp_path):
     text = "\n".join(["x (mm);strength (MPa);strength (MPa)", *rows])
     assert is_read(read(tmp_path, text, value=1))
     assert is_read(read(tmp_path, text, value=2), 2e6 * STRENGTH)
-    for value in (None, "strength", "strength (MPa)"):
+    for value in ("strength", "strength (MPa)"):
         refuses("columns 1 and 2 ... 'strength", lambda v=value: read(tmp_path, text, value=v))
+    refuses("pass value=1 or value=2", lambda: read(tmp_path, text))
 
 
 def test_marks_of_thousands_are_never_guessed(tmp_path):

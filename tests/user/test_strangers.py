@@ -28,7 +28,7 @@ from stiction.base.files import private_folder
 from stiction.base.netcdf import read_netcdf
 from stiction.ensemble import batches, store
 from stiction.methods.dynamics.save import open_rupture
-from stiction.problem.profiles.files import NETCDF, TEXT
+from stiction.problem.reading.files import NETCDF, TEXT
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="Windows has other means")
 SOURCES = Path(__file__).parents[2] / "src"

@@ -49,13 +49,24 @@ _KNOWN = {
     "-": Unit(1.0, (0, 0, 0)),
     "%": Unit(0.01, (0, 0, 0)),
     "in": Unit(0.0254, _LENGTH),
+    "ft": Unit(0.3048, _LENGTH),
+    "mil": Unit(2.54e-5, _LENGTH),
+    **dict.fromkeys(("sec", "secs"), Unit(1.0, (0, 0, 1))),
+    "msec": Unit(1e-3, (0, 0, 1)),
+    "min": Unit(60.0, (0, 0, 1)),
+    **dict.fromkeys(("h", "hr"), Unit(3600.0, (0, 0, 1))),
+    **dict.fromkeys(("kgf", "kp"), Unit(9.80665, (1, 1, -2))),
+    "gf": Unit(9.80665e-3, (1, 1, -2)),
+    "daN": Unit(10.0, (1, 1, -2)),
+    "lbf": Unit(4.4482216152605, (1, 1, -2)),
+    "kip": Unit(4448.2216152605, (1, 1, -2)),
     "psi": Unit(6894.757293168, _STRESS),
     "ksi": Unit(6894757.293168, _STRESS),
 }
 _NAMES = {
     **dict.fromkeys(("meter", "metre"), "m"), "micron": "um", "newton": "N", "pascal": "Pa",
-    "second": "s", "gram": "g", "joule": "J", "bar": "bar", "inch": "in", "inche": "in",
-    "percent": "%", "angstrom": "\N{ANGSTROM SIGN}",
+    "second": "s", "minute": "min", "hour": "h", "gram": "g", "joule": "J", "bar": "bar",
+    "inch": "in", "inche": "in", "percent": "%", "angstrom": "\N{ANGSTROM SIGN}",
 }  # fmt: skip
 _PREFIX_NAMES = {
     "": "", "tera": "T", "giga": "G", "mega": "M", "kilo": "k", "centi": "c", "milli": "m",
@@ -63,7 +74,7 @@ _PREFIX_NAMES = {
 }  # fmt: skip
 _WORD = re.compile(rf"({'|'.join(_PREFIX_NAMES)})({'|'.join(_NAMES)})s?$", re.IGNORECASE)
 """Units in words, such as millimeters, Megapascal and microns."""
-_COMMON = "m, cm, mm, um, nm, km, in, Pa, kPa, MPa, GPa, bar, psi, ksi, N, kN, s, ms"
+_COMMON = "m, cm, mm, um, nm, in, ft, Pa, kPa, MPa, GPa, bar, psi, N, kN, lbf, kgf, s, ms, min"
 _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "m": (1.0, {"km": 1e-3, "m": 1.0, "mm": 1e3, "µm": 1e6, "nm": 1e9}),
     "s": (1.0, {"s": 1.0, "ms": 1e3, "µs": 1e6, "ns": 1e9}),

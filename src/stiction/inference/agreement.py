@@ -49,7 +49,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.inference.curves import Curves, summary_of
-from stiction.inference.peaks import Peaks, factor_of, make_peaks
+from stiction.inference.peaks import Peaks, factor_of, make_peaks, title_of
 from stiction.inference.posterior import Posterior
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
@@ -115,13 +115,13 @@ class Agreement(Result):
 
     def _summary(self) -> Summary:
         rows = [Row(f"p-value, {name}", p) for name, p in self.p_values.items()]
-        return Summary(f"{self.peaks} against the prediction", rows)
+        return Summary(f"{title_of(self.peaks)} against the prediction", rows)
 
     def __str__(self) -> str:
         squares_p, deviation_p, *_ = self.p_values.values()
         text = (
-            f"{self.peaks} against the prediction: p = {squares_p:.3g} (Cramer-von Mises),"
-            f" {deviation_p:.3g} (largest deviation)"
+            f"{title_of(self.peaks)} against the prediction: p = {squares_p:.3g}"
+            f" (Cramer-von Mises), {deviation_p:.3g} (largest deviation)"
         )
         shown = [f"{self.p_values[name]:.3g} ({PRECURSORS[name]})" for name in self.precursors]
         return text + f"; precursors: p = {', '.join(shown)}" * bool(shown)

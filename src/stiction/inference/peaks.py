@@ -9,23 +9,56 @@ refused, and so are peaks that are far from the predictions.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import pydantic
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.model import FilePath, Number, RealArray, check, checked, describe, is_finite
+from stiction.base.model import (
+    FilePath,
+    Number,
+    Positive,
+    RealArray,
+    check,
+    checked,
+    describe,
+    is_finite,
+)
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, is_in, magnitude_in_one_of
-from stiction.inference.curves import Curves, column_in_si
-from stiction.problem.profiles.files import read_table
-from stiction.problem.profiles.labels import column_of, with_stated_unit, without_missing
-from stiction.problem.profiles.reading import Missing
-from stiction.problem.profiles.tables import Options, table_of_frame
+from stiction.base.units import (
+    factor_to,
+    is_in,
+    magnitude_in_one_of,
+    number_and_unit,
+    states_unit,
+)
+from stiction.inference.curves import Curves
+from stiction.problem.reading.columns import (
+    Column,
+    Reading,
+    Table,
+    Wanted,
+    read_column,
+    reading_of,
+    role_of,
+    stated_column,
+    unclear,
+)
+from stiction.problem.reading.files import read_table
+from stiction.problem.reading.labels import (
+    Missing,
+    column_in_si,
+    several_tables,
+    with_stated_unit,
+    without_missing,
+)
+from stiction.problem.reading.tables import Options, table_of_frame
 
 MIN_PEAKS = 3
 """Fewest different peaks in all: of two numbers, one may be a mistake."""
@@ -33,8 +66,10 @@ MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks above which their unit must be wrong."""
 MIN_CURVE_LINES = 100
 """Fewest lines of a table that is taken for a curve if its time or travel only rises."""
-PEAK_COLUMNS = ("peak", "tau", "stress", "strength", "force", "friction")
-LENGTH_COLUMNS = ("length", "specimen")
+SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
+"""Beginnings of the heading of a column that says which specimen was tested."""
+COEFFICIENTS = (0.05, 1.0)
+"""Range of slip factors. Swapped columns or units lead far beyond it."""
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
 """Variable of a method that each unit measures."""
 
@@ -52,11 +87,21 @@ class Peaks(Result):
         Peaks of each kind, in `unit`.
     unit : str
         "Pa", "N" for forces, or "1" for friction coefficients.
+    normal_forces : tuple of arrays, optional
+        Normal force of each test (N), or normal stress (Pa), if
+        coefficients were computed from them.
+    specimens : tuple of arrays, optional
+        Name or number of the specimen of each test.
+    read : Reading, optional
+        File, column, unit and number of values, and what was left out.
     """
 
     lengths: tuple[float | None, ...]
     values: tuple[Array, ...]
     unit: str
+    normal_forces: tuple[Array, ...] | None = None
+    specimens: tuple[Any, ...] | None = None
+    read: Reading | None = None
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks that differ so much from predictions that their unit must be wrong."""
@@ -80,17 +125,14 @@ class Peaks(Result):
             for length, values in kinds
             for i, peak in enumerate(values.tolist())
         ]
-        return Summary(str(self), rows)
+        return Summary(title_of(self), rows, notes=[str(self.read)] if self.read else [])
 
-    def __repr__(self) -> str:
-        return self._summary().text
 
-    def __str__(self) -> str:
-        pairs = zip(self.lengths, self.values, strict=True)
-        kinds = [
-            f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs
-        ]
-        return ", ".join(kinds)
+def title_of(peaks: Peaks) -> str:
+    """Return the numbers of peaks, by the length of specimens."""
+    pairs = zip(peaks.lengths, peaks.values, strict=True)
+    kinds = [f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs]
+    return ", ".join(kinds)
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
@@ -101,7 +143,7 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
         return make_peaks(peaks.peaks, peaks.unit)
     if hasattr(peaks, "columns") and hasattr(peaks, "to_xarray"):
         with prefixed("peaks"):
-            return _of_table(table_of_frame(peaks), None, Options())
+            return _of_table(table_of_frame(peaks), Options())
     # Lengths may be quantities with a unit.
     groups: dict[Any, Any] = dict(peaks) if isinstance(peaks, Mapping) else {None: peaks}
     groups = {magnitude_in_one_of(key, ["m"])[0]: values for key, values in groups.items()}
@@ -159,7 +201,10 @@ def _in_si(given: Any, unit: str) -> Array:
 def read_peaks(
     source: FilePath | Curves,
     *,
+    value: Wanted = None,
     unit: str | None = None,
+    normal: Positive | str | None = None,
+    surfaces: Annotated[Number, pydantic.Field(ge=1)] = 1,
     missing: Missing | None = None,
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,
@@ -167,6 +212,8 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
+    A column is read if its heading, or the caller, says that it is the
+    wanted quantity; if more than one column could be it, none is read.
     First plot the peaks in the order of the tests. Peaks that drift are
     not a sample from one distribution.
 
@@ -174,28 +221,38 @@ def read_peaks(
     ----------
     source : path or Curves
         Curves from `stiction.read_curve`, or a table with a heading and
-        one test in each line, separated by commas, semicolons, tabs or
-        blanks. The peaks are the column called peak, stress, strength,
-        force or friction, with its unit: ``peak [MPa]``. Forces have
-        the unit N or kN. Friction coefficients have the unit 1 or -. If
-        no column has such a name, the peaks are the only column with a
-        suitable unit. A column ``length [mm]`` may hold the length of
-        the specimen. Other columns are not read.
+        one test in each line. Rows of statistics below the tests (mean,
+        SD, n) are left out. A column ``specimen`` may hold the number or
+        name of the specimen, and a column ``length [mm]`` its length.
+    value : str or int, optional
+        Column of the peaks: heading, name, or number from 0. By default
+        it is the column whose heading says friction, shear, slip load,
+        peak, COF, mu, Reibkraft, ... or the only column with numbers
+        besides specimens, times and lengths.
     unit : str, optional
-        Unit of the peaks if the file does not state it.
+        Unit of the peaks if the file does not state it. Forces are in N
+        or kN, friction coefficients in 1 or -.
+    normal : str or float, optional
+        Column of the normal force (or normal stress) of each test, or a
+        number for all tests (N or Pa, or text such as "196 kN"). The
+        result then holds friction coefficients, and keeps the forces.
+    surfaces : int
+        Number of friction surfaces that share the force.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`. Tests without a peak are left out.
 
     Returns
     -------
     Peaks
-        For `stiction.infer`.
+        For `stiction.infer`. Printing shows what was read.
 
     Raises
     ------
     InputError
         If a unit is missing or unknown, columns are ambiguous, a number
-        is missing, or the file is the curve of one test.
+        is missing, there are fewer than three specimens, the slip
+        factors are not between 0.05 and 1, or the file is the curve of
+        one test.
 
     Examples
     --------
@@ -204,47 +261,130 @@ def read_peaks(
     >>> import stiction as st
     >>> path = Path(tempfile.mkdtemp()) / "peaks.csv"
     >>> _ = path.write_text("test, peak [MPa]\\n1, 0.71\\n2, 0.69\\n3, 0.74\\n")
-    >>> print(st.read_peaks(path))
-    3 peaks
+    >>> st.read_peaks(path).read.column
+    "column 1 'peak [MPa]'"
     """
     options = Options(skip, sheet, missing, decimal)
     if isinstance(source, Curves):
+        if value is not None or normal is not None:
+            raise InputError("value, normal: apply to a file of peaks only. Leave them out")
         return make_peaks(source)
     with prefixed(str(source)):
-        return _of_table(read_table(Path(source), options), unit, options)
+        return _of_table(
+            read_table(Path(source), options), options, value, unit, normal, surfaces
+        )
 
 
-def _refuse_curve(table: Any, read: set[str]) -> None:
+def _refuse_curve(columns: Sequence[Column], read: Sequence[Column]) -> None:
     """Refuse a long table in which time or travel only rises: it is the curve of a test."""
-    for name, column in table.items():
-        timed = any(is_in(column.attrs.get("units"), si) for si in ("m", "s"))
-        long = name not in read and len(column) >= MIN_CURVE_LINES
-        if timed and long and np.all(np.diff(column) >= 0):
+    for column in columns:
+        timed = any(is_in(column.unit, si) for si in ("m", "s"))
+        long = column not in read and column.values.size >= MIN_CURVE_LINES
+        if timed and long and np.all(np.diff(column.values) >= 0):
             raise InputError(
-                f"{name!r} only rises over {len(column)} lines, as in the curve of one test. Read"
-                " curves with st.read_curve, and pass them to st.read_peaks"
+                f"{column.label!r} only rises over {column.values.size} lines, as in the curve of"
+                " one test. Read curves with st.read_curve, and pass them to st.read_peaks"
             )
 
 
-def _of_table(table: Any, unit: str | None, options: Options) -> Peaks:
+def _of_table(
+    table: Table, options: Options, value: Wanted = None, unit: str | None = None,
+    normal: float | str | None = None, surfaces: int = 1,
+) -> Peaks:  # fmt: skip
     """Return the peaks in a table of tests."""
-    length, peak = column_of(table, LENGTH_COLUMNS), column_of(table, PEAK_COLUMNS, VARIABLES)
-    if peak is None:
-        names = ", ".join(map(str, table.data_vars))
-        raise InputError(f"no column has a name like 'peak [MPa]'. The columns are {names}")
-    columns = [column for column in (length, peak) if column is not None]
-    _refuse_curve(table, {column.name for column in columns})
-    if any(texts := [column.attrs["text"] for column in columns]):
-        raise InputError(filter(None, texts))
-    values, si = column_in_si(without_missing(peak, options), "peak", unit, VARIABLES, "unit")
+    if table.begins:
+        raise InputError(several_tables(table))
+    columns = table.columns
+    named = [c for c in columns if re.match(SPECIMEN_NAMES, c.name.strip("_:. ").casefold())]
+    lengths = [c for c in columns if role_of(c) == "length"]
+    lengths += [c for c in named if is_in(c.unit, "m") and c not in lengths]
+    names = [c for c in named if c not in lengths and role_of(c) == "specimen"]
+    used: dict[str, Column] = {}
+    force = None
+    if isinstance(normal, str) and not states_unit(normal):
+        force = stated_column(columns, "normal", normal)
+        used["normal force"] = force
+    left = [c for c in columns if c not in (*lengths, *names, force)]
+    peak = read_column(
+        left, "peak", "value", value, VARIABLES, lambda column: role_of(column) == "friction"
+    )
+    if len(lengths) > 1 or len(names) > 1:
+        raise InputError(unclear(columns, "specimen or its length", "value", lengths + names))
+    used |= dict(zip(("length",), lengths, strict=False))
+    used |= dict(zip(("specimen",), names, strict=False))
+    _refuse_curve(columns, [peak, *used.values()])
+    if texts := [c.text for c in (peak, *lengths, *filter(None, [force])) if c.text]:
+        raise InputError(texts)
+    values, si = column_in_si(
+        replace(peak, values=without_missing(peak.values, options)),
+        "peak",
+        unit,
+        VARIABLES,
+        "unit",
+    )
     # A stated word or number marks a test without a peak. Any other NaN
     # is a mistake.
     kept = ~np.isnan(values) if options.missing is not None else np.ones(values.size, np.bool_)
-    if length is None:
-        return make_peaks(values[kept], si)
-    lengths = column_in_si(length, "length", None, ("m",))[0][kept]
-    if np.isnan(lengths).any():
-        row = int(np.argmax(np.isnan(lengths)))
-        raise InputError(f"length: missing in row {row}. Give the length of each specimen")
-    groups = {size: values[kept][lengths == size] for size in np.unique(lengths)}
-    return make_peaks(groups, si)
+    values, forces = values[kept], None
+    if normal is not None:
+        forces = _normal_forces(force, normal, si, table, options)[kept]
+        values, si = _coefficients(values, forces, si, surfaces), "1"
+    elif surfaces != 1:
+        raise InputError("surfaces: needs normal=, the normal force. Leave it out")
+    labels = np.array(names[0].cells or names[0].values.astype(str))[kept] if names else None
+    if labels is not None and 1 < np.unique(labels).size < MIN_PEAKS:
+        raise InputError(
+            f"holds {np.unique(labels).size} specimens in {names[0]}, at least {MIN_PEAKS} are"
+            " needed. Several tests of a specimen say nothing about other specimens"
+        )
+    read = reading_of(table, peak, unit or si, used)
+    sizes: Array | None = None
+    if lengths:
+        sizes = column_in_si(lengths[0], "length", None, ("m",))[0][kept]
+        if np.isnan(sizes).any():
+            row = int(np.argmax(np.isnan(sizes)))
+            raise InputError(f"length: missing in row {row}. Give the length of each specimen")
+    whole = {None: np.ones(values.size, dtype=bool)}
+    groups = whole if sizes is None else {size: sizes == size for size in np.unique(sizes)}
+    made = make_peaks({size: values[rows] for size, rows in groups.items()}, si)
+    return replace(
+        made, read=read,
+        normal_forces=None if forces is None else tuple(forces[rows] for rows in groups.values()),
+        specimens=None if labels is None else tuple(labels[rows] for rows in groups.values()),
+    )  # fmt: skip
+
+
+def _normal_forces(
+    column: Column | None, given: Any, si: str, table: Table, options: Options
+) -> Array:
+    """Return the normal force (or stress) of each test, in the unit of the peaks."""
+    if si == "1":
+        raise InputError("normal: the peaks are friction coefficients already. Leave it out")
+    if column is None:
+        number = given
+        if isinstance(given, str):
+            number, stated = number_and_unit(given)
+            number *= factor_to(si, stated or si)
+        return np.full(table.lines.size, float(number))
+    values = without_missing(column.values, options)
+    forces, _ = column_in_si(replace(column, values=values), "normal force", None, (si,))
+    if (missing := np.flatnonzero(~(forces > 0.0))).size:
+        raise InputError(
+            f"normal: {column.label!r} holds no force in line {table.lines[missing[0]]}"
+            f" ({missing.size} such tests). Remove these tests, or give their forces"
+        )
+    return forces
+
+
+def _coefficients(values: Array, forces: Array, si: str, surfaces: int) -> Array:
+    """Return friction coefficients, and refuse those that swapped columns or units would give."""
+    coefficients = values / (surfaces * forces)
+    typical = float(np.median(coefficients))
+    if not COEFFICIENTS[0] <= typical <= COEFFICIENTS[1]:
+        raise InputError(
+            f"normal: the median friction coefficient would be {typical:.3g}, from"
+            f" {np.median(values):.4g} {si} over {surfaces} times {np.median(forces):.4g} {si}."
+            f" Slip factors lie between {COEFFICIENTS[0]:g} and {COEFFICIENTS[1]:g}. Check that the"
+            " two columns are not swapped, their units, and surfaces="
+        )
+    return coefficients

@@ -17,7 +17,7 @@ from stiction.base.model import Count, Number, RealArray, check, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
-from stiction.inference.peaks import Peaks
+from stiction.inference.peaks import Peaks, title_of
 from stiction.inference.prior import Prior
 from stiction.inference.specimens import FactorGrid
 from stiction.problem.problem import Problem
@@ -249,7 +249,7 @@ class Posterior(Result):
             if name in self.information:
                 remark += f", {self.information[name]:.2f} nats"
             rows.append(Row(name, self.mean(name), self.interval(name), unit, remark))
-        title = f"{self.peaks}; onset by {self.method}, posterior means"
+        title = f"{title_of(self.peaks)}; onset by {self.method}, posterior means"
         return Summary(title, rows, "90 % interval", self.notes)
 
 

@@ -28,8 +28,8 @@ from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import is_coefficient
 from stiction.problem.profiles.placing import at_nodes, turned
+from stiction.problem.reading.labels import is_coefficient
 from stiction.problem.resolution import check_resolution
 from stiction.problem.specimen import Slider
 

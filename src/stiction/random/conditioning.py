@@ -69,7 +69,7 @@ from stiction.base.model import Positive, check_memory, model
 from stiction.base.units import is_in
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import in_si, unit_of
+from stiction.problem.reading.labels import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import condition, layout
 

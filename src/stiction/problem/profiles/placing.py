@@ -25,7 +25,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import real_array
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import OF_A_PLANE, is_labelled, labelled, simplified
+from stiction.problem.reading.labels import OF_A_PLANE, is_labelled, labelled, simplified
 
 TOLERANCE = 0.02
 """Share of the spacing by which rounding in a file may move a point."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -31,33 +31,29 @@ from stiction.base.model import (
 )
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.labels import (
+from stiction.problem.profiles.placing import place, quantity_of, refuse_missing
+from stiction.problem.reading.columns import Wanted
+from stiction.problem.reading.labels import (
     OF_A_PLANE,
-    Column,
+    Missing,
     check_positive,
     labelled,
 )
-from stiction.problem.profiles.placing import (
-    place,
-    quantity_of,
-    refuse_missing,
-)
-from stiction.problem.profiles.tables import Options
+from stiction.problem.reading.tables import Options
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Missing = Annotated[
-    float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
-]
+READ = ("source", "column", "unit_in_source", "values", "other_columns", "left_out")
+"""Attributes that state what was read."""
 
 
 @checked
 def read_profile(
     source: Any,
     *,
-    x: Column = None,
-    value: Column = None,
+    x: Wanted = None,
+    value: Wanted = None,
     unit: str | None = None,
     x_unit: str | None = None,
     quantity: str = "strength",
@@ -165,6 +161,7 @@ def read_profile(
             source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
             x_unit=x_unit, options=options,
         )  # fmt: skip
+        read = array.attrs
         # 2. Map heights.
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
@@ -180,7 +177,8 @@ def read_profile(
             array = xr.DataArray(values, interface.coordinates, interface.dims)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
-    array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
+    names = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
+    array.attrs = names | {key: read[key] for key in READ if read.get(key)}
     return array.rename(quantity)
 
 

@@ -16,10 +16,9 @@ number, so an ambiguous choice is refused. `labelled` takes these steps:
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,14 +28,25 @@ from stiction.base.errors import (
     InputError,
     UnitWarning,
     prefixed,
-    unknown_name,
     warn_user,
 )
 from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
-from stiction.problem.profiles.files import HEIGHT, heights_of, load
-from stiction.problem.profiles.tables import Options, name_and_unit, sizes_of, table_of_frame
+from stiction.problem.reading.columns import (
+    Column,
+    Reading,
+    Table,
+    Wanted,
+    is_coefficient_name,
+    read_column,
+    reading_of,
+    role_of,
+    stated_column,
+    unclear,
+)
+from stiction.problem.reading.files import HEIGHT, heights_of, load
+from stiction.problem.reading.tables import Options, name_and_unit, sizes_of, table_of_frame
 
 NAMES = {
     "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
@@ -61,32 +71,32 @@ SENTINELS = np.array(
      3.40282e38, -3.40282e38]
 )  # fmt: skip
 """Numbers that instruments and formats write for a missing value."""
-UNNAMED = re.compile(r"\d+$|values?$|y\d*$")
-"""Names that say nothing about a column. A column without a heading has its number as a name."""
+LISTED_COLUMNS = 20
+"""Names of columns in a message."""
+Missing = Annotated[
+    float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
+]
+TALL = 1e-3
+"""Range of heights without a unit, m, above which they are probably in um or nm."""
+
 OF_A_PLANE = (
     ". A map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
     " interface of two lengths and two numbers of nodes"
 )
 """Advice for two dimensions where a line was expected."""
-LISTED_COLUMNS = 20
-"""Names of columns in a message."""
-TALL = 1e-3
-"""Range of heights without a unit, m, above which they are probably in um or nm."""
-
-Column = str | int | None
 
 
 # -- values in SI --------------------------------------------------------------------------------
 
 
 def is_labelled(value: Any) -> bool:
-    """Return whether a value is an xarray object, without importing xarray."""
-    return hasattr(value, "dims") and hasattr(value, "coords")
+    """Return whether a value has labels: a table or an xarray object."""
+    return isinstance(value, Table) or (hasattr(value, "dims") and hasattr(value, "coords"))
 
 
 def is_coefficient(value: Any) -> bool:
     """Return whether a labelled array states that it holds friction coefficients, unit 1."""
-    return is_labelled(value) and is_in(unit_of(value), "1")
+    return hasattr(value, "dims") and is_in(unit_of(value), "1")
 
 
 def unit_of(array: Any) -> str:
@@ -109,9 +119,38 @@ def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     return values * factor
 
 
+def column_in_si(
+    column: Column, quantity: str, given: str | None, units: Iterable[str], option: str = ""
+) -> tuple[Array, str]:
+    """Return a column in SI and its SI unit. The source or the caller states the original unit."""
+    name = given or column.unit or "1" * is_coefficient_name(column)
+    if not name:
+        way = f", or pass {option}=" * bool(option)
+        raise InputError(
+            f"the unit of the {quantity} is not stated. Write it into the heading of"
+            f" {column.label!r}{way}"
+        )
+    for si in units:
+        if is_in(name, si):
+            factor = factor_to(si, name)
+            if given and parse(column.unit) and not np.isclose(
+                factor, factor_to(si, column.unit), rtol=1e-12
+            ):  # fmt: skip
+                raise InputError(
+                    f"{quantity} is given in {given}, but the source states {column.unit}. Leave"
+                    " the unit out, or correct the source"
+                )
+            return column.values * factor, si
+    raise InputError(
+        f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
+    )
+
+
 def simplified(value: Any, quantity: str) -> Any:
     """Return a labelled array if the source has labels. Otherwise return numbers in SI."""
     si = QUANTITIES[quantity].units
+    if isinstance(value, Table):
+        return value
     if is_labelled(value):
         whole = value.dims or hasattr(value, "data_vars")
         return value if whole else in_si(value, quantity, si)
@@ -137,11 +176,11 @@ def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]
     return numbers, si or stated or None
 
 
-def without_missing(array: Any, options: Options) -> Any:
-    """Return an array with NaN in place of the numbers that stand for a missing value."""
+def without_missing(values: Array, options: Options) -> Array:
+    """Return values with NaN in place of the numbers that stand for a missing value."""
     numbers = [number for number in options.stated if not isinstance(number, str)]
-    absent = [np.isclose(array.values, number, rtol=1e-6, atol=0.0) for number in numbers]
-    return array.where(~np.any(absent, axis=0)) if absent else array
+    absent = [np.isclose(values, number, rtol=1e-6, atol=0.0) for number in numbers]
+    return np.where(np.any(absent, axis=0), np.nan, values) if absent else values
 
 
 def of_pandas(value: Any) -> Any:
@@ -196,8 +235,8 @@ def labelled(
     quantity: str,
     dims: tuple[str, ...] | None = None,
     *,
-    x: Column = None,
-    value: Column = None,
+    x: Wanted = None,
+    value: Wanted = None,
     unit: str | None = None,
     x_unit: str | None = None,
     options: Options = Options(),  # noqa: B008
@@ -205,46 +244,40 @@ def labelled(
     """Return a quantity from `source` in SI, along `dims` or the directions of the source.
 
     A dimension with a different name, such as the sample, comes first.
-    It is the only dimension if each sample has a single value.
+    It is the only dimension if each sample has a single value. The
+    attributes state what was read.
     """
-    # 1. Make the source a DataArray or a Dataset.
+    # 1. Make the source a table or labelled data.
     is_file = isinstance(source, str | Path)
     data: Any = load(Path(source), options) if is_file else simplified(source, quantity)
     if not is_labelled(data):
         data = _of_array(data, source)
-    name = getattr(data, "name", None)
-    if name == HEIGHT and quantity != "height":
+    if getattr(data, "name", None) == HEIGHT and quantity != "height":
         raise InputError(
             "holds heights. Pass strength=, a function that maps them to strengths (Pa), or keep"
             " them with quantity='height'"
         )
     # 2. A table without headings may be a map.
-    data = _as_map(data, dims, value)
-    if not hasattr(data, "data_vars"):
-        if value not in (None, data.name):
-            raise InputError(
-                f"value: {value!r} is not the name of the only variable, {data.name!r}"
-            )
-        data, value = data.to_dataset(name=quantity), quantity
-    # 3. Choose the variable and its coordinates.
-    dims = dims or (("x", "y") if _is_map(data) else ("x",))
-    chosen, places = _chosen(data, quantity, dims, x, value)
-    texts = [data.variables[name].attrs.get("text") for name in (chosen, *places.values())]
-    if "row" in data.dims and any(texts):
-        raise InputError(filter(None, texts))
+    if isinstance(data, Table):
+        data = _as_map(data, dims, value)
+    # 3. Choose the column and its coordinates by the rule.
+    lines: Any = ()
+    read: Reading | None
+    if isinstance(data, Table):
+        array, read = _of_table(data, quantity, dims, x, value)
+        lines = data.lines
+    else:
+        array, read = _of_variables(data, quantity, dims, x, value)
+    dims = dims or (("x", "y") if "y" in array.coords else ("x",))
     # 4. Name the dimensions.
-    array = data[chosen]
-    at = {dim: data[name].variable for dim, name in places.items()}
-    at = {dim: along for dim, along in at.items() if {*along.dims} <= {*array.dims}}
-    dropped = [name for name in array.coords if name not in array.dims]
-    array = _directed(array.drop_vars(dropped).assign_coords(at), dims)
+    array = _directed(array, dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
     # 5. Convert to SI, and check.
-    array = without_missing(array, options)
+    if options.missing is not None:
+        array = array.copy(data=without_missing(array.values, options))
     values = in_si(array, quantity, QUANTITIES[quantity].units, unit)
     raw = array.values if isinstance(array.data, np.ndarray) else values
-    lines = data.attrs.get("lines", ())
     check_positive(values, quantity, lines, raw)
     if options.missing is None:
         _doubt_sentinels(raw, quantity, lines)
@@ -256,7 +289,15 @@ def labelled(
             where = _place(int(np.argmin(np.isfinite(place))), lines, place.size)
             raise InputError(f"{dim} must be finite, and {where} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
-    return array.copy(data=values)
+    array = array.copy(data=values)
+    if read is not None:
+        stated = unit or read.unit
+        array.attrs |= read._replace(source=_source(source), unit=stated).attributes
+    return array
+
+
+def _source(source: Any) -> str:
+    return Path(source).name if isinstance(source, str | Path) else type(source).__name__
 
 
 def _of_array(values: Any, source: Any) -> Any:
@@ -277,168 +318,174 @@ def _of_array(values: Any, source: Any) -> Any:
 # -- step 2: maps --------------------------------------------------------------------------------
 
 
-def _as_map(data: Any, dims: Any, value: Column) -> Any:
-    """Return a matrix from a text file as a map. Return other data unchanged.
+def _as_map(table: Table, dims: Any, value: Wanted) -> Any:
+    """Return a matrix from a text file as a map. Return other tables unchanged.
 
     Comments may state the width, the height and the unit of a map, as
     Gwyddion writes them.
     """
     import xarray as xr
 
-    if not isinstance(data, xr.Dataset) or "row" not in data.dims:
-        return data
-    if data.attrs.get("headed") or len(data.data_vars) < 2:
-        return data
-    sizes = sizes_of(data.attrs["comments"])
+    if table.headed or len(table.columns) < 2:
+        return table
+    sizes = sizes_of(table.comments)
     if not {"width", "height"} <= sizes.keys():
-        if value is None and dims is not None and len(dims) == 2 and len(data.data_vars) != 3:
+        if value is None and dims is not None and len(dims) == 2 and len(table.columns) != 3:
             raise InputError(
-                f"holds {len(data.data_vars)} columns without names. Pass a map as columns x, y and"
+                f"holds {len(table.columns)} columns without names. Pass a map as columns x, y and"
                 " value, or as an array: np.loadtxt(path).T if each line has a single y"
             )
-        return data
+        return table
     # Each line of the file has a single y.
-    array = xr.DataArray(np.stack([column.values for column in data.values()]), dims=("x", "y"))
+    array = xr.DataArray(np.stack([column.values for column in table.columns]), dims=("x", "y"))
     for dim, name in (("x", "width"), ("y", "height")):
         length, unit = sizes[name]
-        x = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
-        array = array.assign_coords({dim: (dim, x, {"units": unit or "m"})})
+        at = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
+        array = array.assign_coords({dim: (dim, at, {"units": unit or "m"})})
     array.attrs["units"] = sizes.get("value units", (1.0, ""))[1]
     return array
 
 
-def _is_map(data: Any) -> bool:
-    """Return whether values lie on a plane: over x and y, or in a table where x repeats."""
-    if "row" not in data.dims:
-        return {"x", "y"} <= {*data.dims}
-    columns = {_plain(name): data.variables[name].values for name in data.data_vars}
-    if [*columns] == ["0", "1", "2"]:  # without headings both must repeat
-        return all(np.unique(columns[name]).size <= columns[name].size // 2 for name in "01")
-    both = len(columns) > 2 and {"x", "y"} <= {*columns}
-    return both and np.unique(columns["x"]).size < columns["x"].size
+def _is_map(columns: Sequence[Column]) -> bool:
+    """Return whether the values of a table lie over x and y: places repeat."""
+    named = {_plain(column.name): column.values for column in columns}
+    if [*named] == ["0", "1", "2"]:  # without headings both must repeat
+        return all(np.unique(named[name]).size <= named[name].size // 2 for name in "01")
+    both = len(named) > 2 and {"x", "y"} <= {*named}
+    return both and np.unique(named["x"]).size < named["x"].size
 
 
-# -- step 3: the variable and its coordinates ----------------------------------------------------
+# -- step 3: the column and its coordinates ------------------------------------------------------
+
+
+def _of_table(
+    table: Table, quantity: str, dims: Any, x: Wanted, value: Wanted
+) -> tuple[Any, Reading]:
+    """Return the values of a table over its coordinates, and what was read."""
+    import xarray as xr
+
+    if table.begins:
+        raise InputError(several_tables(table))
+    dims = dims or (("x", "y") if _is_map(table.columns) else ("x",))
+    chosen, places = _chosen(table.columns, quantity, dims, x, value, table=True)
+    if texts := [column.text for column in (chosen, *places.values()) if column.text]:
+        raise InputError(texts)
+    array = xr.DataArray(
+        chosen.values,
+        {dim: ("row", column.values, _units(column)) for dim, column in places.items()},
+        ("row",), str(chosen.name), _units(chosen),
+    )  # fmt: skip
+    return array, reading_of(table, chosen, QUANTITIES[quantity].units, places)
+
+
+def _of_variables(
+    data: Any, quantity: str, dims: Any, x: Wanted, value: Wanted
+) -> tuple[Any, Reading | None]:
+    """Return a variable of labelled data over its coordinates, and what was read."""
+    if not hasattr(data, "data_vars"):
+        if value not in (None, data.name):
+            raise InputError(
+                f"value: {value!r} is not the name of the only variable, {data.name!r}"
+            )
+        data, value = data.to_dataset(name=quantity), quantity
+    dims = dims or (("x", "y") if {"x", "y"} <= {*data.dims} else ("x",))
+    variables = [*data.data_vars, *(name for name in data.coords if data[name].ndim == 1)]
+    columns = [
+        Column(str(name), unit_of(data[name]), data[name], -1 - number, str(name))
+        for number, name in enumerate(variables)
+    ]
+    chosen, places = _chosen(columns, quantity, dims, x, value, table=False)
+    array = data[variables[-1 - chosen.number]]
+    at = {dim: data[variables[-1 - column.number]].variable for dim, column in places.items()}
+    at = {dim: along for dim, along in at.items() if {*along.dims} <= {*array.dims}}
+    dropped = [name for name in array.coords if name not in array.dims]
+    table = Table(tuple(columns), "", np.zeros(0))
+    read = reading_of(table, chosen, QUANTITIES[quantity].units, places)
+    return array.drop_vars(dropped).assign_coords(at), read if len(columns) > 1 else None
+
+
+def _units(column: Column) -> dict[str, str]:
+    return {"units": column.unit} if column.unit else {}
+
+
+def several_tables(table: Table) -> str:
+    """Return the message about remarks that separate several tables in a file."""
+    lines = ", ".join(map(str, table.begins[:5])) + ", ..." * (len(table.begins) > 5)
+    return (
+        f"holds {len(table.begins)} tables with remarks between them, which begin at lines {lines}."
+        " Pass skip= with the number of lines above the last one, or save the wanted table in a"
+        " file of its own"
+    )
 
 
 def _chosen(
-    data: Any, quantity: str, dims: tuple[str, ...], x: Column, value: Column
-) -> tuple[Any, dict[str, Any]]:
-    """Return the name of the variable, and by direction the names of its coordinates."""
-    names, table, si = list(data.data_vars), "row" in data.dims, QUANTITIES[quantity].units
-    if table and data.attrs.get("headed"):  # a column without a name is an index
-        names = [name for name in names if data.variables[name].attrs["heading"]]
+    columns: Sequence[Column], quantity: str, dims: tuple[str, ...], x: Wanted, value: Wanted,
+    *, table: bool,
+) -> tuple[Column, dict[str, Column]]:  # fmt: skip
+    """Return the column of a quantity, and by direction the columns of its coordinates."""
+    si = QUANTITIES[quantity].units
     words = (quantity, *NAMES.get(quantity, ()))
-    chosen = None if value is None else _stated(data, names, "value", value)
+    chosen = None if value is None else stated_column(columns, "value", value)
+    stated = None if x is None else stated_column(columns, "x", x)
+    if table and any(column.heading for column in columns):  # without a name, it is an index
+        columns = [column for column in columns if column.heading]
+    plain = [_plain(column.name) for column in columns]
+    bare = plain == [str(number) for number in range(len(columns))]
     along = [
-        name for name, variable in data.variables.items()
-        if variable.ndim == 1 and name != chosen and (name in names or name in data.coords)
-    ]  # fmt: skip
-    places: dict[str, Any] = {}
+        column for column in columns if column is not chosen and np.ndim(column.values) == 1
+    ]
+    places: dict[str, Column] = {}
     if len(dims) == 2:
-        places = {_plain(name): name for name in along if _plain(name) in dims}
-        if [*map(str, names)] == ["0", "1", "2"] and table:
-            places, chosen = {"x": names[0], "y": names[1]}, chosen or names[2]
-    else:
-        name = _choose(data, [name for name in along if name in data.dims], PLACES)
-        name = name or _choose(data, along, PLACES, "m" if table and si != "m" else "")
-        if name is None and table and len(names) == 2 and _plain(names[0]) not in words:
-            name = names[0] if names[0] != chosen else None
-        if name is not None:
-            places["x"] = name
-    if x is not None:
-        places["x"] = _stated(data, along, "x", x)
-    left = [name for name in names if name not in places.values()]
-    left = [name for name in left if table or data.variables[name].ndim >= len(dims)]
+        places = {name: c for name, c in zip(plain, columns, strict=True) if name in dims}
+        if bare and table and len(columns) == 3:
+            places, chosen = {"x": columns[0], "y": columns[1]}, chosen or columns[2]
+        if table and len(places) < 2:
+            listed = ", ".join(repr(column.label) for column in columns[:LISTED_COLUMNS])
+            raise InputError(f"has no columns x and y: got {listed}{OF_A_PLANE}")
+    elif stated is not None:
+        places = {"x": stated}
+    elif bare and table and len(columns) == 2:
+        if chosen is not columns[0]:
+            places = {"x": columns[0]}
+    elif place := _place_of(along, words, si if table else "", table):
+        places = {"x": place}
     if chosen is None:
-        chosen = _choose(data, left, words, si)
-    if chosen is None and len(left) == 1 and UNNAMED.match(_plain(left[0])):
-        chosen = left[0]
-    rivals = [name for name in left if name != chosen and _plain(name) in PLACES]
-    many = value is None and len(names) > 2
-    unplaced = len(places) < len(dims) and (len(dims) == 2 or many)
-    if chosen is None or (table and (unplaced or (rivals and x is None and len(dims) == 1))):
-        raise InputError(_unclear(data, names, quantity, dims))
+        left = [column for column in columns if column not in places.values()]
+        if not table:
+            left = [
+                c for c in left if c.values.ndim >= len(dims) and c.name not in c.values.dims
+            ]
+        others = {name for key, names in NAMES.items() if key != quantity for name in names}
+        left = [c for c in left if _plain(c.name) not in others - {*words}]
+        chosen = read_column(left, quantity, "value", None, [si], _says(words, quantity, left))
+    if table and len(dims) == 1 and not places and len(columns) > 2 and value is None:
+        raise InputError(unclear(columns, "position x", "x"))
     return chosen, places
 
 
-def _choose(data: Any, names: list[Any], words: Sequence[str], si: str = "") -> Any:
-    """Return the first variable found among some names, or else the only variable in a unit."""
-    for word in words:
-        if fitting := [name for name in names if _plain(_name(data, name)) == word]:
-            return _only(data, fitting)
-    fitting = [name for name in names if is_in(unit_of(data.variables[name]), si)]
-    return fitting[0] if len(fitting) == 1 else None
+def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any:
+    """Return whether a heading says that its column is a quantity: by its name, else its role."""
+    named = any(_plain(column.name) in words for column in columns)
+    if named or quantity not in ("strength", "friction_coefficient"):
+        return lambda column: _plain(column.name) in words
+    return lambda column: role_of(column) == "friction"
 
 
-def _stated(data: Any, names: list[Any], argument: str, wanted: str | int) -> Any:
-    """Return the variable that the caller named by its name, heading or number."""
-    if isinstance(wanted, int) and "row" in data.dims:
-        for name, column in data.items():
-            if column.attrs.get("column") == str(wanted):
-                return name
-    fitting = [
-        name for name in names
-        if wanted in (name, _name(data, name), data[name].attrs.get("heading"))
-    ]  # fmt: skip
-    if not fitting:
-        raise InputError(unknown_name(argument, str(wanted), map(str, names)))
-    return _only(data, fitting)
-
-
-def column_of(
-    table: Any, kinds: Sequence[str], units: Iterable[str] = (), wanted: Column = None
-) -> Any:
-    """Return the wanted column in a table of tests, or the column whose name begins with a word.
-
-    If no name begins with such a word, return the column in a unit of
-    `units`, provided that only one column has such a unit.
-    """
-    names = list(table.data_vars)
-    if wanted is not None:
-        return table[_stated(table, names, "column", wanted)]
-    first = {name: re.split(r"[\s_:.]", name.strip("_:. ").lower())[0] for name in names}
-    called = [name for name in names if first[name] in kinds]
+def _place_of(
+    columns: Sequence[Column], words: Sequence[str], si: str, table: bool
+) -> Column | None:
+    """Return the column of positions: by its heading, or as the only one in a unit of length."""
+    numeric = [c for c in columns if not c.text and _plain(c.name) not in words]
+    called = [c for c in numeric if _plain(c.name) in PLACES]
+    if not called and table:
+        called = [c for c in numeric if role_of(c) == "travel" and c.unit not in words]
+        called = [c for c in called if not c.unit or is_in(c.unit, "m")]
+    if not called and si != "m" and table:
+        called = [c for c in numeric if is_in(c.unit, "m")]
+        called = called if len(called) == 1 else []
     if len(called) > 1:
-        raise InputError(
-            f"{' and '.join(map(repr, called))} may both be the {kinds[0]}. Rename either"
-        )
-    fitting = [name for name in names if any(is_in(unit_of(table[name]), si) for si in units)]
-    called = called or (fitting if len(fitting) == 1 else [])
-    return table[called[0]] if called else None
-
-
-def _name(data: Any, name: Any) -> Any:
-    """Return the name in the heading of a column, which several columns may share."""
-    return data.variables[name].attrs.get("name", name)
-
-
-def _only(data: Any, names: list[Any]) -> Any:
-    """Return the only name. Refuse several columns with the same heading."""
-    if len(names) > 1:
-        numbers = " and ".join(str(data[name].attrs.get("column", name)) for name in names)
-        raise InputError(
-            f"columns {numbers} are all called {_name(data, names[0])!r}. Choose a column by its"
-            " number, value= or x="
-        )
-    return names[0]
-
-
-def _unclear(data: Any, names: list[Any], quantity: str, dims: tuple[str, ...]) -> str:
-    """Return a message that lists all columns, because the choice is ambiguous."""
-    units = {name: unit_of(data.variables[name]) for name in names if not str(name).isdecimal()}
-    shown = [f"{name!r} in {unit}" if unit else repr(name) for name, unit in units.items()]
-    listed = ", ".join(shown[:LISTED_COLUMNS]) or f"{len(names)} columns without names"
-    listed += f" and {len(shown) - LISTED_COLUMNS} more" * (len(shown) > LISTED_COLUMNS)
-    if len(dims) == 2 and not {*dims} <= {_plain(name) for name in data.variables}:
-        return f"has no columns x and y: got {listed}{OF_A_PLANE}"
-    return (
-        f"holds no variable that is clearly the {quantity} ({QUANTITIES[quantity].units}): got"
-        f" {listed}. Call it {quantity!r}, state its unit, or give x=..., value=... and unit=...;"
-        " heights and friction coefficients need quantity='height' or 'friction_coefficient'"
-        + OF_A_PLANE
-        * (len(data.data_vars) != 2)
-    )
+        raise InputError(unclear(columns, "position x", "x", called))
+    return called[0] if called else None
 
 
 def _plain(name: Any) -> str:

@@ -22,6 +22,7 @@ import csv
 import io
 import re
 import zipfile
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -34,29 +35,39 @@ from stiction.base.errors import InputError
 from stiction.base.files import check_unpacked, content_of, refuse_damage
 from stiction.base.netcdf import read_netcdf
 from stiction.base.units import parse
-from stiction.problem.profiles.tables import (
+from stiction.problem.reading.columns import Table
+from stiction.problem.reading.tables import (
+    GROUPS,
     NUMBER,
     Grid,
+    Numbers,
     Options,
     Row,
-    Table,
-    dataset_of,
     numbers_of,
     split_at_blanks,
+    table_of,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TEXT, EXCEL = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz"), ".xlsx"
+TEXT, EXCEL = (".csv", ".txt", ".dat", ".tsv", ".asc", ".xyz", ".lvm"), ".xlsx"
 LARGE = 2**19
 """Size of a text, bytes, above which pandas reads all lines but the first."""
 HEAD = 2**16
 """Bytes at the start of a large text that show its dialect."""
 MAX_UNEVEN_CELLS = 2**19
 """Cells of a text that pandas cannot read. Each cell takes hundreds of bytes and microseconds."""
-END = 20
-"""Lines at the end of a text that show the separator."""
+SEPARATORS = (";", "\t", " ", ",", "")
+"""Separators of columns. A single column has none."""
+END, MAX_LINES_COMPARED, HEADING = 100, 500, 2
+"""Lines at the start of a text, and in the rest of it, that show the separator, and the number of
+lines for which a heading counts."""
+_CELL = re.compile(
+    rf"$|{NUMBER.pattern}|{GROUPS.pattern}(?:[.,]\d*)?$|[\W_]+$|[^\W\d][^;,\t]*$"
+    r"|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[ T]\s*\d[\d:.,]*)?$|\d{1,2}:\d{2}[\d:.,]*$"
+)
+"""Cells of rows with data: nothing, numbers, marks, words, dates and times."""
 MAX_COLUMNS = 2_000
 """Columns of a table. A file with more columns holds its values in a single line."""
 MAX_LETTERS = 1_000
@@ -81,7 +92,7 @@ HEIGHT = "height"
 """Name of the array of a surface, which holds no strengths."""
 
 
-def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
+def load(path: Path, options: Options) -> Table | xr.Dataset | xr.DataArray | Array:
     """Read a file as variables, as a surface over 'x' and 'y', or as an .npy array."""
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
@@ -96,32 +107,25 @@ def load(path: Path, options: Options) -> xr.Dataset | xr.DataArray | Array:
     return readers[ending](content_of(path))
 
 
-def read_table(path: Path, options: Options = Options()) -> xr.Dataset:  # noqa: B008  # a tuple
+def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008  # a tuple
     """Read a table of numbers from a text file or a sheet of a workbook.
 
     Semicolons, tabs, commas or blanks separate columns. Lines that
     begin with ``#`` are comments. The last line above the numbers holds
     the names of the columns, or their units below a line of names. If
     there is no such line, the last comment may hold the names.
-
-    Columns become variables along 'row', with NaN in empty cells. A
-    column without a name has its number, from 0, as its name. The
-    attributes are `lines` (the line number of each row), `blocks` (the
-    record number of each row), `comments`, and `headed` (whether
-    columns have names). If a column contains no number, its attribute
-    `text` describes the content.
     """
     content = content_of(path)
     if path.suffix.lower() == EXCEL:
         grid = _sheet(content, options)
-        return dataset_of(grid, numbers_of(grid, options), options)
-    return dataset_of(*_table_of_text(content, options), options)
+        return table_of(grid, numbers_of(grid, options), path.name)
+    return table_of(*_table_of_text(content, options), path.name)
 
 
 # -- cells of a text -----------------------------------------------------------------------------
 
 
-def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Table]:
+def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Numbers]:
     """Return the cells and the numbers in a text."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         content = _text(content).encode()
@@ -165,13 +169,13 @@ def _lines(text: str, options: Options) -> Grid:
             lines.append((number, line))
     if lines and lines[0][1].strip().startswith("sep="):  # Excel writes and reads such a line
         lines = lines[1:]
-    separator = _separator([line for _, line in lines])
+    separator = _separator([line for _, line in lines], options.words)
     for number, line in lines:
         if len(line) > MAX_LETTERS:
             _check_line(number, line, separator)
-    if separator == " ":
-        rows = [Row(number, split_at_blanks(line, options.words)) for number, line in lines]
-        return Grid(rows, comments, separator)
+    if separator in (" ", ""):
+        rows = [Row(number, _split(line, separator, options.words)) for number, line in lines]
+        return Grid(rows, comments, separator or " ")
     split = csv.reader([line for _, line in lines], delimiter=separator)
     try:
         pairs = [*zip(lines, split, strict=True)]
@@ -181,17 +185,38 @@ def _lines(text: str, options: Options) -> Grid:
     return Grid(rows, comments, separator)
 
 
-def _separator(lines: Sequence[str]) -> str:
-    """Return the separator that most of the last lines with numbers contain."""
-    ends = [line for line in lines[-2 * END :] if re.search(r"\d", line)][-END:]
-    for mark in (";", "\t"):
-        if ends and 2 * sum(mark in line for line in ends) >= len(ends):
-            return mark
-    last = ends[-1] if ends else ""
-    # Blanks separate numbers with decimal commas, '0,1 1000,5', but
-    # commas '0.1, 1000.5'.
-    between = re.search(r"\d\s+[+-]?\d", last) and not re.search(r",\s", last)
-    return " " if "," not in last or between else ","
+def _separator(lines: Sequence[str], words: set[str]) -> str:
+    """Return the separator that splits most lines into equally many numbers, times and words.
+
+    If several do, the heading decides, and then the order of
+    `SEPARATORS`. Blanks separate numbers with decimal commas, '0,1
+    1000,5', but commas '0.1, 1000.5'.
+    """
+    step = max(1, len(lines) // MAX_LINES_COMPARED)
+    shown = [line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step])]
+    ratings = []
+    for order, separator in enumerate(SEPARATORS):
+        rows = [_split(line, separator, words) for line in shown]
+        counts = [
+            len(cells) if any(map(NUMBER.match, cells)) and all(map(_CELL.match, cells)) else 0
+            for cells in rows
+        ]
+        common = Counter(filter(None, counts)).most_common(1)
+        if common and (common[0][0] > 1) == bool(separator):
+            ((width, count),) = common
+            first = counts.index(width)
+            headed = first > 0 and len(rows[first - 1]) >= width
+            ratings.append((count + HEADING * headed, -order, separator))
+    return max(ratings)[-1] if ratings else " "
+
+
+def _split(line: str, separator: str, words: set[str]) -> list[str]:
+    if separator == " ":
+        return split_at_blanks(line, words)
+    cells = [cell.strip(' \t"') for cell in (line.split(separator) if separator else [line])]
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    return cells
 
 
 def _check_line(number: int, line: str, separator: str) -> None:
@@ -208,7 +233,7 @@ def _check_line(number: int, line: str, separator: str) -> None:
         )
 
 
-def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
+def _large(content: bytes, options: Options) -> tuple[Grid, Numbers] | None:
     """Return a large table if all its lines are alike, and None for any other text."""
     import pandas as pd
 
@@ -218,6 +243,8 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
     with suppress(InputError, UnicodeDecodeError, ValueError):
         grid = _lines(_text(content[:end]), options)
         table = numbers_of(grid, options)
+        if table.left_out or table.begins:
+            return None
         body, width = content[end:].rstrip(), len(table.columns)
         lines, cells = body.count(b"\n") + 1, len(grid.rows[-1].cells)
         blank = grid.separator == " "
@@ -242,6 +269,7 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Table] | None:
             return grid, table._replace(
                 columns=np.hstack([table.columns, columns]),
                 lines=np.r_[table.lines, table.lines[-1] + 1 + np.arange(lines)],
+                words={},
             )
     return None
 

@@ -1,0 +1,501 @@
+"""Numbers and headings in the cells of tables that instruments and colleagues write.
+
+The format of a table is unknown: the rows that hold data, the decimal
+mark and the place of the units. A wrong guess could change a value by a
+factor of a thousand, so a table that can be read in two ways is
+refused. The cells come from `files.py`. The steps are:
+
+1. Columns with numbers. Most rows with numbers have them in the same
+   columns.
+2. Rows. A row holds data if its cells in these columns are numbers or
+   empty. Rows above the first such row are headings, units or remarks.
+   Below, repeated headings, remarks and statistics (mean, SD, n) are
+   left out, and the table says so. A row with another text is refused.
+3. Decimal mark, which is the same in the whole file. If points or
+   commas may also mark thousands, the file is refused unless the caller
+   states `decimal`.
+4. Cells become numbers. Empty cells and words for a missing value
+   become NaN.
+5. Headings are split into names and units.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import describe
+from stiction.base.units import parse
+from stiction.problem.reading.columns import Column, Table, role_of
+
+_EMPTY = {
+    "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
+    "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
+}  # fmt: skip
+"""Words for a missing value, in lower case. A row of stars is another."""
+_STATISTICS = (
+    "mean average avg median minimum maximum min max std stdev std.dev sd stddev standard deviation"
+    " cv cov c.v variance count sum total range mittelwert mittel standardabweichung streuung"
+    " variationskoeffizient anzahl summe spannweite moyenne écart-type ecart-type média media"
+    " promedio desviación desviacion mw sx"
+)
+STATISTICS = {*_STATISTICS.split()}
+SHORT_STATISTICS = {"x", "x\N{COMBINING MACRON}", "s", "n", "r", "v", "\N{MICRO SIGN}"}
+"""First words in rows of statistics. Short ones count if another row of statistics follows."""
+# Patterns never return to letters that they have passed: time grows
+# linearly with the file.
+WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
+NUMBER = re.compile(
+    r"[+-]?(?:(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+    r"|\d{1,3}(?:(?:,\d{3})+(?:\.\d*)?|(?:\.\d{3})+(?:,\d*)?))$"
+)
+_BETWEEN = r"['\N{RIGHT SINGLE QUOTATION MARK} \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}]"
+GROUPS = re.compile(rf"([+-]?\d{{1,3}})((?:{_BETWEEN}\d{{3}})+)(?!\d)")
+_THOUSANDS = {
+    mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?!\d)")
+    for mark in ".,"
+}
+"""Numbers whose mark may separate thousands, such as 1.020 and 1.020.000, not 0.020 or 1.02."""
+_OTHER = {".": ",", ",": "."}
+
+
+class Options(NamedTuple):
+    """What the caller states about a file."""
+
+    skip: int = 0
+    sheet: int | str = 0
+    missing: Any = None  # a number, a word, or a sequence of them
+    decimal: str | None = None
+
+    @property
+    def stated(self) -> tuple[float | str, ...]:
+        """Numbers and words that the caller uses for a missing value."""
+        several = self.missing if isinstance(self.missing, tuple | list) else (self.missing,)
+        return tuple(value for value in several if value is not None)
+
+    @property
+    def words(self) -> set[str]:
+        """All words for a missing value, in lower case."""
+        given = {word.strip().casefold() for word in self.stated if isinstance(word, str)}
+        return _EMPTY | given
+
+
+class Row(NamedTuple):
+    """A line of a table: its number (from 1) and its cells."""
+
+    number: int
+    cells: list[str]
+
+    @property
+    def text(self) -> str:
+        """The line in a message."""
+        return f"line {self.number} {', '.join(filter(None, self.cells))[:60]!r}"
+
+
+class Grid(NamedTuple):
+    """The cells of a file, with the comments above them."""
+
+    rows: list[Row]
+    comments: list[str]
+    separator: str  # empty if the file is a workbook
+
+
+class Numbers(NamedTuple):
+    """The numbers of a table in columns, and its headings."""
+
+    columns: Array  # (columns, rows)
+    header: list[Row]
+    lines: Array  # the number of the line of each row
+    texts: dict[int, str]  # by column without any number: its content, in words
+    words: dict[int, list[str]]  # the cells of these columns
+    mark: str | None  # the decimal mark, if one was seen
+    left_out: tuple[str, ...]
+    begins: tuple[int, ...]
+
+
+def table_of(grid: Grid, numbers: Numbers, source: str) -> Table:
+    """Return the columns of a table with names and units (step 5)."""
+    headed = any({*row.cells} - {"", "-"} for row in numbers.header)
+    headings = _headings(numbers.header, len(numbers.columns))
+    for number, (_, _, heading) in enumerate(headings[1:], 1):  # the first may be an index
+        if headed and not heading and not np.isnan(numbers.columns[number]).all():
+            raise InputError(
+                f"column {number} has numbers, such as in line {numbers.lines[0]}, but no heading."
+                " If commas mark thousands, separate columns with ';'"
+            )
+    columns = tuple(
+        Column(
+            name,
+            unit,
+            values,
+            number,
+            heading,
+            numbers.texts.get(number, ""),
+            numbers.words.get(number, ()),
+        )
+        for number, (values, (name, unit, heading)) in enumerate(
+            zip(numbers.columns, headings, strict=True)
+        )
+    )
+    return Table(
+        columns, source, numbers.lines, grid.comments, headed, numbers.left_out, numbers.begins
+    )
+
+
+def table_of_frame(frame: Any) -> Table:
+    """Convert a DataFrame with headings to the form of a table from a file."""
+    import pandas as pd
+
+    headings = [str(name) for name in frame.columns]
+    if frame.index.dtype.kind == "f":  # positions
+        frame, headings = frame.reset_index(), [str(frame.index.name or "x"), *headings]
+    columns = []
+    for number, heading in enumerate(headings):
+        column, text = frame.iloc[:, number], ""
+        values = pd.to_numeric(column, errors="coerce") if column.dtype == object else column
+        if values.dtype.kind not in "fiu" or (values.isna() & column.notna()).any():
+            text = f"column {heading!r} does not hold numbers"
+            values = np.full(len(frame), np.nan)
+        name, unit = name_and_unit(heading)
+        values, cells = (
+            np.asarray(values, dtype=np.float64),
+            [*map(str, column)] if text else (),
+        )
+        columns.append(Column(name, unit, values, number, heading, text, cells))
+    return Table(tuple(columns), "DataFrame", np.arange(len(frame)))
+
+
+def split_at_blanks(line: str, words: set[str]) -> list[str]:
+    """Split a line at blanks, but not between a name and its unit in brackets."""
+    cells = line.split()
+    if all(NUMBER.match(cell) or cell.casefold() in words for cell in cells):
+        return cells
+    return [cell.strip() for cell in WORDS.findall(line)]
+
+
+# -- steps 1 to 4: numbers -----------------------------------------------------------------------
+
+
+def numbers_of(grid: Grid, options: Options) -> Numbers:
+    """Return the numbers of a table (steps 1 to 4)."""
+    words, separator = options.words, grid.separator
+    rows = [row for row in grid.rows if any(row.cells)]
+    # 1.
+    numeric = _numeric_columns(rows, words)
+    # 2.
+    header, rows, left_out, begins = _rows_of_data(rows, numeric, words, separator)
+    width = max(len(row.cells) for row in rows)
+    while not any(len(row.cells) >= width and row.cells[width - 1] for row in rows):
+        width -= 1  # a column that is empty in all rows comes from a separator at the end
+    rows = _without_cut_end(rows, width, left_out)
+    # Without a line of headings, the last comment may name as many
+    # columns as there are.
+    if not header and grid.comments and not _SIZE.match(grid.comments[-1]):
+        comment = grid.comments[-1]
+        at_blanks = split_at_blanks(comment, words)
+        if len(at_blanks) == 2 * width and all(map(parse, at_blanks[1::2])):  # x mm  tau kPa
+            at_blanks = [f"{a} ({b})" for a, b in zip(*[iter(at_blanks)] * 2, strict=True)]
+        cells = comment.split(separator) if separator.strip() else at_blanks
+        cells = [comment] if width == 1 else [cell.strip() for cell in cells]
+        header = [Row(0, cells)] if len(cells) == width else []
+    header = [_of_width(row, width, separator) for row in header]
+    columns = [list(cells) for cells in zip(*(row.cells[:width] for row in rows), strict=True)]
+    if separator == "," and not header and width == 2:
+        _check_pairs(columns, rows[0])
+    numeric = [column for column in numeric if column < width]
+    # 3.
+    mark = _decimal_mark(columns, numeric, rows, separator, options.decimal)
+    # 4.
+    numbers, texts = np.full((width, len(rows)), math.nan), {}
+    for column, cells in enumerate(columns):
+        values = _numbers(cells, words, mark)
+        if None not in values:
+            numbers[column] = values
+            continue
+        wrong = values.index(None)
+        texts[column] = _not_a_number(rows[wrong].number, cells[wrong])
+        if column in numeric:
+            raise InputError(texts[column])
+    lines = np.array([row.number for row in rows])
+    texted = {column: columns[column] for column in texts}
+    return Numbers(numbers, header, lines, texts, texted, mark, tuple(left_out), begins)
+
+
+def _not_a_number(line: int, cell: str) -> str:
+    advice = f"If it stands for no value, pass missing={cell!r}"
+    return f"line {line}: {describe(cell)} is not a number. {advice}"
+
+
+def _is_value(cell: str, words: set[str]) -> bool:
+    """Return whether a cell holds a number."""
+    value = _number(cell, words, None)
+    return bool(NUMBER.match(cell)) or (value is not None and value == value)
+
+
+def _is_word(cell: str, words: set[str]) -> bool:
+    """Return whether a cell holds neither a number nor a missing value."""
+    return not NUMBER.match(cell) and _number(cell, words, None) is None
+
+
+def _numeric_columns(rows: Sequence[Row], words: set[str]) -> list[int]:
+    """Return the columns in which most rows with numbers have them (step 1)."""
+    places = [
+        tuple(i for i, cell in enumerate(row.cells) if _is_value(cell, words)) for row in rows
+    ]
+    counts = Counter(filter(None, places))
+    if not counts:
+        raise InputError("holds no numbers")
+    usual = {*max(counts, key=lambda place: (counts[place], len(place)))}
+    values: Counter[int] = Counter()
+    texts: Counter[int] = Counter()
+    for row, place in zip(rows, places, strict=True):
+        if usual & {*place}:
+            values.update(place)
+            texts.update(i for i, cell in enumerate(row.cells) if _is_word(cell, words))
+    return sorted(i for i in values if values[i] > texts[i] and (i in usual or values[i] > 1))
+
+
+def _rows_of_data(
+    rows: Sequence[Row], numeric: Sequence[int], words: set[str], separator: str
+) -> tuple[list[Row], list[Row], list[str], tuple[int, ...]]:
+    """Return the headings, the rows with data, the rows left out, and where tables begin."""
+
+    def wrong(row: Row) -> list[str]:
+        """Return the words in the columns with numbers."""
+        cells = [row.cells[i] for i in numeric if i < len(row.cells)]
+        return [cell for cell in cells if _is_word(cell, words)]
+
+    def has_number(row: Row) -> bool:
+        return any(_is_value(row.cells[i], words) for i in numeric if i < len(row.cells))
+
+    start = next(i for i, row in enumerate(rows) if has_number(row) and not wrong(row))
+    header = list(rows[:start])
+    if header and not _are_units(header[-1].cells):
+        row = header[-1]
+        if has_number(row):  # a row of values, one of which is wrong
+            raise InputError(_not_a_number(row.number, wrong(row)[0]))
+    data: list[Row] = []
+    left_out: list[str] = []
+    known = [row.cells for row in header]
+    begins, interrupted = [rows[start].number], False
+    labels = [next(filter(None, row.cells)).casefold().rstrip(" .:=()") for row in rows]
+    for place in range(start, len(rows)):
+        row, later = rows[place], labels[place + 1 : place + 2]
+        short = labels[place] in SHORT_STATISTICS and bool(
+            SHORT_STATISTICS.union(STATISTICS) & {*later, *labels[place - 1 : place]}
+        )
+        statistic = (
+            short or labels[place].split(" ")[0].split("(")[0].rstrip(" .:") in STATISTICS
+        )
+        if data and statistic and _is_word(next(filter(None, row.cells)), words):
+            left_out.append(f"{row.text} (statistics)")
+            interrupted = True
+        elif not wrong(row):
+            if interrupted and has_number(row):
+                begins.append(row.number)
+            interrupted = False
+            data.append(row)
+        elif row.cells in known:
+            continue  # a heading is repeated above each record
+        elif not has_number(row) and (
+            len([*filter(None, row.cells)]) < max(2, len(numeric)) or separator == " "
+        ):
+            left_out.append(f"{row.text} (no numbers)")
+            interrupted = True
+        else:
+            raise InputError(_not_a_number(row.number, wrong(row)[0]))
+    return header, data, left_out, tuple(begins) if len(begins) > 1 else ()
+
+
+def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[Row]:
+    """Leave out a last row that is cut. Refuse any other row with too few cells (step 2)."""
+    if len(rows[-1].cells) < width and len(rows) > 1:
+        left_out.append(f"{rows[-1].text} (cut: {len(rows[-1].cells)} of {width} cells)")
+        rows = rows[:-1]
+    for row in rows:
+        if len(row.cells) < width:
+            most = next(row.number for row in rows if len(row.cells) >= width)
+            raise InputError(
+                f"line {row.number} has {len(row.cells)} columns, line {most} has {width}. Remove"
+                " the line, or give it the same number of cells"
+            )
+    return rows
+
+
+def _of_width(row: Row, width: int, separator: str) -> Row:
+    """Return a heading with a cell for each column, without headings beyond the last number."""
+    cells = list(row.cells)
+    while len(cells) > width and (not cells[-1] or separator != " "):
+        cells.pop()
+    return Row(row.number, cells + [""] * (width - len(cells)) if any(cells) else cells)
+
+
+def _check_pairs(columns: Sequence[Sequence[str]], first: Row) -> None:
+    """Refuse pairs of whole numbers between commas, which may be decimal commas."""
+    digits = re.compile(r"[+-]?\d+")
+    if all(digits.fullmatch(cell) for cells in columns for cell in cells):
+        raise InputError(
+            f"line {first.number}: {','.join(first.cells)!r} may be a number or two. Separate"
+            " columns with ';', or write decimal points"
+        )
+
+
+def _decimal_mark(
+    columns: Sequence[Sequence[str]],
+    numeric: Sequence[int],
+    rows: Sequence[Row],
+    separator: str,
+    stated: str | None,
+) -> str | None:
+    """Return the decimal mark of a file, or None if its numbers have no mark (step 3).
+
+    The number 1.020 means 1.02 in some countries
+    and 1020 in others. Such a file is refused
+    unless the caller or a different cell decides.
+    """
+    # A cell such as 0.5 or 1.02 shows that its mark stands before decimals.
+    example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
+    decimal: set[str] = set()  # marks that stand where a mark of thousands cannot stand
+    cells = [(row.number, row.cells[column]) for row in rows for column in numeric]
+    for mark in ".,":
+        for number, cell in cells:
+            if mark in cell and NUMBER.match(cell):
+                example.setdefault(mark, f"line {number} has {cell!r}")
+                if not _THOUSANDS[mark].match(cell):
+                    decimal.add(mark)
+                    example[mark] = f"line {number} has {cell!r}"
+                    break
+    if stated is not None:
+        if (thousands := _OTHER[stated]) in decimal:
+            text = f"{thousands!r} does not mark thousands. Pass decimal={thousands!r}"
+            raise InputError(f"{example[thousands]}, in which {text}")
+        return stated
+    if len(example) == 2:
+        raise InputError(
+            f"{example[',']}, and {example['.']}: two decimal marks. Pass decimal=',' if points"
+            " mark thousands, and decimal='.' if commas do"
+        )
+    # Programs write the same number of decimals in a column: 980 above
+    # 1.020 means 1020.
+    whole = any(
+        any(map(str.isdigit, columns[i])) and any("." in cell for cell in columns[i])
+        for i in numeric
+    )
+    for mark in {*example} - decimal:
+        if mark == "," or separator in (";", "\t") or whole:
+            raise InputError(
+                f"{example[mark]}, which may have three decimals or be a thousand times as large."
+                f" Pass decimal={mark!r} or decimal={_OTHER[mark]!r}"
+            )
+    return next(iter(example), None)
+
+
+def _numbers(cells: Sequence[str], words: set[str], mark: str | None) -> list[float | None]:
+    """Return the numbers in a column (step 3)."""
+    if mark != "," and not any("_" in cell for cell in cells):
+        with suppress(ValueError):
+            return list(map(float, cells))
+    return [_number(cell, words, mark) for cell in cells]
+
+
+def _number(cell: str, words: set[str], mark: str | None) -> float | None:
+    """Return the number in a cell, NaN for a missing value, None for any other text."""
+    if cell.casefold() in words or not cell.strip("*"):
+        return math.nan
+    cell = GROUPS.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), cell)
+    cell = cell.replace("\N{MINUS SIGN}", "-")
+    if mark is not None:
+        thousands = _OTHER[mark]
+        if thousands in cell and _THOUSANDS[thousands].match(cell):
+            cell = cell.replace(thousands, "")
+        if mark == "," and "." not in cell:
+            cell = cell.replace(",", ".")
+    try:
+        return None if "_" in cell else float(cell)  # Python accepts 1_000
+    except ValueError:
+        return None
+
+
+# -- step 5: headings ----------------------------------------------------------------------------
+
+
+def _headings(header: list[Row], width: int) -> list[tuple[str, str, str]]:
+    """Return the name, the unit and the heading of each column (step 5)."""
+    header = [row for row in header if not {*row.cells} <= {"", "-"}]
+    if not header:
+        return [(str(number), "", "") for number in range(width)]
+    number, names = header[-1]
+    if len(names) != width:
+        raise InputError(
+            f"line {number} names {len(names)} columns, the numbers below it have {width}. Begin"
+            " comment lines with '#', or pass skip= with the number of lines above the headings"
+        )
+    # A row below the names may hold the units. LabVIEW writes them
+    # above.
+    units = [""] * width
+    above = {row.cells[0]: row.cells[1:] for row in header[:-1] if row.cells}
+    if len(header) > 1 and len(header[-2].cells) == width and _are_units(names):
+        units = [cell.strip("()[]{} ") for cell in names]
+        names = header[-2].cells
+    elif "Y_Unit_Label" in above and width > 1:
+        time = "s" if "Time" in above.get("X_Dimension", ["Time"]) else ""
+        units = [time, *above["Y_Unit_Label"], *units][:width]
+    headings = []
+    for column, (heading, below) in enumerate(zip(names, units, strict=True)):
+        name, unit = name_and_unit(heading)
+        if unit and below not in ("", unit):
+            raise InputError(f"{heading!r} has {below!r} below it, which is another unit")
+        name = name if heading else str(column)  # such as the index that pandas writes
+        headings.append((name, unit or below, heading))
+    return headings
+
+
+def _are_units(cells: Iterable[str]) -> bool:
+    """Return whether a row states units: most of its cells are units, and the others are short."""
+    bare = [cell.strip("()[]{} ") for cell in cells if cell.strip("()[]{} ")]
+    known = [cell for cell in bare if parse(cell)]
+    clear = any(cell not in ("1", "-", "%") for cell in known)
+    return clear and 2 * len(known) > len(bare) and all(len(cell) < 9 for cell in bare)
+
+
+def name_and_unit(text: str) -> tuple[str, str]:
+    """Split a heading, such as 'strength (MPa)', 'tau/MPa', 'x_mm', 'x in mm' or 'tau MPa'."""
+    text = text.strip()
+    if text[-1:] in tuple(")]}") and (start := max(map(text.rfind, "([{"))) >= 0:
+        return text[:start].strip(" _"), text[start + 1 : -1].strip()
+    if " / " in text:
+        name, unit = text.split(" / ", 1)
+        return name.strip(), unit.strip()
+    *before, last = re.split(r"[\s,_:]+(?:in\s+)?", text)
+    name = text[: text.rindex(last)].rstrip(" ,_:") if before else ""
+    # A short unit may be a part of the name, such as N for normal.
+    role = role_of(Column(name.removesuffix(" in"), "", None, 0))
+    clear = name.endswith(" in") or (len(name) > 2 and role in _SHORT.get(last, ()))
+    if parse(last) is not None and (clear or (len(last) > 1 and last not in _SHORT)):
+        return name.removesuffix(" in"), last
+    before_slash, slash, unit = text.partition("/")
+    if slash and before_slash and parse(unit) is not None:
+        return before_slash, unit
+    return text, ""
+
+
+_SHORT = {
+    "N": ("force", "friction"), "m": ("travel", "length"), "s": ("time",), "h": ("time",),
+    "min": ("time",), "mil": ("travel", "length"), "g": (), "J": (), "1": (), "-": (), "%": (),
+}  # fmt: skip
+"""Units that may be a part of a name, and the roles of names behind which they are units."""
+_SIZE = re.compile(r"(width|height|value units)\s*[:=]\s*(?:([\d.,eE+-]+)\s*)?(\S*)$", re.I)
+
+
+def sizes_of(comments: Iterable[str]) -> dict[str, tuple[float, str]]:
+    """Return from comments the 'width', 'height' and 'value units' of a map, with their units."""
+    matches = filter(None, map(_SIZE.match, comments))
+    return {m[1].lower(): (float(m[2] or 1.0), m[3]) for m in matches}
