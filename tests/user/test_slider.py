@@ -97,6 +97,10 @@ REFUSED = {
         "load.initial_stress",
         sampled(problem={"load": st.Load(initial_stress=1e5, pressing_force=4e3)}),
     ),
+    "an extent": (
+        "interface.extent",
+        sampled(problem={"interface": st.Interface(0.14, 64, extent=(0.02, 0.1))}),
+    ),
     "no pressure": ("load ... normal force", sampled(problem={"load": st.Load()})),
     "a profile of the pressure": (
         "load.normal_pressure ... pressing_force",

@@ -156,6 +156,8 @@ class Problem:
         problems = slider.misfits(interface.measure, interface.spacing, self.solid, self.mode)
         if np.any(self.friction.residual_strength):
             problems.append(f"friction.residual_strength: {COEFFICIENTS}, or residual_ratio")
+        if interface.is_held:
+            problems.append("interface.extent: all of a slider can slip. Leave it out")
         if np.any(load.initial_stress):
             problems.append(f"load.initial_stress: {NO_INITIAL_STRESS}")
         if np.ndim(0.0 if load.normal_pressure is None else load.normal_pressure):

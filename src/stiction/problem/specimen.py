@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -119,12 +120,8 @@ SLIDER_DRIVES = Kinds(
 )
 
 
-def _drive(value: Any) -> Any:
-    return value if isinstance(value, Platen | Pusher) else NotImplemented
-
-
-def _slider_drive(value: Any) -> Any:
-    return value if isinstance(value, Pusher | TopShear) else NotImplemented
+def _only(*kinds: type) -> Callable[[Any], Any]:
+    return lambda value: value if isinstance(value, kinds) else NotImplemented
 
 
 def _beyond_side(drive: Any, height: float) -> list[str]:
@@ -175,7 +172,7 @@ class Blocks:
 
     height: Positive
     thickness: Positive | None = None
-    drive: Annotated[Platen | Pusher, OneOf(DRIVES, _drive)] = Platen()
+    drive: Annotated[Platen | Pusher, OneOf(DRIVES, _only(Platen, Pusher))] = Platen()
     pressing: Literal["frictionless", "glued"] = "frictionless"
     quality_factor: Quality = 25.0
     type: Literal["blocks"] = "blocks"
@@ -284,7 +281,7 @@ class Slider:
     height: Positive
     thickness: Positive | None = None
     base: Base
-    drive: Annotated[Pusher | TopShear, OneOf(SLIDER_DRIVES, _slider_drive)]
+    drive: Annotated[Pusher | TopShear, OneOf(SLIDER_DRIVES, _only(Pusher, TopShear))]
     pressing: Literal["soft", "plate"] = "soft"
     tilt: Annotated[Real, Field(ge=-1.0, le=1.0)] = 0.0
     type: Literal["slider"] = "slider"
@@ -411,10 +408,4 @@ class Slider:
 SPECIMENS = Kinds(
     "specimens", {"blocks": "problem.specimen:Blocks", "slider": "problem.specimen:Slider"}
 )
-
-
-def _specimen(value: Any) -> Any:
-    return value if isinstance(value, Blocks | Slider) else NotImplemented
-
-
-Specimen = Annotated[Blocks | Slider, OneOf(SPECIMENS, _specimen, default="blocks")]
+Specimen = Annotated[Blocks | Slider, OneOf(SPECIMENS, _only(Blocks, Slider), default="blocks")]
