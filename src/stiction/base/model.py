@@ -107,7 +107,9 @@ def real_array(value: Any) -> Array:
         raise TypeError("got rows of unequal length") from None
     if given.dtype.kind not in "fiu":
         kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
-        raise TypeError(f"got {kind}")
+        text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
+        read = ". st.read_profile(path) reads a file" if Path(text).suffix else ""
+        raise TypeError(f"got {kind}{read}")
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
 
 
