@@ -158,15 +158,16 @@ def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
     point = Experiment(LINE, beta_strength(4e-3), st.Equilibrium())
     whole = batches.solve_span(point, batches.Span(0, 5, 5))
     failures = tuple(batches.Failure(0, sample, 0, "lost") for sample in (7, 8))
-    for rows, lost in ((whole.rows, []), (np.delete(whole.rows, 2), [7])):
+    fewer = {name: np.delete(values, 2, axis=0) for name, values in whole.columns.items()}
+    for columns, lost in ((whole.columns, []), (fewer, [7])):
         gathered = Gathered([point], 3, 5)
-        gathered.add(whole._replace(rows=rows, failures=failures))
+        gathered.add(whole._replace(columns=columns, failures=failures))
         assert [one.sample for one in gathered.failed] == lost
         found = gathered.dataset({})
         counts = found.arrested_events
         assert counts.dtype.kind == ("f" if lost else "i")
         assert found.sample[counts.isnull().values].values.tolist() == lost
-        np.testing.assert_array_equal(counts[:2], whole.rows["arrested_events"][:2])
+        np.testing.assert_array_equal(counts[:2], whole.columns["arrested_events"][:2])
 
 
 def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):

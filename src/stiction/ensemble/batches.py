@@ -86,26 +86,23 @@ class Failure(NamedTuple):
 class Table(NamedTuple):
     """Samples at any points of a sweep, and the failures among them.
 
-    A row holds `POINT`, `NUMBER` and the variables of the method for a
-    solved sample.
+    The columns are `POINT`, `NUMBER` and the variables of the method,
+    with an entry for each solved sample.
     """
 
-    rows: NDArray[Any]
+    columns: dict[str, NDArray[Any]]
     failures: tuple[Failure, ...]
     seconds: float  # of one core
     versions: str  # of the packages that computed the samples
     warned: tuple[Warned, ...] = ()  # not stored
 
 
-def _rows(point: int, first: int, values: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return as rows the values of consecutive samples at a point."""
+def _columns(
+    point: int, first: int, values: Mapping[str, NDArray[Any]]
+) -> dict[str, NDArray[Any]]:
+    """Return the values of consecutive samples at a point with the numbers of both."""
     count = len(next(iter(values.values()), ()))
-    columns = {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
-    types = [(name, array.dtype, array.shape[1:]) for name, array in columns.items()]
-    rows = np.empty(count, dtype=types)
-    for name, array in columns.items():
-        rows[name] = array
-    return rows
+    return {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
 
 
 def usable_cores() -> int:
@@ -126,8 +123,8 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 
 def on_executor(
     function: Callable[[Any], Table], jobs: Sequence[Any], executor: Executor, meter: Meter
-) -> list[NDArray[Any]]:
-    """Return the rows of the tables of all jobs from an executor. Each warning is issued once."""
+) -> list[dict[str, NDArray[Any]]]:
+    """Return the columns of all tables from an executor. Each warning is issued once."""
     futures = [executor.submit(function, job) for job in jobs]
     with merge_warnings() as caught:
         try:
@@ -139,7 +136,7 @@ def on_executor(
             for future in futures:
                 future.cancel()
         caught += [warning.unnumbered() for table in tables for warning in table.warned]
-    return [table.rows for table in tables]
+    return [table.columns for table in tables]
 
 
 @cache
@@ -151,7 +148,7 @@ def versions() -> str:
 def solve_span(experiment: Experiment, span: Span) -> Table:
     """Solve a span of samples. A sample that fails does not stop the others."""
     begin = time.perf_counter()
-    parts: list[NDArray[Any]] = []
+    parts: list[dict[str, NDArray[Any]]] = []
     failures: list[Failure] = []
     warned: list[Warned] = []
     waiting = deque(experiment.batches(span.first, span.samples))
@@ -160,7 +157,7 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
         try:
             # The number of BLAS threads changes the last bits.
             with one_blas_thread(), collect_warnings() as caught:
-                parts.append(_rows(span.point, first, experiment.results(first, count)))
+                parts.append(_columns(span.point, first, experiment.results(first, count)))
         except Exception as error:
             # One bad sample makes its batch fail. Solve each sample of
             # the batch alone.
@@ -172,9 +169,10 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
             failures.append(Failure(span.point, first, experiment.seed, text, known))
             continue
         warned += (warning.after(first) for warning in caught)
-    rows = np.concatenate(parts or [_rows(span.point, 0, {})])
+    parts = parts or [_columns(span.point, 0, {})]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     seconds = time.perf_counter() - begin
-    return Table(rows, tuple(failures), seconds, versions(), tuple(merged(warned)))
+    return Table(columns, tuple(failures), seconds, versions(), tuple(merged(warned)))
 
 
 def piece_size(

@@ -89,16 +89,16 @@ class Gathered:
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
         # Numbers of failures may be anything in a stranger's file, so
         # they are objects.
-        for points, samples in ((table.rows[POINT], table.rows[NUMBER]), failed.T):
+        for points, samples in ((table.columns[POINT], table.columns[NUMBER]), failed.T):
             if not within(points, len(self.points)) or np.any(samples < self.first):
                 return "a point or a sample is not in the study"
         variables, interface = variables_in(self.points), self.points[0].problem.interface
         sizes = dict(zip(interface.dims, interface.shape, strict=True))
         sizes[DIRECTION] = len(interface.dims)
-        for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
+        for name in table.columns.keys() - {POINT, NUMBER}:
             if name not in variables:
                 return f"{describe(name)} is not a variable of the study"
-            dims, shape = variables[name].dims[1:], table.rows.dtype[name].shape
+            dims, shape = variables[name].dims[1:], table.columns[name].shape[1:]
             known = [sizes.get(dim, size) for dim, size in zip(dims, shape, strict=False)]
             if len(shape) != len(dims) or [*shape] != known:
                 return f"{name} has shape {shape} for each sample"
@@ -110,13 +110,13 @@ class Gathered:
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
                 self._failures[failure.point, failure.sample - self.first] = failure
-        point, sample = table.rows[POINT], table.rows[NUMBER] - self.first
+        point, sample = table.columns[POINT], table.columns[NUMBER] - self.first
         inside = sample < self.done.shape[1]
         where = point[inside], sample[inside]
         self.done[where] = True
-        for name in {*(table.rows.dtype.names or ())} - {POINT, NUMBER}:
+        for name in table.columns.keys() - {POINT, NUMBER}:
             if self._only is None or name in self._only:
-                values = table.rows[name][inside]
+                values = table.columns[name][inside]
                 # The type and the shape of a variable are known from
                 # its first table.
                 if name not in self._arrays:

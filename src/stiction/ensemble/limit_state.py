@@ -121,7 +121,7 @@ class LimitState:
         if self.executor is not None:
             here = replace(self, workers=1, meter=SILENT, executor=None)
             solved = on_executor(partial(solve_part, here), parts, self.executor, self.meter)
-            stress = np.concatenate(solved)
+            stress = np.concatenate([columns["stress"] for columns in solved])
         elif len(parts) == 1:
             stress = self._stress(rows)
         else:
@@ -259,7 +259,8 @@ def solve_part(state: LimitState, draws: Array) -> Table:
     begin = time.perf_counter()
     with one_blas_thread(), collect_warnings() as warned:
         stress = state._stress(draws)
-    return Table(stress, (), time.perf_counter() - begin, versions(), tuple(merged(warned)))
+    columns = {"stress": stress}
+    return Table(columns, (), time.perf_counter() - begin, versions(), tuple(merged(warned)))
 
 
 @checked

@@ -33,6 +33,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.base.errors import InputError, StoreError, warn_user
 from stiction.base.files import (
@@ -182,7 +183,7 @@ class Store:
         self._taken.append(table)
         # Few large chunks are read faster, but a kill may lose the last
         # seconds of work.
-        size = sum(table.rows.nbytes for table in self._taken)
+        size = sum(v.nbytes for table in self._taken for v in table.columns.values())
         if time.monotonic() - self._saved >= SAVE_SECONDS or size >= SAVE_BYTES:
             self.save()
 
@@ -191,14 +192,15 @@ class Store:
         _check_folder(self.path / CHUNKS)
         # An array of rows has one type, and a
         # chunk one version of the packages.
-        groups: dict[Any, list[Table]] = {}
+        groups: dict[Any, list[tuple[NDArray[Any], Table]]] = {}
         for table in self._taken:
-            groups.setdefault((table.rows.dtype, table.versions), []).append(table)
+            rows = _rows(table.columns)
+            groups.setdefault((rows.dtype, table.versions), []).append((rows, table))
         for (_, made_by), group in groups.items():
-            seconds = round(sum(table.seconds for table in group), 3)
-            failures = [failure for table in group for failure in table.failures]
+            seconds = round(sum(table.seconds for _, table in group), 3)
+            failures = [failure for _, table in group for failure in table.failures]
             about = json.dumps([self._mark, made_by, seconds, failures]).encode()
-            rows, file = np.concatenate([table.rows for table in group]), io.BytesIO()
+            rows, file = np.concatenate([rows for rows, _ in group]), io.BytesIO()
             np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
             data = file.getvalue()
             write_whole(self.path / CHUNKS / f"{digest(data)}.npz", data)
@@ -214,6 +216,15 @@ def _check_folder(folder: Path) -> None:
     """Refuse a link in place of the folder of chunks, because files would go to its target."""
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
         raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
+
+
+def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    """Return columns as rows, which are stored."""
+    types = [(name, values.dtype, values.shape[1:]) for name, values in columns.items()]
+    rows = np.empty(len(columns[POINT]), dtype=types)
+    for name, values in columns.items():
+        rows[name] = values
+    return rows
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:
@@ -236,7 +247,8 @@ def _table_in(data: bytes) -> tuple[str, Table]:
     )  # fmt: skip
     if not valid:
         raise ValueError("other values than in a chunk")
-    return mark, Table(rows, failures, seconds, made_by)
+    columns = {name: rows[name] for name in fields}
+    return mark, Table(columns, failures, seconds, made_by)
 
 
 def _read(file: Path, max_bytes: int) -> bytes:
