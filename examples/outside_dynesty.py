@@ -52,7 +52,7 @@ posterior = st.infer(
 )
 for i, name in enumerate(names):
     low, high = np.quantile(draws[:, i], [0.05, 0.95])
-    own = posterior.interval(name)
+    own = posterior.interval[name]
     print(f"{name}: dynesty {low:.4g} to {high:.4g}, infer {own[0]:.4g} to {own[1]:.4g}")
 evidence = float(sampler.results.logz[-1])
 print(f"log-evidence: dynesty {evidence:.2f}, infer {posterior.log_evidence:.2f}")

@@ -37,7 +37,9 @@ def main(seeds=20):
         for seed in range(seeds):
             random = source if count is None else source.interfaces(count, seed=seed)
             answer = st.design_stress(LINE, random, method=AtOnePlace(), seed=seed, **options)
-            inside += answer.interval[0] <= exact <= answer.interval[1]
+            inside += (
+                answer.interval["probability"][0] <= exact <= answer.interval["probability"][1]
+            )
             found.append(answer.stress / exact)
         scatter = 100.0 * np.std(found)
         print(f"| {count or 'source'} | {inside} of {seeds} | {scatter:.2f} |", flush=True)

@@ -36,7 +36,12 @@ def repetition(problem, field, stress, reference, method, algorithm, target):
     ]
     ratio = np.array([one.probability for one in found]) / reference
     error = math.sqrt(np.mean([one.cv**2 for one in found]))
-    held = np.mean([one.interval[0] <= reference <= one.interval[1] for one in found])
+    held = np.mean(
+        [
+            one.interval["probability"][0] <= reference <= one.interval["probability"][1]
+            for one in found
+        ]
+    )
     print(
         f"  {method.type:16s} {algorithm:11s} mean {ratio.mean():.3f}"
         f" +- {ratio.std(ddof=1) / math.sqrt(REPEATS):.3f}, cv observed"

@@ -75,7 +75,7 @@ def test_design_stress_has_the_probability_asked_for():
     back = by(SYSTEM, answer.stress, "importance", 0.07, method=EXACT)
     error = math.hypot(answer.cv, back.cv)
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
-    low, high = answer.interval
+    low, high = answer.interval["probability"]
     assert 0.66e6 < low < answer.stress < high
 
 

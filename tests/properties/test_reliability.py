@@ -75,8 +75,8 @@ def test_curve_and_design_stress_agree_and_are_monotone():
     last = float(chance[-1])
     design = st.design_stress(PROBLEM, STRENGTH, probability=last, seed=1, **options)
     # Independent seeds; the intervals are 95 % each, so they overlap unless both are far out.
-    assert design.interval[0] < float(curve["stress_high"][-1])
-    assert design.interval[1] > float(curve["stress_low"][-1])
+    assert design.interval["stress"][0] < float(curve["stress_high"][-1])
+    assert design.interval["stress"][1] > float(curve["stress_low"][-1])
     # Where plain sampling reaches, both agree: four joint standard errors.
     onsets = ensemble(PROBLEM, STRENGTH, 4000).critical_stress.values
     counts = np.sum(onsets < stress[:, None], axis=1)

@@ -124,8 +124,8 @@ def two_parameters_from_six_peaks():
     tree = found.to_arviz()
     return {
         "str": str(found),
-        "mean": [found.mean(name) for name in found.names],
-        "interval": [found.interval(name, 0.8) for name in found.names],
+        "mean": [found.mean[name] for name in found.names],
+        "interval": [found.interval[name] for name in found.names],
         "information": found.information,
         "draws": found.draws,
         "members": members[:2],

@@ -74,7 +74,7 @@ def test_a_design_has_the_scatter_of_the_pressing_force():
         st.design_stress(PRESSED, given, probability=1e-2, **GIVEN) for given in (random, both)
     ]
     assert "specimens of each sample" in designs[0].reason
-    lows, highs = zip(*(design.interval for design in designs), strict=True)
+    lows, highs = zip(*(design.interval["stress"] for design in designs), strict=True)
     assert max(lows) < min(highs) < 1.03 * max(lows)  # the intervals overlap
     found = st.failure_probability(PRESSED, random, friction_coefficient=0.14, **GIVEN)
     alone = st.RandomInterface(strength=FIELD, between={"strength": FACTOR})
@@ -183,7 +183,7 @@ def test_a_page_of_a_design(tmp_path):
     source = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
     evidence = [st.Lognormal(mean=1.0, cv=0.1)]
     path = design.write_page(
-        tmp_path / "design.html", problem=PROBLEM, evidence=evidence, sources=source,
+        tmp_path / "design.html", evidence=evidence, sources=source,
         title="Lap joint 7",
     )  # fmt: skip
     text = path.read_text(encoding="utf-8")
@@ -196,12 +196,12 @@ def test_a_page_of_a_design(tmp_path):
     assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
     refuses(
         "sources: ... load.weight ... is not an input",
-        lambda: design.write_page(path, problem=PROBLEM, sources={"load.weight": "scales"}),
+        lambda: design.write_page(path, sources={"load.weight": "scales"}),
     )
     demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
     refuses(
         "design: must come from st.design_stress",
-        lambda: demand.write_page(path, problem=PROBLEM),
+        lambda: demand.write_page(path),
     )
     # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
     means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))

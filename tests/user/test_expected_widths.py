@@ -22,7 +22,7 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
     assert found.design.values.tolist() == ["now", "many"]
     for name in ("strength.mean", "between.strength"):
         now, many = found.width.sel(parameter=name).values
-        assert now == pytest.approx(np.ptp(posterior.interval(name)), rel=0.1)
+        assert now == pytest.approx(np.ptp(posterior.interval[name]), rel=0.1)
         # Eight times as many tests: a third of the width, less where eight leave heavy tails.
         assert 0.15 * now < many < 0.5 * now
     assert found.design_low[1] < found.design_stress[1] < found.design_high[1]

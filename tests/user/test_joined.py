@@ -81,7 +81,7 @@ def test_five_strengths_give_what_proportion_gives(monkeypatch):
     long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
     assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
     for name in ("strength.mean", "between.strength"):
-        assert long.mean(name) == pytest.approx(short.mean(name), rel=5e-3)
+        assert long.mean[name] == pytest.approx(short.mean[name], rel=5e-3)
     np.testing.assert_allclose(np.mean(long.predicted), np.mean(short.predicted), rtol=5e-3)
 
 
@@ -108,8 +108,8 @@ def test_profiles_and_peaks_are_joined():
     peaks = onsets.critical_stress.values * (PEAKS / 1.05e6)
     both = st.infer(PROBLEM, fit, peaks, **LOCAL)
     alone = st.infer(PROBLEM, ROUGH, peaks, **LOCAL)
-    assert np.ptp(both.interval("strength.mean")) < np.ptp(alone.interval("strength.mean"))
-    assert np.ptp(both.interval("strength.mean")) < np.ptp(fit.interval["mean"])
+    assert np.ptp(both.interval["strength.mean"]) < np.ptp(alone.interval["strength.mean"])
+    assert np.ptp(both.interval["strength.mean"]) < np.ptp(fit.interval["mean"])
     assert min(both.agreement.p_values.values()) > 0.05
     assert not both.notes
     assert sum(both.families.values()) == pytest.approx(1.0)
@@ -128,7 +128,7 @@ def test_profiles_and_peaks_are_joined():
         sensitivities=False, progress=False,
     )  # fmt: skip
     assert design.doubts == apart.notes
-    assert f"! {apart.notes[0]}" in str(design)
+    assert apart.notes[0] in str(design)
     specimens = len(RECORDS) + len(peaks)
     share = 1.0 - 0.05 ** (1.0 / specimens)
     assert design.specimens == specimens
@@ -138,8 +138,8 @@ def test_profiles_and_peaks_are_joined():
     # The prior of the scatter decides where it is narrow, and that of the mean.
     prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
     told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)
-    assert 0.2 < told.mean("between.strength") < 0.21
-    assert told.mean("strength.mean") == pytest.approx(1.2e6, rel=3e-3)
+    assert 0.2 < told.mean["between.strength"] < 0.21
+    assert told.mean["strength.mean"] == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
     refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL))
 

@@ -41,8 +41,8 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
     alone = st.infer(PROBLEM, FIELD, PEAKS, **given)
     for one, other in zip(guided.likelihood.densities, alone.likelihood.densities, strict=True):
         assert one.onsets.shape == other.onsets.shape
-    assert guided.mean("correlation_length") == pytest.approx(
-        alone.mean("correlation_length"), rel=1e-6
+    assert guided.mean["correlation_length"] == pytest.approx(
+        alone.mean["correlation_length"], rel=1e-6
     )
 
 

@@ -431,7 +431,7 @@ def reliability(
         if page is not None:
             path = page.with_stem(page.stem + (f"_{point.number}" if point.values else ""))
             title = loaded.title or "Design of a joint"
-            answer.write_page(path, problem=experiment.problem, evidence=evidence, title=title)
+            answer.write_page(path, evidence=evidence, title=title)
             echo(f"page: {path}")
 
 

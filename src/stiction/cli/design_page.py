@@ -25,12 +25,13 @@ from stiction.reliability.answer import Answer, unseen_batch
 
 MAX_SHOWN_VALUES = 8
 """Values of an input that are listed."""
+LIGHT = ("positive entries",)
+"""Words of doubts that are a matter of the grid, and come last."""
 
 
 def write_page(
     design: Answer,
     place: Path,
-    problem: Problem,
     evidence: Sequence[Any],
     sources: Mapping[str, str],
     title: str,
@@ -53,14 +54,34 @@ def write_page(
             plot.sensitivities(design, ax=figure.subplots())
             page.figure(figure, "What moves the design. The band is its interval.")
         page.table("What moves the design", *_moves(design))
+    problem, random = design.experiment.problem, design.experiment.random
     page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources))
-    doubts = [*design.warnings, *design.doubts, *unseen_batch(design.specimens)]
+    source = random.source
+    basis = [source or design.experiment.given, getattr(source, "agreement", None)]
+    basis += [getattr(source, "peaks", None), *evidence]
+    texts = {f"{type(item).__name__}: {item!r}": item for item in basis if item is not None}
+    for text, item in texts.items():
+        page.listing(f"Evidence: {type(item).__name__}", text.partition(": ")[2])
+    doubts = [*design.doubts, *unseen_batch(design.specimens), *design.warnings]
     for item in evidence:
-        page.listing(f"Evidence: {type(item).__name__}", str(item))
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
+    # A matter of the grid weighs least.
+    doubts.sort(key=lambda text: any(word in text for word in LIGHT))
     page.table("Doubts", ["doubt"], [[text] for text in dict.fromkeys(doubts or ["none"])])
+    page.text(_repeat(design))
     write_whole(place, page.html().encode())
     return place
+
+
+def _repeat(design: Answer) -> str:
+    """Return a sentence with all that a checker needs beside the data to repeat the design."""
+    method, seed = design.experiment.method, design.experiment.seed
+    source: Any = design.experiment.random.source
+    of_tests = f", seed of infer {source.seed}" if hasattr(source, "seed") else ""
+    return (
+        f"To repeat: stiction {versions()}, method {method!r}, seed {seed}{of_tests}. The force is"
+        " that of one friction surface of the interface above."
+    )
 
 
 def _demand(design: Answer) -> tuple[str, Callable[[float], str]]:
@@ -74,10 +95,10 @@ def _numbers(design: Answer) -> list[list[str]]:
     """Return the rows for the table of results. Unknown optional quantities are left out."""
 
     name, shown = _demand(design)
-    low, high = map(shown, design.interval)
+    low, high = map(shown, design.interval["stress"])
     rows = {
         f"design {name}": shown(design.stress),
-        "95 % interval of the computation": f"{low} to {high}",
+        "90 % interval of the computation": f"{low} to {high}",
         "target probability of failure": f"{design.probability:g}",
         "reliability index β": f"{design.reliability_index:.3g}",
         f"characteristic value (5 %, confidence {100.0 * design.confidence:g} %)": shown(
@@ -103,10 +124,8 @@ def _moves(design: Answer) -> tuple[list[str], list[list[str]]]:
     columns = [map(str, effects[key].values) for key in ("source", "low", "high")]
     columns += [map(shown, at_low), map(shown, at_high)]
     rows = [list(row) for row in zip(*columns, strict=True)]
-    for key, value in effects.attrs.items():
-        if key.startswith("stress by"):
-            family = key.replace("stress by", "family of the factor:")
-            rows.append([family, "", "", shown(value), ""])
+    for family, stress in design.by_family.items():
+        rows.append([f"family of the factor: {family}", "", "", shown(stress), ""])
     return ["source", "from", "to", f"{name} at the first", f"{name} at the second"], rows
 
 

@@ -117,15 +117,6 @@ class Agreement(Result):
         rows = [Row(f"p-value, {name}", p) for name, p in self.p_values.items()]
         return Summary(f"{title_of(self.peaks)} against the prediction", rows)
 
-    def __str__(self) -> str:
-        squares_p, deviation_p, *_ = self.p_values.values()
-        text = (
-            f"{title_of(self.peaks)} against the prediction: p = {squares_p:.3g}"
-            f" (Cramer-von Mises), {deviation_p:.3g} (largest deviation)"
-        )
-        shown = [f"{self.p_values[name]:.3g} ({PRECURSORS[name]})" for name in self.precursors]
-        return text + f"; precursors: p = {', '.join(shown)}" * bool(shown)
-
 
 @checked
 def agreement(

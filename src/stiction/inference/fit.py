@@ -32,6 +32,7 @@ Steps:
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from functools import cached_property
 from itertools import chain, cycle
 from typing import Annotated, Any, Literal
@@ -55,14 +56,18 @@ from stiction.inference.bootstrap import (
     likely,
 )
 from stiction.inference.estimate import BestFit, FitSetting, Goodness, ranking, windowed
+from stiction.inference.likelihood import Simulation
 from stiction.inference.marginal_fit import Family, family_of
 from stiction.inference.records import records_of, refuse_uncorrelated
 from stiction.inference.specimens import (
+    FEW_FIELDS,
     MEAN_KEY,
     SCATTER_KEY,
     FactorGrid,
     FactorPrior,
+    Prediction,
     Profiles,
+    WithFactors,
     families_of,
     grid_of_profiles,
     of_mean,
@@ -70,6 +75,8 @@ from stiction.inference.specimens import (
 from stiction.inference.whittle import SpectrumFamily, spectrum_family
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface
 from stiction.random.spectra import Share
 
@@ -113,7 +120,7 @@ Factors = Annotated[Any, BeforeValidator(_factors), DEFAULT_TOO, "str | list"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FieldFit(Result):
+class FieldFit(WithFactors, Result):
     """A random field that is fitted to measured profiles, with intervals and doubts.
 
     Attributes
@@ -177,6 +184,7 @@ class FieldFit(Result):
     _levels: Array
     _families: tuple[str, ...]  # of the factor between specimens; empty without a factor
     _prior: FactorPrior
+    _between: Mapping[str, Any] = dataclass_field(default_factory=dict)
 
     @property
     def specimens(self) -> int:
@@ -240,13 +248,28 @@ class FieldFit(Result):
         """
         chosen = self._chosen(count, seed)
         if not self._families:
-            return [RandomInterface(strength=field) for field in chosen]
+            return self._scattered([RandomInterface(strength=field) for field in chosen])
         # The mean and the factor follow from the posterior given the
         # chosen field.
         numbers = {field: number for number, field in enumerate(self._every)}
         rng = np.random.default_rng([seed, 6])
         drawn = self._posterior.draws(count, rng, [numbers[field] for field in chosen])
-        return list(map(self._posterior.interface, drawn))
+        return self._scattered(list(map(self._posterior.interface, drawn)))
+
+    def prediction(
+        self, problem: Problem, method: Any, changes: Mapping[str, float], workers: int | None
+    ) -> Prediction | None:
+        """Return the prediction for a problem with constants changed by full key.
+
+        `None` if records are of one specimen, for which there is no
+        posterior of mean and scatter.
+        """
+        if not self._families:
+            return None
+        given = {key.removeprefix("problem."): value for key, value in changes.items()}
+        grid, _ = grid_of_profiles(self.profiles(FEW_FIELDS, 0))
+        simulation = Simulation(method, None, 0, workers)
+        return Prediction.of(grid, with_values(problem, given, "problem"), simulation)
 
     def _chosen(self, count: int, seed: int) -> list[RandomField]:
         """Return likely fields from all families in proportion to their weights (step 6)."""

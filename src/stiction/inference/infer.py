@@ -239,7 +239,7 @@ def infer(
     >>> posterior = st.infer(
     ...     problem, strength, peaks, unit="MPa", prior=prior, method=st.LocalCriterion()
     ... )
-    >>> low, high = posterior.interval("marginal.low")
+    >>> low, high = posterior.interval["marginal.low"]
     >>> 0.5e6 < low < high < 0.75e6
     True
 
@@ -250,7 +250,7 @@ def infer(
     >>> both = st.infer(
     ...     problem, fit, peaks, unit="MPa", method=st.LocalCriterion(), samples=100
     ... )
-    >>> low, high = both.interval("strength.mean", confidence=0.99)
+    >>> low, high = both.interval["strength.mean"]
     >>> 0.9e6 < low < high < 1.1e6
     True
     """

@@ -17,20 +17,30 @@ from stiction.base.model import Count, Number, RealArray, check, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
+from stiction.inference.likelihood import Simulation
 from stiction.inference.peaks import Peaks, title_of
 from stiction.inference.prior import Prior
-from stiction.inference.specimens import FactorGrid
+from stiction.inference.specimens import (
+    MEAN_KEY,
+    PRIOR_SCALE,
+    SCATTER_KEY,
+    FactorGrid,
+    FactorPrior,
+    Prediction,
+    WithFactors,
+    grid_of_profiles,
+    tables_of,
+)
 from stiction.problem.problem import Problem
-from stiction.random.dotted_keys import full_key
+from stiction.random.dotted_keys import full_key, value_at, with_values
 from stiction.random.fields import RandomInterface
-from stiction.random.spectra import Share
 
 POSTERIOR_DRAWS, CHAINS = 4000, 4
 """Number of draws, and of the chains into which ArviZ expects them to be cut."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Posterior(Result):
+class Posterior(WithFactors, Result):
     """Posterior of the parameters, with their prior.
 
     Attributes
@@ -69,6 +79,7 @@ class Posterior(Result):
     u: Array = field(repr=False, compare=False)
     problem: Any = field(default=None, repr=False, compare=False)
     seed: int = 0
+    _between: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,29 +97,27 @@ class Posterior(Result):
         prior: Prior = self.likelihood.prior
         return prior
 
+    @property
+    def inferred(self) -> tuple[str, ...]:
+        """Keys of the parameters that measurements changed. The others were stated."""
+        return self.names
+
     @cached_property
     def before(self) -> dict[str, Array]:
         """Draws from the prior."""
         u = np.random.default_rng(self.seed).random(self.u.shape)
         return dict(zip(self.names, self.prior.theta(u).T, strict=True))
 
-    def mean(self, name: str) -> float:
-        """Return the posterior mean of a parameter."""
-        return float(self.draws[name].mean())
+    @cached_property
+    def mean(self) -> dict[str, float]:
+        """Posterior mean of each parameter."""
+        return {name: float(draws.mean()) for name, draws in self.draws.items()}
 
-    @checked
-    def interval(self, name: str, confidence: Share = 0.9) -> tuple[float, float]:
-        """Return the central credible interval of a parameter.
-
-        Parameters
-        ----------
-        name : str
-        confidence : float
-            Between 0 and 1.
-        """
-        tail = 0.5 - 0.5 * confidence
-        low, high = np.quantile(self.draws[name], [tail, 1.0 - tail])
-        return float(low), float(high)
+    @cached_property
+    def interval(self) -> dict[str, tuple[float, float]]:
+        """Central 90 % credible interval of each parameter."""
+        ends = {name: np.quantile(draws, [0.05, 0.95]) for name, draws in self.draws.items()}
+        return {name: (float(low), float(high)) for name, (low, high) in ends.items()}
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and the random interface at a draw."""
@@ -152,7 +161,7 @@ class Posterior(Result):
         # Each draw counts once, unless more interfaces than draws are wanted.
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
-        return [self.at(int(draw))[1] for draw in draws]
+        return self._scattered([self.at(int(draw))[1] for draw in draws])
 
     def prior_transform(self, u: Any) -> Array:
         """Return the parameters at points u in the unit cube, in which the prior is uniform.
@@ -248,7 +257,9 @@ class Posterior(Result):
             remark = f"{' to '.join(ends)} {shown_unit} before the tests".replace("  ", " ")
             if name in self.information:
                 remark += f", {self.information[name]:.2f} nats"
-            rows.append(Row(name, self.mean(name), self.interval(name), unit, remark))
+            elif name not in self.inferred:
+                remark = "stated, not measured"
+            rows.append(Row(name, self.mean[name], self.interval[name], unit, remark))
         title = f"{title_of(self.peaks)}; onset by {self.method}, posterior means"
         return Summary(title, rows, "90 % interval", self.notes)
 
@@ -281,6 +292,13 @@ class SpecimenPosterior(Posterior):
         return self.grid.profiles.levels.size + sum(map(len, self.peaks.values))
 
     @property
+    def inferred(self) -> tuple[str, ...]:
+        """Keys of the parameters that measurements changed. The others were stated."""
+        if self.grid.profiles.levels.size or len(self.grid.profiles.fields) > 1:
+            return self.names
+        return MEAN_KEY, SCATTER_KEY
+
+    @property
     def families(self) -> dict[str, float]:
         """Posterior probability of each family for the factor between specimens."""
         return self.grid.families
@@ -308,7 +326,68 @@ class SpecimenPosterior(Posterior):
             Not negative.
         """
         drawn = self.grid.draws(count, np.random.default_rng([seed, 4]))
-        return [self.grid.interface(row) for row in drawn]
+        return self._scattered([self.grid.interface(row) for row in drawn])
+
+    @property
+    def assumed(self) -> dict[str, float]:
+        """Parameters of a field within a specimen that was stated and not measured, by key."""
+        profiles = self.grid.profiles
+        if profiles.levels.size or len(profiles.fields) > 1:
+            return {}
+        field = profiles.fields[0].strength
+        values = {
+            "marginal.cv": getattr(field.marginal, "cv", None),
+            "correlation_length": getattr(field.spectrum, "correlation_length", None),
+        }
+        return {key: value for key, value in values.items() if value is not None}
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What was stated and not measured, in words."""
+        profiles, texts = self.grid.profiles, []
+        if not profiles.levels.size:
+            field = profiles.fields[0].strength
+            more = f" and {len(profiles.fields) - 1} more" * (len(profiles.fields) > 1)
+            texts.append(
+                f"the field within a specimen is stated, not measured: {field.marginal!r},"
+                f" {field.spectrum!r}{more}. Its mean has no effect"
+            )
+        usual = profiles.prior.scatter is FactorPrior().scatter
+        law = f"half-Cauchy with scale {PRIOR_SCALE:g}" if usual else "as stated"
+        return (*texts, f"prior of the scatter between specimens: {law}")
+
+    def prediction(
+        self, problem: Problem, method: Any, changes: Mapping[str, float], workers: int | None
+    ) -> Prediction:
+        """Return the prediction for a problem, with constants changed by full key.
+
+        The strength is inferred again with the changed constants. A
+        constant of the tests changes if it has the same value as in the
+        problem.
+        """
+        of_problem = {
+            key.removeprefix("problem."): value
+            for key, value in changes.items()
+            if key.startswith("problem.")
+        }
+        of_field = {full_key(k)[7:]: v for k, v in changes.items() if k[:8] != "problem."}
+        profiles = self.grid.profiles.few()
+        fields = tuple(with_values(one, of_field) for one in profiles.fields)
+        profiles = profiles._replace(fields=fields)
+        in_tests = {
+            key: value
+            for key, value in of_problem.items()
+            if value_at(self.problem, key) == value_at(problem, key)
+        }
+        tested = with_values(self.problem, in_tests, "problem")
+        simulation = Simulation(self.likelihood.method, None, self.seed, workers)
+        tests = tables_of(tested, profiles, simulation, self.peaks, self.likelihood.error)
+        _, grid = grid_of_profiles(profiles, tests)
+        joint = with_values(problem, of_problem, "problem")
+        same = joint == tested and method == simulation.method and self.peaks.lengths == (None,)
+        if same and self.peaks.unit != "1":
+            return Prediction(tests, grid)
+        return Prediction.of(grid, joint, simulation._replace(method=method))
 
     @property
     def prior(self) -> Any:
@@ -321,7 +400,11 @@ class SpecimenPosterior(Posterior):
     def _summary(self) -> Summary:
         summary = super()._summary()
         shares = ", ".join(f"{name} {share:.0%}" for name, share in self.families.items())
-        notes = [*summary.notes, f"families of the factor between specimens: {shares}"]
+        notes = [
+            *summary.notes,
+            *self.assumptions,
+            f"families of the factor between specimens: {shares}",
+        ]
         if self.agreement is not None:
             p = min(self.agreement.p_values.values())
             notes.append(f"agreement of peaks and profiles: p = {p:.2g}")

@@ -36,7 +36,7 @@ their levels.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
@@ -85,7 +85,7 @@ LOG_STRENGTH_MARGIN = 0.3
 """Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
 LOG_MEAN_MARGIN = 1.0
 """Distance by which the first range of log m exceeds the range of x."""
-LOWEST, PREDICTED = 3.0, 1_000
+LOWEST, PREDICTED = 6.0, 2_000
 """Distance of the lowest x below log m, and points of x, for a predictive distribution."""
 OUTER_MASS = 1e-6
 """Neglected mass on either side of log m."""
@@ -97,6 +97,8 @@ LOWEST_FACTOR, TABULATED = 6.0, 2_401
 """Range of log b on either side of zero, and number of values in the table of its distribution."""
 TABULATED_DEVIATIONS = 6.0
 """Standard deviations up to which the likelihood of a number is tabulated."""
+FEW_FIELDS = 10
+"""Fields within a specimen for what moves a design, of which only ratios are used."""
 LEAST_DEVIATION = 1e-3
 """Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
 
@@ -154,6 +156,10 @@ class Profiles(NamedTuple):
     within: Array  # variance of the logarithm of a level by the field, (fields, specimens)
     families: tuple[str, ...] = tuple(FACTOR_FAMILIES)
     prior: FactorPrior = FactorPrior()
+
+    def few(self) -> Self:
+        """Return the profiles with at most `FEW_FIELDS` fields."""
+        return self._replace(fields=self.fields[:FEW_FIELDS], within=self.within[:FEW_FIELDS])
 
     @classmethod
     def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
@@ -415,20 +421,28 @@ class Tables:
         ratio = [np.interp(at, known.at, row) for at, row in zip(x, ratios, strict=True)]
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
 
-    def quantile(self, grid: FactorGrid, probability: float) -> float:
+    def quantile(
+        self, grid: FactorGrid, probability: float, family: str | None = None
+    ) -> float:
         """Return the peak of a further specimen, of the first kind, at a probability.
 
         The predictive distribution is the mean over field, onset and
-        grid. No draws are needed.
+        grid, or over the part of the grid with one `family` of the
+        factor. No draws are needed.
         """
+        if family is not None:
+            place = self.profiles.families.index(family)
+            mass = np.zeros_like(grid.mass)
+            mass[:, place] = grid.mass[:, place] / grid.mass[:, place].sum()
+            grid = replace(grid, mass=mass)
         profiles, known = self.profiles, self.onsets[0]
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
         # Probability that x of a further specimen lies below each
         # point, for each field.
         below = np.zeros((len(profiles.fields), x.size))
-        for family, name in enumerate(profiles.families):
+        for number, name in enumerate(profiles.families):
             for cell, cv in enumerate(profiles.prior.cells()):
-                below += grid.mass[:, family, cell] @ masses(name, cv, grid.means, x)
+                below += grid.mass[:, number, cell] @ masses(name, cv, grid.means, x)
         below = np.cumsum(below, axis=1)
         # T(c) rises with c. Find the c at which
         # it is t, for each field and sample.
@@ -443,7 +457,75 @@ class Tables:
             return float(sum(shares)) / logs.shape[2] - probability
 
         low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
+        if excess(low) >= 0.0:  # a rarer peak than those of the table
+            return float(np.exp(low))
         return float(np.exp(brentq(excess, low, high, xtol=1e-6)))
+
+
+class Prediction(NamedTuple):
+    """Distribution of the onset of one further specimen, from a posterior on a grid."""
+
+    tables: Tables
+    grid: FactorGrid
+
+    @classmethod
+    def of(cls, grid: FactorGrid, problem: Problem, simulation: Simulation) -> Self:
+        """Return the prediction for a problem, for which the fields are simulated."""
+        nothing = Peaks((None,), (np.zeros(0),), "Pa")
+        return cls(tables_of(problem, grid.profiles, simulation, nothing, 0.0), grid)
+
+    def quantile(self, probability: float, family: str | None = None) -> float:
+        """Return the stress, Pa, at a probability, for all families of the factor or for one."""
+        return self.tables.quantile(self.grid, probability, family) / self.tables.onsets[0].area
+
+    @property
+    def families(self) -> list[str]:
+        """Families of the factor with posterior mass."""
+        return [name for name, mass in self.grid.families.items() if mass > OUTER_MASS]
+
+
+class WithFactors:
+    """Source whose interfaces also have factors of constants, such as the preload of new joints."""
+
+    _between: Mapping[str, Any]
+
+    def with_between(self, between: Mapping[str, Any]) -> Self:
+        """Return the source for new specimens, in which constants scatter between specimens.
+
+        Scatter that was already present in the tests explains a part of
+        their scatter, and is stated before `infer` in
+        ``RandomInterface(between=)``. Scatter that only new joints have
+        is stated here.
+
+        Parameters
+        ----------
+        between : mapping
+            Distributions with mean 1, as in `RandomInterface`, such as
+            ``{"pressing_force": Lognormal(mean=1.0, cv=0.05)}``. The
+            factor of the strength is inferred, and cannot be given.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=64)
+        >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+        >>> tests = st.infer(
+        ...     problem, strength, [0.70e6, 0.71e6, 0.74e6], method=st.LocalCriterion(), samples=100
+        ... )
+        >>> joints = tests.with_between({"normal_pressure": st.Lognormal(mean=1.0, cv=0.05)})
+        >>> sorted(joints.interfaces(1)[0].between)
+        ['normal_pressure', 'strength']
+        """
+        if "strength" in between:
+            raise InputError("between: strength: is inferred. State it in prior= of st.infer")
+        return replace(self, _between=dict(between))  # type: ignore[type-var]
+
+    def _scattered(self, interfaces: Sequence[RandomInterface]) -> list[RandomInterface]:
+        if not self._between:
+            return list(interfaces)
+        return [
+            replace(one, between={**(one.between or {}), **self._between}) for one in interfaces
+        ]
 
 
 def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:

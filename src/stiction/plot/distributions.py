@@ -330,12 +330,12 @@ def failure_curve(
     with on_axes(ax) as axes:
         if bounded(bound):
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
-        text = "subset simulation, 95 % interval"
+        text = "subset simulation, 90 % interval"
         if "members" in curve:
             ends = (np.maximum(curve[name].values, TINY) for name in ("band_low", "band_high"))
             label = f"90 % of {curve.sizes['member']} equally likely interfaces"
             axes.fill_between(x, *ends, color=BAND, linewidth=0.0, label=label)
-            text = "their mean, 95 % interval of sampling"
+            text = "their mean, 90 % interval"
         low, high = curve["probability_low"].values, curve["probability_high"].values
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
         axes.plot(x, chance, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
@@ -373,8 +373,9 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar connects the designs at both ends of a range. The line
-        is the design, and the band is its interval.
+        Each bar connects the designs at both ends of a range, and its
+        dot is the design at the second end. The line is the design, and
+        the band is its interval.
 
     Raises
     ------
@@ -393,21 +394,14 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     place = np.arange(ends.shape[1])[::-1]
     with on_axes(ax) as axes:
         axes.axvspan(
-            *(end * area * factor for end in design.interval), color=BAND, linewidth=0.0
+            *(end * factor for end in design.interval[quantity]), color=BAND, linewidth=0.0
         )
         axes.axvline(design.stress * area * factor, color=INK, linewidth=0.8)
         low, high = np.sort(ends, axis=0) * factor
         axes.barh(place, high - low, left=low, height=0.5, color=color(1))
-        for number, (at_low, at_high) in enumerate(ends.T * factor):
-            left, right = ("low", "high") if at_low <= at_high else ("high", "low")
-            for at, name, side in (
-                (min(at_low, at_high), left, "right"), (max(at_low, at_high), right, "left")
-            ):  # fmt: skip
-                text = f" {table[name].values[number]} "
-                axes.text(at, place[number], text, ha=side, va="center", fontsize=7)
-        axes.set_yticks(
-            place, [str(name).removeprefix("problem.") for name in table.source.values]
-        )
+        axes.plot(ends[1] * factor, place, "o", color=INK, markersize=3)
+        names = [str(name).removeprefix("problem.") for name in table.source.values]
+        pairs = zip(names, table.low.values, table.high.values, strict=True)
+        axes.set_yticks(place, [f"{name}: {low} to {high}" for name, low, high in pairs])
         axes.set_xlabel(with_unit(f"design {quantity}", unit))
-        axes.margins(x=0.25)
     return axes

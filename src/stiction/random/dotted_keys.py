@@ -61,6 +61,13 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
         raise InputError([begin + text for text in texts]) from None
 
 
+def value_at(owner: Any, key: str) -> Any:
+    """Return the value at a dotted key of a model object, or None."""
+    for name in key.split("."):
+        owner = getattr(owner, name, None)
+    return owner
+
+
 def full_key(key: str) -> str:
     """Return the full key, as in a sweep. Keys that belong to the strength may omit the prefix."""
     first = key.split(".")[0]

@@ -11,7 +11,7 @@ for failures covers all members. For several members:
    (`EquallyLikely.from_draws`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import (
@@ -58,6 +58,16 @@ class Source(Protocol):
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
         """Return `count` equally likely interfaces."""
+
+
+@runtime_checkable
+class Predictive(Protocol):
+    """Source that predicts the onset of one further specimen, also with changed constants."""
+
+    def prediction(
+        self, problem: Any, method: Any, changes: Mapping[str, float], workers: int | None
+    ) -> Any:
+        """Return an object with `families` and ``quantile(probability, family)``, Pa, or None."""
 
 
 def _known(given: Any) -> Any:

@@ -1,70 +1,30 @@
-"""Answers on failure probability, and the checks that they share."""
+"""The answer of a call on failure probability: numbers, intervals, doubts, and how it is shown."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeAlias, TypeVar
+from typing import Any, Self
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
-from pydantic import Field
 from scipy.special import ndtri
 
 from stiction.base.arrays import Array
-from stiction.base.errors import (
-    InputError,
-    Warned,
-    collect_warnings,
-    merge_warnings,
-    texts_of,
-    warn_accuracy,
-)
-from stiction.base.model import Count, FilePath, Real, Text, checked
-from stiction.base.progress import Meter, Show
+from stiction.base.errors import warn_accuracy
+from stiction.base.model import FilePath, Text, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import in_words
-from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, StressName
-from stiction.ensemble.monte_carlo import check_fields
-from stiction.methods.onset import exact_counterpart
-from stiction.methods.protocol import optional_member, seconds_per_sample
-from stiction.problem.problem import Problem
-from stiction.random.equally_likely import MAX_MEMBERS, specimens_of_fit
-from stiction.reliability.counting import CONFIDENCE
-from stiction.reliability.tail import TailPoint, guide_of
+from stiction.reliability.tail import TailPoint
 
-TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
-"""A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
-Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
-Budget: TypeAlias = Annotated[Count, Field(ge=100)]
-
-COUNTING_SECONDS, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 100.0, 1_000, 2_000_000
-"""Computing time of counting by a slow method, and fewest and most evaluations by default."""
-CHAIN_EVALUATIONS, PATIENCE_SECONDS = 20_000, 900.0
-"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and longest time of
-evaluations on one core, s, unless `max_evaluations` allows more."""
-LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
-"""Parts of the target for the errors by the list of interfaces and by sampling. Squares add up."""
-REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
-"""Margin on the wanted number of members, and share of the mean that a warning reports."""
-FRESH = 1.5
-"""Least ratio of different members that makes a longer list worthwhile."""
-EXACT_CHECKS = (8, 64)
-"""Fewest and most samples of an approximate method that are solved exactly as a check."""
-CHECK_SECONDS = 10.0
-"""Seconds of one core for this check."""
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
 """Attributes of an answer that a `TailPoint` has."""
-
-
-F = TypeVar("F", "Answer", TailPoint)
+UNSEEN_CONFIDENCE = 0.95
+"""Confidence with which a weaker batch would have been seen."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -76,8 +36,10 @@ class Answer(Result):
     stress, probability : float
         Stress, Pa, and probability of an onset below this stress. One
         is given, and the other is estimated.
-    interval : tuple of float
-        95 % confidence interval of the estimated number.
+    interval : dict of str to (float, float)
+        90 % interval of each estimated number by name, due to the error
+        of the computation: ``probability``, or ``stress`` (Pa),
+        ``force`` (N) and ``friction_coefficient`` of a design.
     cv : float
         Coefficient of variation of the probability: estimated standard
         error over the estimate. It is infinite without a failure, and
@@ -148,11 +110,13 @@ class Answer(Result):
     specimens : int
         Number of measured specimens behind the scatter between
         specimens, or 0.
+    experiment : Experiment
+        Problem, random properties, method and seed of the call.
     """
 
     stress: float
     probability: float
-    interval: tuple[float, float]
+    interval: Mapping[str, tuple[float, float]]
     cv: float
     members_cv: float = 0.0
     evaluations: int
@@ -172,23 +136,42 @@ class Answer(Result):
     of_stress: bool = False
     quantity: str = "stress"
     specimens: int = 0
+    experiment: Experiment = field(repr=False, compare=False)
     doubts: tuple[str, ...] = ()
 
     @classmethod
-    def at(cls, point: TailPoint, doubts: Sequence[str] = (), **more: Any) -> Self:
+    def at(
+        cls,
+        point: TailPoint,
+        ends: tuple[float, float],
+        doubts: Sequence[str] = (),
+        **more: Any,
+    ) -> Self:
         """Return the answer at a point of a tail, and issue doubts as warnings.
 
-        `more` contains further attributes, or replaces the attributes
-        of the point.
+        `ends` is the interval of the probability, or of the stress of a
+        design. `more` contains further attributes, or replaces the
+        attributes of the point.
         """
         for text in doubts:
             warn_accuracy(text)
         state, tail = point.state, point.tail
+        pressure, area = state.experiment.pressure, state.experiment.problem.area or math.nan
+        scales = {"probability": 1.0}
+        if more.get("of_stress"):
+            scales = {"stress": 1.0, "force": area, "friction_coefficient": 1.0 / pressure}
+        interval = {
+            name: (ends[0] * scale, ends[1] * scale)
+            for name, scale in scales.items()
+            if not math.isnan(scale)
+        }
         known = {name: getattr(point, name) for name in ESTIMATED if name not in more}
         return cls(
+            interval=interval,
             lower_bound=state.bounds[0],
-            normal_pressure=state.experiment.pressure,
-            area=state.experiment.problem.area or math.nan,
+            normal_pressure=pressure,
+            area=area,
+            experiment=state.experiment,
             evaluations=tail.spent,
             first_stage_evaluations=sum(d.first_stage_evaluations for d in tail.repetitions),
             algorithm=tail.algorithm,
@@ -220,6 +203,13 @@ class Answer(Result):
         return -float(ndtri(self.probability))
 
     @property
+    def by_family(self) -> dict[str, float]:
+        """Stress, Pa, for each family of the factor between specimens, if several are likely."""
+        start = "stress by "
+        families = self.sensitivities.attrs.items()
+        return {name.removeprefix(start): v for name, v in families if name.startswith(start)}
+
+    @property
     def band(self) -> tuple[float, float]:
         """90 % band of the probability over equally likely interfaces, NaN for a single interface.
 
@@ -243,7 +233,6 @@ class Answer(Result):
         self,
         path: FilePath,
         *,
-        problem: Problem,
         evidence: Sequence[Any] = (),
         sources: Mapping[str, str] | None = None,
         title: Text = "Design of a joint",
@@ -254,11 +243,10 @@ class Answer(Result):
         ----------
         path : path
             HTML file.
-        problem : Problem
-            The problem for which the design was computed. Its constants are the inputs.
         evidence : sequence
-            Results on which the design rests, such as a fit, a posterior or an agreement.
-            They are printed on the page. Their doubts and notes are listed as doubts.
+            Further results that are printed on the page, such as an agreement, with their
+            doubts. The fit or posterior of the design, its peaks and its agreement are
+            printed in any case.
         sources : mapping, optional
             The sources of inputs by dotted key, such as ``{"load.pressing_force":
             "drawing 12"}``. An input without a source is called 'assumed'.
@@ -286,35 +274,42 @@ class Answer(Result):
         >>> design = st.design_stress(
         ...     problem, strength, probability=1e-2, method=st.LocalCriterion(), target_cv=0.3
         ... )
-        >>> page = design.write_page(
-        ...     Path(tempfile.mkdtemp()) / "design.html", problem=problem
-        ... )
+        >>> page = design.write_page(Path(tempfile.mkdtemp()) / "design.html")
         >>> "reliability index" in page.read_text()
         True
         """
         # The page is drawn by an upper layer, which is imported when it is needed.
         pages = import_module("stiction.cli.design_page")
         place = Path(path)
-        pages.write_page(self, place, problem, evidence, sources or {}, title)
+        pages.write_page(self, place, evidence, sources or {}, title)
         return place
 
     def _summary(self) -> Summary:
-        ends = self.interval if self.of_stress else ()
-
-        def over(name: str, scale: float, unit: str) -> Row:
-            return Row(name, self.stress * scale, [end * scale for end in ends], unit)
-
+        values = {
+            "probability": (self.probability, ""),
+            "stress": (self.stress, "Pa"),
+            "force": (self.force, "N"),
+            "friction_coefficient": (self.friction_coefficient, "1"),
+        }
+        # The estimated number comes first, or else the requested
+        # quantity of a design, and then the given number.
+        first = self.quantity if self.of_stress else "probability"
+        order = dict.fromkeys([first, self.quantity, *values])
+        names = sorted(order, key=lambda name: name == "probability" and self.of_stress)
         rows = [
-            over("stress", 1.0, "Pa"),
-            over("force", self.area, "N"),
-            over("friction coefficient", 1.0 / self.normal_pressure, "1"),
+            Row(
+                name.replace("_", " "),
+                values[name][0],
+                self.interval.get(name, ()),
+                values[name][1],
+            )
+            for name in names
         ]
-        # The requested quantity comes first, and the other number of
-        # the answer beside it.
-        rows.sort(key=lambda row: row.name != self.quantity.replace("_", " "))
-        chance = Row("probability", self.probability, () if ends else self.interval)
-        rows.insert(len(rows) if ends else 0, chance)
         rows += [
+            Row("coefficient of variation", self.cv or math.nan),
+            Row("part of it by the list of interfaces", self.members_cv or math.nan),
+            Row("90 % of interfaces are between", self.band[0], self.band),
+            Row("share that survives any stress", self.survived or math.nan),
             Row("reliability index", self.reliability_index),
             Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
             Row("characteristic stress", self.characteristic_stress, (), "Pa"),
@@ -322,83 +317,37 @@ class Answer(Result):
         ]
         known = [row for row in rows if math.isfinite(row.value)]
         title = "Design value" if self.of_stress else "Probability of sliding"
+        if math.isinf(self.stress):
+            title = "No stress has this probability"
         basis = f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"
-        return Summary(title, known, "95 % interval", [basis, *self.warnings, *self.doubts])
+        notes = [*self.warnings, *self.doubts, *unseen_batch(self.specimens)]
+        return Summary(title, known, "90 % interval", [basis, *self._moves(), *notes])
 
-    def __str__(self) -> str:
-        if self.of_stress and math.isinf(self.stress):
-            return (
-                f"no stress has P = {self.probability:g}: the event happens in"
-                f" {1.0 - self.survived:.3g} of {self.evaluations} samples"
-            )
-        low, high = self.interval
-        known = {
-            "stress": f"{self.stress / 1e6:.7g} MPa",
-            "force": f"force {in_words('N', self.force)}",
-            "friction_coefficient": f"friction coefficient {self.friction_coefficient:.4g}",
-        }
-        result = known.pop(self.quantity)
-        if self.of_stress:
-            ends = f"{low / 1e6:.7g} to {high / 1e6:.7g}"
-            if self.quantity == "force":
-                ends = " to ".join(in_words("N", end * self.area) for end in (low, high))
-            result += f" (95 %: {ends}) at P = {self.probability:g}"
-        else:
-            chance = f"P = {self.probability:.3g} (95 %: {low:.3g} to {high:.3g},"
-            result = f"{chance} cv {self.cv:.2g}) below {result}"
-        finite = [name for name in known if math.isfinite(getattr(self, name))]
-        equivalents = [known[name] for name in finite]
-        result += f" ({', '.join(equivalents)})" if equivalents else ""
-        if bounded(self.lower_bound):
-            above = self.stress_above_bound / 1e3
-            result += f", {abs(above):.4g} kPa {'above' if above >= 0.0 else 'below'} the bound"
-        if self.survived:
-            result += f"; {self.survived:.3g} of plain samples survive any stress"
-        if self.members.size:
-            result += f"; the mean over {self.members.size} equally likely interfaces"
-            band = zip(("5 %", "95 %"), self.band, strict=True)
-            parts = [f"{share} have at most P = {p:.2g}" for share, p in band if p >= 0.0]
-            result += f", of which {' and '.join(parts)}" if parts else ""
-        if self.members_cv:
-            sampled = math.sqrt(max(self.cv**2 - self.members_cv**2, 0.0))
-            result += f" (cv by the list {self.members_cv:.2g}, by sampling {sampled:.2g})"
-        if self.algorithm == "exact":
-            result += f"; {self.reason}"
-        else:
-            result += f"; {self.algorithm}, {self.evaluations} evaluations"
-        return "\n".join([result, *self._moved(), *(f"  ! {text}" for text in self.doubts)])
-
-    def _moved(self) -> list[str]:
+    def _moves(self) -> list[str]:
         """Return lines of text that show how each assumption changes the design."""
         effects = self.sensitivities
         if not effects.sizes.get("source"):
             return []
         unit, area = ("Pa", 1.0) if math.isnan(self.area) else ("N", self.area)
-        lines = [
-            "  the interval holds the error of the computation only; what moves the design:"
-        ]
+
+        def words(values: Sequence[float]) -> list[str]:
+            return [in_words(unit, area * value) for value in values]
+
+        lines = ["the interval holds the error of the computation only; what moves the design:"]
         for row in effects.to_dataframe().itertuples():
-            ends = [
-                in_words(unit, area * end) for end in (row.stress_at_low, row.stress_at_high)
-            ]
-            lines.append(f"    {row.Index}: {row.low} to {row.high}: {' to '.join(ends)}")
-        families = [
-            f"{name.removeprefix('stress by ')} {in_words(unit, area * value)}"
-            for name, value in effects.attrs.items()
-            if name.startswith("stress by ")
-        ]
-        if len(families) > 1:
-            lines.append(
-                f"    by family of the factor between specimens: {', '.join(families)}"
-            )
-        return lines + [f"    {text}" for text in unseen_batch(self.specimens)]
+            ends = " to ".join(words([row.stress_at_low, row.stress_at_high]))
+            lines.append(f"  {row.Index}: {row.low} to {row.high}: {ends}")
+        families = self.by_family
+        pairs = zip(families, words(list(families.values())), strict=True)
+        text = ", ".join(" ".join(pair) for pair in pairs)
+        return [*lines, *[f"  by family of the factor between specimens: {text}"] * bool(text)]
 
 
 def unseen_batch(specimens: int) -> list[str]:
     """Return a sentence on the batch that so many specimens cannot exclude with 95 % confidence."""
     if not specimens:
         return []
-    unseen = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / specimens)
+    unseen = 1.0 - (1.0 - UNSEEN_CONFIDENCE) ** (1.0 / specimens)
     return [
         f"{specimens} specimens cannot exclude a weaker batch with a share of up to"
         f" {unseen:.0%} of all specimens"
@@ -421,196 +370,6 @@ def band_of(members: Array) -> tuple[float, float]:
     return low, high
 
 
-def prepare(
-    experiment: Experiment,
-    event: StressName,
-    workers: int | None,
-    meter: Meter,
-    max_evaluations: int | None,
-    *,
-    algorithm: str = "subset",
-    per_pressure: bool = False,
-    executor: Executor | None = None,
-) -> tuple[LimitState, int]:
-    """Return the limit state and the allowed evaluations, or refuse a method that is too slow."""
-    threads = workers or usable_cores()
-    state = LimitState(experiment, event, per_pressure, threads, meter, executor)
-    problems = []
-    if per_pressure and not experiment.pressure > 0.0:
-        problems.append("friction_coefficient: needs load.normal_pressure or pressing_force")
-    if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
-        problems.append(f"method: {slow}")
-    elif algorithm == "two_level" and isinstance(reason := guide_of(state), str):
-        problems.append(f"algorithm: 'two_level' is not possible: {reason}")
-    if problems:
-        raise InputError(problems)
-    # Warnings come after errors: nobody needs a warning about a call
-    # that is refused.
-    check_fields([experiment])
-    seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
-    return state, max_evaluations or int(
-        min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))
-    )
-
-
-def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return why chains of samples take too long with this method, or None."""
-    seconds, method = CHAIN_EVALUATIONS * experiment.seconds, experiment.method
-    fast = seconds <= PATIENCE_SECONDS and not optional_member(method, "counted_only")
-    if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
-        return None
-    return (
-        f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} take about"
-        f" {seconds / 3600.0:.1g} h. Allow them with max_evaluations, or count: algorithm='plain'"
-    )
-
-
 def bounded(lowest: float) -> bool:
     """Return whether the least stress is a useful bound: finite and above zero."""
     return bool(np.isfinite(lowest) and lowest > 0.0)
-
-
-def sampling_target(state: LimitState, target_cv: float) -> float:
-    """Return the part of the target that is left for the sampling error."""
-    return target_cv * (SAMPLING_SHARE if state.several else 1.0)
-
-
-def wanted_members(random: Any, cv: float, target_cv: float) -> int:
-    """Return the number of members to draw from a source, 0 if there are enough."""
-    least = cv / (LIST_SHARE * target_cv)  # the error falls with the root of the number
-    count = len(random.members)
-    if random.source is None or least <= 1.0 or count >= MAX_MEMBERS:
-        return 0
-    return int(min(max(REQUEST_MARGIN * count * least * least, 2 * count), MAX_MEMBERS))
-
-
-def answered(
-    experiment: Experiment,
-    target_cv: float,
-    name: str,
-    progress: Show,
-    solve: Callable[[Experiment, Meter], Answer],
-) -> Answer:
-    """Return an answer, and its warnings, from as many members as the target needs."""
-    with Meter(name, show=progress) as meter, merge_warnings() as warned:
-        warn_of_field(experiment)
-        experiment, answer = with_enough_members(experiment, target_cv, meter, warned, solve)
-        for text in few_members(experiment.random, answer, target_cv):
-            warn_accuracy(text)
-    source = experiment.random.source
-    return replace(
-        answer,
-        warnings=tuple(texts_of(warned)),
-        doubts=(*getattr(source, "doubts", ()), *getattr(source, "notes", ())),
-        specimens=getattr(source, "specimens", 0),
-    )
-
-
-def warn_of_field(experiment: Experiment) -> None:
-    """Warn about the field of a fit in place of a fit with scatter between specimens."""
-    if specimens_of_fit(experiment.random):
-        warn_accuracy(
-            "random: is the field of a fit, without the scatter between specimens, so that failures"
-            " are too rare. Pass the fit itself"
-        )
-
-
-def with_enough_members(
-    experiment: Experiment,
-    target_cv: float,
-    meter: Meter,
-    warned: list[Warned],
-    solve: Callable[[Experiment, Meter], F],
-) -> tuple[Experiment, F]:
-    """Return a solution with enough members for the error due to the list.
-
-    A source draws more members until the error is small enough.
-    """
-    while True:
-        solution, known = solve(experiment, meter), experiment.random
-        if not (count := wanted_members(known, solution.members_cv, target_cv)):
-            return experiment, solution
-        meter.note = f"{count:,} interfaces, cv by the list {solution.members_cv:.2g}"
-        larger = known.larger(count, experiment.seed)
-        # A posterior over a list has hardly more different members,
-        # however many are drawn.
-        if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
-            return experiment, solution
-        experiment = replace(experiment, random=larger)
-        warned.clear()  # the new solution warns again where it must
-
-
-def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> list[str]:
-    """Return a warning if the list makes the estimate less precise than `target_cv`."""
-    by_list = estimate.members_cv
-    if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
-        return []
-    # Add up the probabilities of equal interfaces, the largest first.
-    # None may be known.
-    members = np.nan_to_num(estimate.members)
-    shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
-    count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
-    carried = f", and {count} of its {shares.size} different ones carry {CARRIED_SHARE:.0%}"
-    advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
-    if random.source is not None:
-        advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
-    return [
-        f"the list of interfaces is a sample{f'{carried} of the mean' * bool(shares[-1])}. By this"
-        f" alone the coefficient of variation is {by_list:.2g} (target {target_cv:g}). {advice}, or"
-        " measure more"
-    ]
-
-
-def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
-    """Return a warning if the estimate is less precise than `target_cv`."""
-    advice = "raise max_evaluations"
-    if math.isfinite(cv):
-        advice += f" to about {REQUEST_MARGIN * evaluations * (cv / target_cv) ** 2:.1g}"
-    text = (
-        f"the coefficient of variation by sampling is {cv:.3g} after {evaluations} evaluations, but"
-        f" {target_cv:.3g} was wanted. To reach it, {advice}, or accept a larger target_cv"
-    )
-    return [text] if cv > target_cv else []
-
-
-def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return up to `count` positions of distinct values, in random order."""
-    _, first = np.unique(values, return_index=True)  # chains repeat states
-    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
-    return chosen
-
-
-def exact_doubts(point: TailPoint) -> list[str]:
-    """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
-
-    These are some of the lowest samples on both sides of the stress.
-    Failures are counted, because in a tail a small change of stress may
-    multiply the probability.
-    """
-    state, stress = point.state, point.stress
-    experiment, (population, near) = state.experiment, point.tail.repetitions[-1].around(stress)
-    exact = exact_counterpart(experiment.problem, experiment.method)
-    if exact is None or not near.size:
-        return []
-    seconds = seconds_per_sample(experiment.problem, exact)
-    # Different values, because samples of a chain repeat.
-    count = int(np.clip(CHECK_SECONDS / seconds, *EXACT_CHECKS))
-    chosen = near[different(population.values[near], count, np.random.default_rng(0))]
-    state.meter.note = f"checking by {exact.label}"
-    with collect_warnings():
-        fails_exactly = state.by(exact)(population.draws[chosen]) < stress
-    fails = population.values[chosen] < stress
-    failed, failed_exactly = int(fails.sum()), int(fails_exactly.sum())
-    # If both methods are right on average, the samples that change
-    # sides go both ways, and the difference of the counts has the
-    # square root of their number as standard deviation.
-    differing = int(np.sum(fails != fails_exactly))
-    if abs(failed_exactly - failed) <= 2.0 * math.sqrt(max(differing, 1)):
-        return []
-    there = min(point.probability * max(failed_exactly, 1) / max(failed, 1), 1.0)
-    return [
-        f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
-        f" {failed_exactly} by {exact.label}. The probability by st.{type(exact).__name__}() is"
-        f" {'about' if failed_exactly else 'below'} {there:.2g}, not {point.probability:.2g}."
-        " Use it"
-    ]

@@ -31,7 +31,7 @@ from stiction.base.arrays import Array
 from stiction.ensemble.limit_state import LimitState
 from stiction.reliability.subset import Descent, Population
 
-CONFIDENCE = 0.95
+CONFIDENCE = 0.9
 """Confidence level of every interval."""
 COUNT_BATCH = 1024
 """Most samples that are solved before failures are counted again."""

@@ -8,7 +8,7 @@ Steps:
 1. Sample the tail down to the smallest probability
    (`tail.sample_curve`). If interfaces are drawn from a fit or a
    posterior, draw more of them until the error due to their number is
-   small enough (`answer.with_enough_members`).
+   small enough (`solving.with_enough_members`).
 2. Warn if the end of the curve is in doubt (`curve_doubts`).
 3. At `PER_DECADE` probabilities per decade, take the stress, its
    interval, and the probabilities of the equally likely interfaces
@@ -17,6 +17,7 @@ Steps:
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,11 +34,11 @@ from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
 from stiction.problem.results import study_attributes, to_dataset
 from stiction.random.equally_likely import AnyRandom, as_random
-from stiction.reliability.answer import (
+from stiction.reliability.answer import band_of
+from stiction.reliability.solving import (
     Budget,
     Probability,
     TargetCv,
-    band_of,
     exact_doubts,
     few_members,
     prepare,
@@ -61,7 +62,7 @@ CURVE: dict[str, Variable] = {
         ("force", "N", "stress times the area of the interface"),
         ("probability", "1", "probability of an onset below the stress"),
         ("probability_low", "1", "lower end of the interval of the probability"),
-        ("probability_high", "1", "upper end of the 95 % interval of the probability"),
+        ("probability_high", "1", "upper end of the 90 % interval of the probability"),
         ("cv", "1", "coefficient of variation of the probability"),
         ("stress_low", "Pa", "lower end of the interval of the stress"),
         ("stress_high", "Pa", "upper end of the interval of the stress"),
@@ -141,9 +142,9 @@ def failure_curve(
     """
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
 
-    def solve(experiment: Experiment, meter: Meter) -> TailPoint:
+    def solve(experiment: Experiment, meter: Meter, spent: int) -> TailPoint:
         state, budget = prepare(
-            experiment, event, workers, meter, max_evaluations, executor=executor
+            experiment, event, workers, meter, max_evaluations, executor=executor, spent=spent
         )
         state = weakest_first(state)
         goal = Goal(sampling_target(state, target_cv), probability=smallest)
@@ -155,7 +156,9 @@ def failure_curve(
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
         warn_of_field(experiment)
         # 1.
-        _, end = with_enough_members(experiment, target_cv, meter, warned, solve)
+        _, end, spent = with_enough_members(
+            experiment, target_cv, meter, warned, max_evaluations, solve
+        )
         # 2.
         for text in curve_doubts(end, smallest, target_cv):
             warn_accuracy(text)
@@ -163,6 +166,7 @@ def failure_curve(
     attributes["seed"] = seed
     # 3. If the event never happens, the only point is NaN.
     last = smallest if end.tail.complete else end.probability or COMMONEST
+    end = replace(end, tail=end.tail._replace(spent=spent))
     return curve_of(end.tail, end.state, chances(last), attributes)
 
 

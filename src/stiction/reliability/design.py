@@ -16,14 +16,16 @@ Steps:
    a quantile of the onset.
 2. If so many onsets lie at their lower bound that the design stress is
    the bound itself, return the bound.
-3. For the sensitivities, solve `SAMPLES_PER_END` samples, and take the
-   quantile at the design probability (`factors.solve`). All further
-   steps use the same draws, so that differences are accurate.
-4. For each family, take the quantile over the
-   interfaces with this family. These interfaces
-   are draws from the posterior given the family.
-5. For each constant solve the same samples at both ends of its range: a
-   stated range, or `USUAL_SHARE` below and above its value.
+3. For the sensitivities, take the quantile at the design probability:
+   from the prediction of a fit or posterior
+   (`inference.specimens.Prediction`), or else from `SAMPLES_PER_END`
+   samples (`factors.solve_specimens`). All further steps use the same
+   draws, so that differences are accurate.
+4. For each family, take the quantile over the posterior given the
+   family, or over the interfaces with this family.
+5. For each constant repeat step 3 at both ends of its range: a stated
+   range, or `USUAL_SHARE` below and above its value. A posterior infers
+   the strength again from the same tests with the changed constant.
 6. Multiply the design by the ratios of the quantiles from steps 4 and 5
    to the quantile from step 3.
 """
@@ -31,11 +33,12 @@ Steps:
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
 
+from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings
 from stiction.base.model import Count, Flag, Number, Progress, Real, checked, is_finite
 from stiction.base.progress import Meter
@@ -43,12 +46,13 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
-from stiction.random.dotted_keys import with_values
-from stiction.random.equally_likely import AnyRandom, as_random
+from stiction.random.dotted_keys import value_at, with_values
+from stiction.random.equally_likely import AnyRandom, Predictive, as_random
 from stiction.random.marginals import FACTOR_FAMILIES
 from stiction.random.spectra import Share
-from stiction.reliability.answer import (
-    Answer,
+from stiction.reliability.answer import Answer
+from stiction.reliability.factors import Counts, count_tail, solve_specimens
+from stiction.reliability.solving import (
     Budget,
     Probability,
     TargetCv,
@@ -58,7 +62,6 @@ from stiction.reliability.answer import (
     prepare,
     sampling_target,
 )
-from stiction.reliability.factors import Counts, count_tail, solve_specimens
 from stiction.reliability.tail import FREQUENT, Goal, TailPoint, sample_tail
 
 SAMPLES_PER_END = 300
@@ -121,7 +124,7 @@ def design_stress(
     Returns
     -------
     Answer
-        With `stress`, its 95 % `interval` due to the error of the
+        With `stress`, its 90 % `interval` due to the error of the
         computation (Pa), and `sensitivities`.
 
     Raises
@@ -145,8 +148,8 @@ def design_stress(
     True
     """
 
-    def solve(experiment: Experiment, meter: Meter) -> Answer:
-        state, budget = prepare(experiment, event, workers, meter, max_evaluations)
+    def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
+        state, budget = prepare(experiment, event, workers, meter, max_evaluations, spent=spent)
         answer = _quantile(state, probability, target_cv, budget, confidence)
         wanted = (
             experiment.random.source is not None
@@ -160,7 +163,7 @@ def design_stress(
         return replace(answer, quantity="stress" if math.isnan(answer.area) else "force")
 
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
-    return answered(experiment, target_cv, "design_stress", progress, solve)
+    return answered(experiment, target_cv, "design_stress", progress, max_evaluations, solve)
 
 
 def _quantile(
@@ -172,22 +175,25 @@ def _quantile(
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
     # 1. Counted specimens are whole samples, so they also give the
     # characteristic value.
-    if counts := count_tail(state, goal, budget):
-        tail = counts.tail
+    counts, enough = count_tail(state, goal, budget)
+    if counts:
         asked |= {
             "characteristic_stress": counts.characteristic(confidence), "confidence": confidence
         }  # fmt: skip
+    if counts and enough:
+        tail = counts.tail
     else:
-        often = probability >= FREQUENT
+        often, counted = probability >= FREQUENT, len(counts.values) if counts else 0
         tail = sample_tail(
-            weakest_first(state), goal, budget=budget, algorithm="subset" if often else "auto",
-            reason="frequent" if often else "rare",
+            weakest_first(state), goal, budget=budget - counted,
+            algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
         )  # fmt: skip
+        tail = tail._replace(spent=counted + tail.spent)
     if not tail.complete:  # the tail ends at its lowest sample
         point = TailPoint(state, tail, tail.extent[0])
         interval = (lowest, point.stress) if point.stress > lowest else state.bounds
         doubts = [tail.short_of(f"P = {probability:g}")]
-        return Answer.at(point, doubts, interval=interval, cv=math.inf, members_cv=0.0, **asked)
+        return Answer.at(point, interval, doubts, cv=math.inf, members_cv=0.0, **asked)
     point, doubts = TailPoint(state, tail, tail.quantile(probability)), []
     # 2. A lower bound of strength, or the accuracy of the method, lets
     # onsets accumulate.
@@ -206,30 +212,52 @@ def _quantile(
             f" P = {probability:g}. No stress has that probability"
         )
     doubts += imprecise(point.sampling_cv, goal.cv, tail.spent) + exact_doubts(point)
-    return Answer.at(point, doubts, interval=interval, **asked)
+    return Answer.at(point, interval, doubts, **asked)
 
 
-def value_at(problem: Any, key: str) -> Any:
-    """Return the value at a dotted key of a problem, or None."""
-    value = problem
-    for name in key.split("."):
-        value = getattr(value, name, None)
-    return value
-
-
-def ranges_of(problem: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the range of each constant by dotted key without ``problem.``."""
-    ranges = {}
-    for key in CONSTANTS:
-        value = value_at(problem, key)
-        if np.ndim(value) == 0 and is_finite(value) and value > 0.0:
-            ranges[key] = value * (1.0 - USUAL_SHARE), value * (1.0 + USUAL_SHARE)
+def ranges_of(problem: Any, source: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the range of each constant that may be assumed, by full key."""
+    values = {f"problem.{key}": value_at(problem, key) for key in CONSTANTS}
+    values |= getattr(source, "assumed", {})
+    ranges = {
+        key: (value * (1.0 - USUAL_SHARE), value * (1.0 + USUAL_SHARE))
+        for key, value in values.items()
+        if np.ndim(value) == 0 and is_finite(value) and value > 0.0
+    }
     for key, ends in stated.items():
-        short = key.removeprefix("problem.")
-        if not key.startswith("problem.") or value_at(problem, short) is None:
+        known = key.startswith("problem.") and value_at(problem, key[8:]) is not None
+        if not known and key not in ranges:
             raise InputError(f"sensitivities: {key}: is not a constant of this problem")
-        ranges[short] = tuple(ends)
+        ranges[key] = tuple(ends)
     return ranges
+
+
+class _Counted(NamedTuple):
+    """Prediction by samples, for interfaces that cannot predict by themselves."""
+
+    counts: Counts
+    kinds: Array  # family of the factor of each interface
+
+    @classmethod
+    def of(cls, state: LimitState, changes: Mapping[str, float]) -> Self:
+        experiment = state.experiment
+        given = {key.removeprefix("problem."): value for key, value in changes.items()}
+        changed = replace(experiment, problem=with_values(experiment.problem, given, "problem"))
+        counts = solve_specimens(replace(state, experiment=changed), 0, SAMPLES_PER_END)
+        laws, law = experiment.random.factor_laws
+        names = {family: name for name, family in FACTOR_FAMILIES.items()}
+        kinds = [names.get(type(one), getattr(one, "type", "none")) for one in laws]
+        return cls(counts, np.array(kinds)[law])
+
+    def quantile(self, probability: float, family: str | None = None) -> float:
+        if family is None:
+            return self.counts.tail.quantile(probability)
+        alike = self.kinds[self.counts.members] == family
+        return float(np.quantile(self.counts.values[alike], probability))
+
+    @property
+    def families(self) -> list[str]:
+        return [str(name) for name in np.unique(self.kinds[self.counts.members])]
 
 
 def sensitivities_of(
@@ -237,31 +265,33 @@ def sensitivities_of(
 ) -> xr.Dataset:
     """Return the design stress at both ends of each source, with the largest effect first."""
     experiment = state.experiment
-    problem = experiment.problem
+    problem, source = experiment.problem, experiment.random.source
 
-    def quantile_at(constants: Mapping[str, float]) -> float:
-        changed = replace(experiment, problem=with_values(problem, constants, "problem"))
-        counts = solve_specimens(replace(state, experiment=changed), 0, SAMPLES_PER_END)
-        return counts.tail.quantile(probability)
+    def predicted(changes: Mapping[str, float]) -> Any:
+        known = None
+        if isinstance(source, Predictive) and state.event == "critical_stress":
+            known = source.prediction(problem, experiment.method, changes, state.workers)
+        return _Counted.of(state, changes) if known is None else known
 
     rows: list[tuple[str, str, str, float, float]] = []  # source, its ends, quantiles there
     with collect_warnings():
-        # 3. and 4. The reference takes the same samples as the ends,
-        # not those of the design.
-        counts = solve_specimens(state, 0, SAMPLES_PER_END)
-        reference = counts.tail.quantile(probability)
-        families = _by_family(counts, probability)
+        # 3. The reference takes the same samples as the ends, not those
+        # of the design.
+        known = predicted({})
+        reference = known.quantile(probability)
+        # 4.
+        families = {name: known.quantile(probability, name) for name in known.families}
         if len(families) > 1:
             least, most = (pick(families, key=families.__getitem__) for pick in (min, max))
             rows.append((FAMILY, least, most, families[least], families[most]))
-        # 5. Only the problem changes, so the draws remain the same.
-        for key, ends in ranges_of(problem, stated).items():
+        # 5.
+        for key, ends in ranges_of(problem, source, stated).items():
             state.meter.note = f"what moves the design: {key}"
             try:
-                low, high = (quantile_at({key: end}) for end in ends)
+                low, high = (predicted({key: end}).quantile(probability) for end in ends)
             except InputError:  # the constant cannot have this value
                 continue
-            rows.append((f"problem.{key}", f"{ends[0]:.4g}", f"{ends[1]:.4g}", low, high))
+            rows.append((key, f"{ends[0]:.4g}", f"{ends[1]:.4g}", low, high))
     # 6. The widest range comes first.
     rows.sort(key=lambda row: -abs(row[4] - row[3]))
     area = problem.area or np.nan
@@ -280,21 +310,6 @@ def sensitivities_of(
     for name, unit, scale in (("stress", "Pa", stress), ("force", "N", area * stress)):
         for end, ratio in ratios.items():
             effects[f"{name}_at_{end}"] = "source", scale * ratio, {"units": unit}
-    for name, value in families.items():
+    for name, value in families.items() if len(families) > 1 else ():
         effects.attrs[f"stress by {name}"] = stress * value / reference
     return effects
-
-
-def _by_family(counts: Counts, probability: float) -> dict[str, float]:
-    """Return the quantile for each family of the factor with enough specimens (step 4)."""
-    random = counts.state.experiment.random
-    laws, law = random.factor_laws
-    names = {family: name for name, family in FACTOR_FAMILIES.items()}
-    kinds = np.array([names.get(type(one), getattr(one, "type", "none")) for one in laws])[law]
-    quantiles = {}
-    for kind in np.unique(kinds):
-        stresses = np.where(kinds[counts.members] == kind, counts.values, np.nan)
-        rows = stresses[np.isfinite(stresses).any(axis=1)]
-        if np.isfinite(rows).sum() * probability >= 1.0:
-            quantiles[str(kind)] = float(np.nanquantile(rows, probability))
-    return quantiles

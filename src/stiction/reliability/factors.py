@@ -177,11 +177,15 @@ def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
     return Counts(state, ratios[:, None] * random.means[chosen] * factors, chosen, shares)
 
 
-def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
-    """Count failures up to the goal (steps 4 and 5). Return None if chains cost less."""
+def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts | None, bool]:
+    """Count failures up to the goal (steps 4 and 5), and return whether the count is enough.
+
+    It is not enough if chains cost less. Without a long list and
+    factors there is no count.
+    """
     long_list = len(state.experiment.random.members) > LONG_LIST
     if state.may_survive or not (long_list or _expands(state)):
-        return None
+        return None, False
     counts = solve_specimens(state, 0, min(FIRST_SAMPLES, budget))
     while True:
         tail, samples = counts.tail, len(counts.values)
@@ -194,14 +198,14 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> Counts | None:
             cv = max(cv, math.sqrt((1.0 - chance) / (chance * samples)))
         state.meter.note = f"cv {cv:.2g} (target {goal.cv:g})"
         if cv <= goal.cv or samples >= budget:
-            return counts
+            return counts, True
         # 5. Compare the costs of counting to
         # the target and of subset simulation.
         wanted = COUNT_MARGIN * samples * (cv / goal.cv) ** 2
         decades = max(-math.log10(chance), 1.0) if chance else math.inf
         price = SUBSET_EVALUATIONS * (decades / goal.cv) ** 2
         if wanted > min(price * (LIST_COST if long_list else 1.0), budget):
-            return None
+            return counts, False
         size = int(min(max(wanted - samples, FIRST_SAMPLES), MOST_STEP_SAMPLES))
         more = solve_specimens(state, samples, min(size, budget - samples))
         counts = Counts(

@@ -15,10 +15,10 @@ Steps:
    frequent, or if the method is too slow for chains (`counting`).
    Sample the tail if they are rare (`tail`).
 4. If the method is approximate, solve some samples near the stress
-   exactly. Warn if more or fewer of them fail (`answer.exact_doubts`).
+   exactly. Warn if more or fewer of them fail (`solving.exact_doubts`).
 5. If interfaces are drawn from a fit or a posterior, draw more
    interfaces until the error due to their number is small enough.
-   Repeat steps 1 to 4 (`answer.with_enough_members`).
+   Repeat steps 1 to 4 (`solving.with_enough_members`).
 """
 
 import math
@@ -39,8 +39,10 @@ from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem, stress_of
 from stiction.problem.results import along, study_attributes
 from stiction.random.equally_likely import AnyRandom, as_random
-from stiction.reliability.answer import (
-    Answer,
+from stiction.reliability.answer import Answer
+from stiction.reliability.counting import binomial_interval, count_failures
+from stiction.reliability.factors import count_tail
+from stiction.reliability.solving import (
     Budget,
     TargetCv,
     answered,
@@ -51,8 +53,6 @@ from stiction.reliability.answer import (
     sampling_target,
     too_slow,
 )
-from stiction.reliability.counting import binomial_interval, count_failures
-from stiction.reliability.factors import count_tail
 from stiction.reliability.subset import generator
 from stiction.reliability.tail import (
     FREQUENT,
@@ -142,7 +142,7 @@ def failure_probability(
     Returns
     -------
     Answer
-        With `probability`, `cv`, `interval` (95 %), `evaluations` and more.
+        With `probability`, `cv`, `interval` (90 %), `evaluations` and more.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def failure_probability(
     >>> problem = st.paper.problem(nodes=512)
     >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
     >>> found = st.failure_probability(problem, strength, 0.68e6, method=st.LocalCriterion())
-    >>> low, high = found.interval
+    >>> low, high = found.interval["probability"]
     >>> bool(0.0 < low < found.probability < high < 1.0)
     True
     """
@@ -181,10 +181,10 @@ def failure_probability(
     if force is not None:
         stress = stress_of(problem, "force", force)
 
-    def solve(experiment: Experiment, meter: Meter) -> Answer:
+    def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
         state, budget = prepare(
             experiment, event, workers, meter, max_evaluations,
-            algorithm=algorithm, per_pressure=stress is None,
+            algorithm=algorithm, per_pressure=stress is None, spent=spent,
         )  # fmt: skip
         wanted = stress
         if wanted is None:
@@ -194,7 +194,9 @@ def failure_probability(
         return replace(answer, quantity=name)
 
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
-    return answered(experiment, target_cv, "failure_probability", progress, solve)
+    return answered(
+        experiment, target_cv, "failure_probability", progress, max_evaluations, solve
+    )
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
@@ -222,14 +224,19 @@ def _probability(
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
-    reason, pilot, least = "as requested", None, min(PILOT_SAMPLES, max(budget // 5, 50))
+    counted, reason, pilot = 0, "as requested", None
+    least = min(PILOT_SAMPLES, max(budget // 5, 50))
     goal = Goal(sampling_target(state, target_cv), stress)
     if algorithm == "auto" and (slow := too_slow(state.experiment, allowed)):
         algorithm, reason = "plain", slow
     elif algorithm == "auto":
         # 2.
-        if counts := count_tail(state, goal, budget):
+        counts, enough = count_tail(state, goal, budget)
+        if counts and enough:
             return _by_tail(TailPoint(state, counts.tail, stress), goal.cv)
+        if counts:  # its samples are part of the budget
+            budget -= (counted := len(counts.values))
+            least = min(PILOT_SAMPLES, max(budget // 5, 50))
         # 3. Members in order help the chains, and the pilot must have
         # the order of the chains.
         state = weakest_first(state)
@@ -241,12 +248,15 @@ def _probability(
         reason = f"{failures} failure{'s' * (failures != 1)} of {least} plain samples: "
         reason += "rare" if rare else "frequent enough to count"
     if algorithm == "plain":
-        return _by_counting(state, goal, budget, least, least if pilot else 0, reason)
+        start = least if pilot else 0
+        answer = _by_counting(state, goal, budget, least, start, reason)
+        return replace(answer, evaluations=counted + answer.evaluations)
     if algorithm != "auto":
         state = weakest_first(state)
     tail = sample_tail(
         state, goal, algorithm=algorithm, budget=budget, reason=reason, pilot=pilot
     )
+    tail = tail._replace(spent=counted + tail.spent)
     return _by_tail(TailPoint(state, tail, stress), goal.cv)
 
 
@@ -265,8 +275,8 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
         doubt = max(doubt, binomial_interval(0, members)[1])
     return Answer.at(
         TailPoint(state, Tail((), "exact", reason), stress),
+        (chance - doubt, 1.0) if chance else (0.0, doubt),
         probability=chance,
-        interval=(chance - doubt, 1.0) if chance else (0.0, doubt),
         cv=0.0,
         members_cv=0.0,
         members=np.full(members if state.several else 0, chance),
@@ -293,7 +303,7 @@ def _by_counting(
     # 4.
     doubts = imprecise(count.cv, goal.cv, spent) + exact_doubts(point)
     return Answer.at(
-        point, doubts, probability=count.probability, cv=cv, interval=interval,
+        point, interval, doubts, probability=count.probability, cv=cv,
         failing_profiles=_failing_profiles(point),
     )  # fmt: skip
 
@@ -324,9 +334,7 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
             )
         # 4.
         doubts += exact_doubts(point)
-    return Answer.at(
-        point, doubts, interval=interval, failing_profiles=_failing_profiles(point)
-    )
+    return Answer.at(point, interval, doubts, failing_profiles=_failing_profiles(point))
 
 
 def _failing_profiles(point: TailPoint) -> xr.Dataset:

@@ -50,9 +50,10 @@ from stiction.problem.problem import Problem, stress_of
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import FIRST_MEMBERS, Source
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
-from stiction.reliability.answer import Answer, Probability, TargetCv, too_slow
+from stiction.reliability.answer import Answer
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
+from stiction.reliability.solving import Probability, TargetCv, too_slow
 from stiction.study.reading import check_toml, read_toml, validated
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
 from stiction.study.sweep import SWEPT, Point, Sweep, grid_axes
