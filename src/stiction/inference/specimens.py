@@ -439,10 +439,13 @@ class Tables:
         x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
         # Probability that x of a further specimen lies below each
         # point, for each field.
-        below = np.zeros((len(profiles.fields), x.size))
+        below, half = np.zeros((len(profiles.fields), x.size)), 0.5 * (x[1] - x[0])
         for number, name in enumerate(profiles.families):
             for cell, cv in enumerate(profiles.prior.cells()):
-                below += grid.mass[:, number, cell] @ masses(name, cv, grid.means, x)
+                mass = grid.mass[:, number, cell]
+                below += mass @ masses(name, cv, grid.means, x)
+                start = np.interp(x[0] - half - grid.means, *_tabulated(name, cv))
+                below[:, 0] += mass @ start
         below = np.cumsum(below, axis=1)
         # T(c) rises with c. Find the c at which
         # it is t, for each field and sample.
@@ -453,7 +456,7 @@ class Tables:
             if known.at.size > 1:
                 at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
             pairs = zip(at, below, strict=True)
-            shares = [np.interp(row, x, chance, left=0.0).sum() for row, chance in pairs]
+            shares = [np.interp(row, x, chance).sum() for row, chance in pairs]
             return float(sum(shares)) / logs.shape[2] - probability
 
         low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
