@@ -56,7 +56,7 @@ def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
     Return the stops of the path. Each onset is then inside the bracket of two load steps.
     """
     n, matrices = len(friction.peak), make_matrices(K, T, relief)
-    stops = to_the_end(begin_push(matrices, friction, start))
+    stops = to_the_end(begin_push(matrices, start))
     onsets = [stop.load for stop in stops if stop.status == Status.UNSTABLE]
     end = onsets[-1]  # there the slider slides
     loads = np.linspace(0.0, end, steps)[1:-1]
@@ -65,7 +65,7 @@ def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
         K + relief * np.outer(T, T), T, *friction, start.forces, np.abs(start.moved[:n]),
         start.moved[n:],
     )  # fmt: skip
-    contact, stop = begin_push(matrices, friction, start), PathStop(0.0, 0.0, 0.0, 0)
+    contact, stop = begin_push(matrices, start), PathStop(0.0, 0.0, 0.0, 0)
     for load in loads[loads < end]:
         while True:
             stop = follow(contact, *stop[:3], load)
@@ -122,7 +122,7 @@ def test_an_edge_closes_where_the_rest_is_unstable(seed):
     weakening = np.full(n, 0.3 * plain.K[n // 2, n // 2])
     friction = Friction(np.maximum(peak, 0.25), np.full(n, 0.2), weakening)
     start = press(make_matrices(plain.K, plain.T_p), friction, N)
-    contact = begin_push(make_matrices(plain.K, plain.T), friction, start)
+    contact = begin_push(make_matrices(plain.K, plain.T), start)
     to_the_end(contact)
     assert contact.counts[N_BORDERED_AGAIN] > 0
     compare(plain.K, plain.T, friction, start)

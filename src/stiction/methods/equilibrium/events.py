@@ -142,19 +142,58 @@ def event_table(
     With `most`, the arrays hold the first `most` events. If there are
     fewer, they are padded with NaN.
     """
-    events = events[:most]
     # Methods that lack a variable do not ask for it, so `_measures` may
     # return more.
-    measured = [_measures(problem, rows, row, *event) for event in events]
-    table = {}
+    measured = [_measures(problem, rows, row, *event) for event in events[:most]]
+    return tabulate(measured, variables, most)
+
+
+def tabulate(
+    measured: Sequence[Mapping[str, Any]],
+    variables: Mapping[str, Variable],
+    most: int | None = None,
+) -> dict[str, Array]:
+    """Return the variables of measured events as arrays, padded with NaN to `most` events."""
+    table, count = {}, len(measured)
     for name, variable in variables.items():
         # After 'event', the only other dimension is 'direction'.
         components = (2,) * (len(variable.dims) - 1)
-        table[name] = np.full((len(events) if most is None else most, *components), np.nan)
-        table[name][: len(events)] = np.reshape(
-            [values[name] for values in measured], (len(events), *components)
+        table[name] = np.full((count if most is None else most, *components), np.nan)
+        table[name][:count] = np.reshape(
+            [values[name] for values in measured], (count, *components)
         )
     return table
+
+
+def patch_measures(
+    problem: Problem, direction: Array, added: Array, drop: Array
+) -> dict[str, Any]:
+    """Return what follows from the added slip (*shape), m, and the drop of shear stress, Pa.
+
+    `direction` is the direction in which slip jumps.
+    """
+    # 1. and 2. Patch and moment.
+    # The centre and the extents follow the growth alone.
+    interface, moment = problem.interface, moment_of(problem, added)
+    inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
+    return {
+        "event_position": patch.centre,
+        "event_hypocentre": place_of(interface, int(np.argmax(direction)))
+        if direction.any()
+        else (np.nan,) * len(interface.shape),
+        "event_length": patch.area,
+        "event_start": patch.starts,
+        "event_end": np.mod(np.add(patch.starts, patch.extents), _periods(interface)),
+        "event_extent": patch.extents,
+        "event_area": patch.area,
+        "event_mean_slip": added[inside].mean(),
+        "event_largest_slip": added.max(),
+        "event_moment": moment,
+        "event_magnitude": (np.log10(moment) - 9.1) / 1.5,
+        # 3.
+        "event_area_stress_drop": drop[inside].mean(),
+        "event_slip_stress_drop": (drop * added).sum() / added.sum(),
+    }
 
 
 def _measures(
@@ -172,12 +211,8 @@ def _measures(
     )
     slips = before.slip.reshape(interface.shape), after.slip.reshape(interface.shape)
     added = slips[1] - slips[0]
-    # 1. and 2. Patch and moment.
-    # The centre and the extents follow the growth alone.
-    inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
-    moment = moment_of(problem, added)
     # 3. and 4. Stress drops and fracture energy. Waves and weakening
     # share what the mean of the stress before and after, at a constant
     # load, does on the slip beyond the residual strength.
@@ -197,21 +232,7 @@ def _measures(
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
-        "event_position": patch.centre,
-        "event_hypocentre": place_of(interface, int(np.argmax(before.direction)))
-        if before.direction.any()
-        else (np.nan,) * len(interface.shape),
-        "event_length": patch.area,
-        "event_start": patch.starts,
-        "event_end": np.mod(np.add(patch.starts, patch.extents), _periods(interface)),
-        "event_extent": patch.extents,
-        "event_area": patch.area,
-        "event_mean_slip": added[inside].mean(),
-        "event_largest_slip": added.max(),
-        "event_moment": moment,
-        "event_magnitude": (np.log10(moment) - 9.1) / 1.5,
-        "event_area_stress_drop": drop[inside].mean(),
-        "event_slip_stress_drop": (drop * added).sum() / added.sum(),
+        **patch_measures(problem, before.direction, added, drop),
         "event_energy_stress_drop": 2.0 * released / (added.sum() * interface.cell),
         "event_fracture_energy": fracture,
         **known,

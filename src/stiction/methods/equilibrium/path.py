@@ -27,7 +27,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import RealArray, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
-from stiction.methods.equilibrium.contact.solver import push_at_loads
+from stiction.methods.equilibrium.contact.solver import SliderSolver
 from stiction.methods.equilibrium.events import (
     elongation_of,
     event_table,
@@ -208,7 +208,7 @@ def equilibrium_path(
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     if isinstance(problem.specimen, Slider):
-        values, variables = push_at_loads(problem, rows, given)
+        values, variables = SliderSolver(problem).at_loads(rows, given)
     else:
         values, variables = _at_loads(problem, rows, given, method)
     variables = VARIABLES | TRAVEL | variables

@@ -37,7 +37,7 @@ could not start.
 3. Move to the kink.
    Start: border the inverse if the pivot is positive. Otherwise push the node on E.
    e has lost its overstress: take e from E, and start it.
-   Corner: change one row of M, and the inverse by an update of rank one.
+   Corner: change one row of M. If the cell slips, remove it from the inverse, and border again.
    Close or stop: remove a row and a column from the inverse. If the diagonal of the
    inverse is not positive there, the rest of S is unstable: border all of S again, open
    edges first and cells in the order in which they started, and push each node whose
@@ -60,7 +60,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.jit import jit_allocating, jit_inside
+from stiction.base.jit import jit, jit_inside
 
 Integers = NDArray[np.int64]
 
@@ -115,9 +115,9 @@ class PathStop(NamedTuple):
 class Contact(NamedTuple):
     """A slider on its path. Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
 
-    `columns` is M transposed. `difference` is mu_p - mu_r, and 0 from the corner on.
-    `slip_strength` is W, and 0 from the corner on. `counts` holds the sizes of S and E,
-    and the numbers of starts, events and bordering S again so far.
+    `columns` is M transposed. `difference` is mu_p - mu_r, and `weakening` is W. Both are 0 from
+    the corner on. `counts` holds the sizes of S and E, and how many events there were and how
+    often S was bordered again.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa
@@ -130,19 +130,18 @@ class Contact(NamedTuple):
     overstress: Array  # (m,): o, N/m
     moved: Array  # (m,): slip in either direction so far, and opening, m
     inverse: Array  # (m, m): of M_SS in its first rows and columns
-    inside: Integers  # (m,): nodes in S
+    inside: Integers  # (m,): nodes in S, in the order of their starts
     place: Integers  # (m,): position in S, or NOBODY
     stack: Integers  # (m,): nodes in E
     stacked: NDArray[np.bool_]  # (m,): whether a node is in E
-    started: Integers  # (m,): number of the last start
-    counts: Integers  # (5,)
+    counts: Integers  # (4,)
     rate: Array  # (m,): of slip and opening
     change: Array  # (m,): rate of o
     left: Array  # (m,): M_eS M_SS^-1
     right: Array  # (m,): M_SS^-1 M_Se
 
 
-N_INSIDE, N_STACKED, N_STARTED, N_EVENTS, N_BORDERED_AGAIN = range(5)
+N_INSIDE, N_STACKED, N_EVENTS, N_BORDERED_AGAIN = range(4)
 
 
 @jit_inside
@@ -153,23 +152,32 @@ def normal(edges: Array, n: int, a: int) -> float:
 
 
 @jit_inside
-def _multiply_inverse(state: Contact, k: int, product: Array) -> None:
-    """Write M_SS^-1 b (in S) to `product`, for b (k,) in `left`."""
+def _largest(values: Array) -> float:
+    """Return the largest size of values, or 0."""
+    largest = 0.0
+    for value in values:
+        largest = max(largest, abs(value))
+    return largest
+
+
+@jit_inside
+def _multiply_inverse(state: Contact, k: int) -> None:
+    """Write M_SS^-1 b (in S) to `right`, for b (k,) in `left`."""
     for t in range(k):
         row, total = state.inverse[t], 0.0
         for r in range(k):
             total += row[r] * state.left[r]
-        product[t] = total
+        state.right[t] = total
 
 
 @jit_inside
-def _border(state: Contact, node: int) -> bool:
-    """Put a node into S if its pivot is positive, and return whether it is."""
+def _start(state: Contact, node: int) -> None:
+    """Step 3: put a node into S if its pivot is positive, otherwise on E."""
     k, columns, inverse = state.counts[N_INSIDE], state.columns, state.inverse
     left, right = state.left, state.right
     for t in range(k):
         left[t] = columns[node, state.inside[t]]
-    _multiply_inverse(state, k, right)
+    _multiply_inverse(state, k)
     pivot = columns[node, node]
     for t in range(k):
         left[t] = 0.0
@@ -179,267 +187,179 @@ def _border(state: Contact, node: int) -> bool:
         for r in range(k):
             left[r] += entry * inverse[t, r]
     if not pivot > PIVOT_RTOL * abs(columns[node, node]):
-        return False
+        state.stack[state.counts[N_STACKED]], state.stacked[node] = node, True
+        state.counts[N_STACKED] += 1
+        return
     for t in range(k):
         factor = right[t] / pivot
         for r in range(k):
             inverse[t, r] += factor * left[r]
-        inverse[t, k] = -factor
-        inverse[k, t] = -left[t] / pivot
+        inverse[t, k], inverse[k, t] = -factor, -left[t] / pivot
     inverse[k, k] = 1.0 / pivot
     state.inside[k], state.place[node] = node, k
-    state.counts[N_INSIDE] = k + 1
-    return True
-
-
-@jit_inside
-def _push(state: Contact, node: int) -> None:
-    """Put a node on top of E."""
-    state.stack[state.counts[N_STACKED]] = node
-    state.stacked[node] = True
-    state.counts[N_STACKED] += 1
-
-
-@jit_inside
-def _start(state: Contact, node: int) -> None:
-    """Step 3: put a node into S, or on E."""
-    state.started[node] = state.counts[N_STARTED]
-    state.counts[N_STARTED] += 1
-    if not _border(state, node):
-        _push(state, node)
-
-
-@jit_inside
-def _starts_before(state: Contact, node: int, other: int, n: int) -> bool:
-    """Return whether a node comes before another one if S is bordered again."""
-    if (node < n) != (other < n):
-        return node >= n
-    return state.started[node] < state.started[other]
-
-
-@jit_inside
-def _border_again(state: Contact, without: int) -> None:
-    """Step 3: border S without a node, open edges first, and push what cannot start on E."""
-    state.counts[N_BORDERED_AGAIN] += 1
-    k, n, inside = state.counts[N_INSIDE], state.difference.shape[0], state.inside
-    for t in range(1, k):  # sort: edges in the order of their starts, and then cells
-        node, r = inside[t], t
-        while r > 0 and _starts_before(state, node, inside[r - 1], n):
-            inside[r] = inside[r - 1]
-            r -= 1
-        inside[r] = node
-    for t in range(k):
-        state.place[inside[t]] = NOBODY
-    state.counts[N_INSIDE] = 0
-    for t in range(k):  # S is never longer than the nodes that were read
-        node = inside[t]
-        if node != without and not _border(state, node):
-            _push(state, node)
+    state.counts[N_INSIDE] += 1
 
 
 @jit_inside
 def _remove(state: Contact, node: int) -> None:
     """Step 3: take a node out of S."""
-    inverse, place = state.inverse, state.place
-    last, t = state.counts[N_INSIDE] - 1, place[node]
-    if not inverse[t, t] > 0.0:
-        _border_again(state, node)
+    k, t, n = state.counts[N_INSIDE], state.place[node], state.difference.shape[0]
+    inverse, inside, left = state.inverse, state.inside, state.left
+    for r in range(k):
+        left[r] = inverse[t, r]
+    state.place[node] = NOBODY
+    for r in range(t + 1, k):
+        inside[r - 1] = inside[r]
+        state.place[inside[r]] = r - 1
+    if left[t] > 0.0:
+        for r in range(k):
+            factor = inverse[r, t] / left[t]
+            for c in range(k):
+                if r != t and c != t:
+                    inverse[r - (r > t), c - (c > t)] = inverse[r, c] - factor * left[c]
+        state.counts[N_INSIDE] = k - 1
         return
-    for r in range(last + 1):
-        if r != t:
-            factor = inverse[r, t] / inverse[t, t]
-            for c in range(last + 1):
-                inverse[r, c] -= factor * inverse[t, c]
-    # The last node takes its place.
-    moved = state.inside[last]
-    for r in range(last + 1):
-        inverse[r, t] = inverse[r, last]
-    for c in range(last + 1):
-        inverse[t, c] = inverse[last, c]
-    state.inside[t], place[moved] = moved, t
-    place[node] = NOBODY
-    state.counts[N_INSIDE] = last
+    state.counts[N_BORDERED_AGAIN] += 1
+    state.counts[N_INSIDE] = 0
+    for r in range(k - 1):
+        state.change[r] = inside[r]  # before the next rates are written there
+    for of_edges in (True, False):
+        for r in range(k - 1):
+            member = int(state.change[r])
+            if (member >= n) == of_edges:
+                state.place[member] = NOBODY
+                _start(state, member)
 
 
 @jit_inside
 def _pass_corner(state: Contact, a: int) -> None:
     """Step 3: the friction coefficient of a cell is mu_r, and its strength no longer falls."""
-    columns, inverse = state.columns, state.inverse
-    k, t = state.counts[N_INSIDE], state.place[a]
-    drop, W = state.difference[a], state.weakening[a]
-    state.difference[a] = state.weakening[a] = 0.0
-    state.load[a] -= drop * state.normal_load[a]
+    slips, drop, columns = state.place[a] != NOBODY, state.difference[a], state.columns
+    if slips:
+        _remove(state, a)
+    columns[a, a] += state.weakening[a]
     for s in range(columns.shape[0]):
         columns[s, a] -= drop * state.normal_stiffness[a, s]
-    columns[a, a] += W
-    if t == NOBODY:
-        return
-    # (M + e c')^-1 = M^-1 - M^-1 e c' M^-1/(1 + c' M^-1 e), with c' = change of the row
-    left, right = state.left, state.right
-    for r in range(k):
-        left[r] = 0.0
-    pivot = 1.0
-    for s in range(k):
-        node = state.inside[s]
-        entry = -drop * state.normal_stiffness[a, node] + (W if node == a else 0.0)
-        pivot += entry * inverse[s, t]
-        right[s] = inverse[s, t]
-        for r in range(k):
-            left[r] += entry * inverse[s, r]
-    if not pivot > 0.0:
-        _border_again(state, NOBODY)
-        return
-    for s in range(k):
-        factor = right[s] / pivot
-        for r in range(k):
-            inverse[s, r] -= factor * left[r]
+    state.load[a] -= drop * state.normal_load[a]
+    state.difference[a] = state.weakening[a] = 0.0
+    if slips:
+        _start(state, a)
 
 
 @jit_inside
 def _find_rates(state: Contact, e: int) -> int:
     """Steps 1 and 2: write the rates of x and o. Return a cell that stops, or NOBODY."""
     columns, rate, change = state.columns, state.rate, state.change
-    k, m, n = state.counts[N_INSIDE], rate.shape[0], state.difference.shape[0]
-    for t in range(k):
-        node = state.inside[t]
-        state.left[t] = state.load[node] if e == NOBODY else -columns[e, node]
-    _multiply_inverse(state, k, state.right)
-    most = 0.0
-    for t in range(k):
-        most = max(most, abs(state.right[t]))
-    if e == NOBODY:
-        least, stopping = -RATE_RTOL * most, NOBODY
-        for t in range(k):
-            if state.inside[t] < n and state.right[t] < least:
-                least, stopping = state.right[t], state.inside[t]
-        if stopping != NOBODY:
-            return stopping
+    k, m, inside = state.counts[N_INSIDE], state.rate.shape[0], state.inside
     for i in range(m):
         rate[i] = 0.0
         change[i] = state.load[i] if e == NOBODY else -columns[e, i]
     for t in range(k):
-        speed, column = state.right[t], columns[state.inside[t]]
-        rate[state.inside[t]] = speed
+        state.left[t] = change[inside[t]]
+    _multiply_inverse(state, k)
+    least, stopping = -RATE_RTOL * _largest(state.right[:k]), NOBODY
+    for t in range(k):
+        speed, column = state.right[t], columns[inside[t]]
+        rate[inside[t]] = speed
+        if speed < least and inside[t] < state.difference.shape[0]:
+            least, stopping = speed, inside[t]
         for i in range(m):
             change[i] -= speed * column[i]
     for t in range(k):
-        change[state.inside[t]] = 0.0
+        change[inside[t]] = 0.0
     if e != NOBODY:
         rate[e] = 1.0
-    return NOBODY
+        return NOBODY
+    return stopping
+
+
+@jit_inside
+def _nearer(kink: Kink, gap: float, speed: float, least: float, node: int, kind: int) -> Kink:
+    """Return a kink, or another one that comes earlier, where a gap closes at a speed."""
+    if speed > least and max(gap, 0.0) < kink.step * speed:
+        return Kink(max(gap, 0.0) / speed, node, kind)
+    return kink
 
 
 @jit_inside
 def _nearest_kink(state: Contact, e: int, longest: float) -> Kink:
     """Step 2: return the nearest kink within the longest step."""
-    rate, change, overstress = state.rate, state.change, state.overstress
-    m, n = rate.shape[0], state.difference.shape[0]
-    fastest = forces = 0.0
-    for i in range(m):
-        fastest = max(fastest, abs(rate[i]))
-        if e == NOBODY:
-            forces = max(forces, abs(state.load[i]))
-    step, node, kind = longest, NOBODY, Kind.NOTHING
-    for i in range(m):
+    rate, change, overstress, moved = state.rate, state.change, state.overstress, state.moved
+    n, difference, weakening = state.difference.shape[0], state.difference, state.weakening
+    fastest = _largest(rate)
+    forces = _largest(state.load) if e == NOBODY else 0.0
+    kink = Kink(longest, NOBODY, Kind.NOTHING)
+    for i in range(rate.shape[0]):
         stiffness = abs(state.columns[i, i])
         least = RATE_RTOL * (stiffness * fastest + forces)
-        # Starts of resting cells and closed edges, and the end of the overstress of e.
         if i == e:
-            if -change[i] > max(least, PIVOT_RTOL * stiffness):
-                reach = max(overstress[i], 0.0) / -change[i]
-                if reach < step:
-                    step, node, kind = reach, i, Kind.AT_STRENGTH
-        elif state.place[i] == NOBODY and not state.stacked[i] and change[i] > least:
-            reach = max(-overstress[i], 0.0) / change[i]
-            if reach < step:
-                step, node, kind = reach, i, Kind.START
-        # Corners of cells, also of those that rest after slip, and edges that close.
-        if i < n:
-            if state.difference[i] > 0.0 and (rate[i] != 0.0 or state.moved[i] > 0.0):
-                falls = state.difference[i] * normal(change, n, i)
-                falls += state.weakening[i] * rate[i]
-                if falls > least:
-                    reach = max(_above_corner(state, i), 0.0) / falls
-                    if reach < step:
-                        step, node, kind = reach, i, Kind.CORNER
-        elif state.place[i] != NOBODY and rate[i] < -RATE_RTOL * fastest:
-            reach = max(state.moved[i], 0.0) / -rate[i]
-            if reach < step:
-                step, node, kind = reach, i, Kind.CLOSE
-    return Kink(step, node, kind)
+            least_pivot = max(least, PIVOT_RTOL * stiffness)
+            kink = _nearer(kink, overstress[i], -change[i], least_pivot, i, Kind.AT_STRENGTH)
+        elif state.place[i] == NOBODY and not state.stacked[i]:
+            kink = _nearer(kink, -overstress[i], change[i], least, i, Kind.START)
+        elif i >= n and not state.stacked[i]:
+            kink = _nearer(kink, moved[i], -rate[i], RATE_RTOL * fastest, i, Kind.CLOSE)
+        # Also cells that rest after slip.
+        if i < n and difference[i] > 0.0 and (rate[i] != 0.0 or moved[i] > 0.0):
+            above = -difference[i] * normal(overstress, n, i) - weakening[i] * moved[i]
+            falls = difference[i] * normal(change, n, i) + weakening[i] * rate[i]
+            kink = _nearer(kink, above, falls, least, i, Kind.CORNER)
+    return kink
 
 
 @jit_inside
-def _above_corner(state: Contact, a: int) -> float:
-    """Return by how much the strength of a cell is above mu_r N, N/m."""
-    pressed = -normal(state.overstress, state.difference.shape[0], a)
-    return state.difference[a] * pressed - state.weakening[a] * state.moved[a]
+def _pop(state: Contact, e: int) -> None:
+    """Take the top e from E."""
+    state.overstress[e] = min(state.overstress[e], 0.0)
+    state.stacked[e] = False
+    state.counts[N_STACKED] -= 1
 
 
-@jit_inside
-def _move(state: Contact, step: float) -> float:
-    """Step 3: move to the kink, and return by how much slip and opening relieve the force."""
-    relieved = 0.0
-    for i in range(state.rate.shape[0]):
-        state.overstress[i] += step * state.change[i]
-        state.moved[i] += step * state.rate[i]
-        relieved += state.relief[i] * step * state.rate[i]
-    return relieved
-
-
-@jit_allocating
+@jit
 def follow(state: Contact, load: float, force: float, peak: float, target: float) -> PathStop:
     """Follow the path from a load (N/m) to a target, an instability or an arrest."""
-    m = state.rate.shape[0]
-    while state.counts[N_EVENTS] < MAX_EVENTS_PER_NODE * m:
-        state.counts[N_EVENTS] += 1
-        held = state.counts[N_STACKED] > 0
+    counts, overstress, moved = state.counts, state.overstress, state.moved
+    while counts[N_EVENTS] < MAX_EVENTS_PER_NODE * moved.shape[0]:
+        counts[N_EVENTS] += 1
+        held = counts[N_STACKED] > 0
         # 1.
-        e = state.stack[state.counts[N_STACKED] - 1] if held else NOBODY
-        if held and state.overstress[e] < -OVERSTRESS_RTOL * np.abs(state.overstress).max():
-            # Others have taken its overstress away meanwhile.
-            state.stacked[e] = False
-            state.counts[N_STACKED] -= 1
-            if state.counts[N_STACKED] == 0:
-                return PathStop(load, force, peak, Status.ARRESTED)
-            continue
+        e = state.stack[counts[N_STACKED] - 1] if held else NOBODY
         stopping = _find_rates(state, e)
         if stopping != NOBODY:
             _remove(state, stopping)
-            if state.counts[N_STACKED] > 0:
-                _find_rates(state, state.stack[state.counts[N_STACKED] - 1])
-                return PathStop(load, force, peak, Status.UNSTABLE)
-            continue
-        # 2.
-        kink = _nearest_kink(state, e, np.inf if held else target - load)
-        if kink.step == np.inf:
-            return PathStop(load, force, peak, Status.SLIDING)
-        # 3.
-        force -= _move(state, kink.step)
-        if not held:
-            load += kink.step
-            force += kink.step
-        peak = max(peak, force)
-        if kink.kind == Kind.NOTHING:
-            return PathStop(target, force, peak, Status.AT_TARGET)
-        i = kink.node
-        if kink.kind == Kind.CORNER:
-            _pass_corner(state, i)
-        elif kink.kind == Kind.CLOSE:
-            state.moved[i] = 0.0
-            _remove(state, i)
-        elif kink.kind == Kind.START:
-            state.overstress[i] = 0.0
-            _start(state, i)
+        elif held and overstress[e] < -OVERSTRESS_RTOL * _largest(overstress):
+            _pop(state, e)  # others have taken its overstress away meanwhile
         else:
-            state.overstress[i] = 0.0
-            state.counts[N_STACKED] -= 1
-            state.stacked[i] = False
-            _start(state, i)
+            # 2.
+            kink = _nearest_kink(state, e, np.inf if held else target - load)
+            if kink.step == np.inf:
+                return PathStop(load, force, peak, Status.SLIDING)
+            # 3.
+            rise = 0.0 if held else kink.step
+            load += rise
+            force += rise
+            for i in range(moved.shape[0]):
+                overstress[i] += kink.step * state.change[i]
+                moved[i] += kink.step * state.rate[i]
+                force -= kink.step * state.relief[i] * state.rate[i]
+            peak = max(peak, force)
+            i = kink.node
+            if kink.kind == Kind.NOTHING:
+                return PathStop(target, force, peak, Status.AT_TARGET)
+            if kink.kind == Kind.CORNER:
+                _pass_corner(state, i)
+            elif kink.kind == Kind.CLOSE:
+                moved[i] = 0.0
+                _remove(state, i)
+            else:
+                overstress[i] = 0.0
+                if i == e:
+                    _pop(state, e)
+                _start(state, i)
         # 4.
-        if held and state.counts[N_STACKED] == 0:
+        if held and counts[N_STACKED] == 0:
             return PathStop(load, force, peak, Status.ARRESTED)
-        if not held and state.counts[N_STACKED] > 0:
-            _find_rates(state, state.stack[state.counts[N_STACKED] - 1])  # where slip jumps
+        if not held and counts[N_STACKED] > 0:
+            _find_rates(state, state.stack[counts[N_STACKED] - 1])  # where slip jumps
             return PathStop(load, force, peak, Status.UNSTABLE)
     return PathStop(load, force, peak, Status.GIVEN_UP)

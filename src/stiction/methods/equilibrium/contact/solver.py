@@ -1,8 +1,8 @@
 """Onsets, events and paths of sliders, as `Equilibrium` gives them.
 
 Loads and forces are divided by the length of the interface: the mean shear stress, Pa. The load
-D is the push that the machine would exert without slip. Slip counts from the beginning of the
-push, and opening is the present opening. The travel of the push is U = F/C + T'x (`Rig`),
+D is the push that the machine would exert without slip. Slip and travel count from the beginning
+of the push, and opening is the present opening. The travel of the push is U = F/C + T'x (`Rig`),
 without the constant part from the pressing.
 """
 
@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import warn_accuracy, warn_of_samples
 from stiction.base.variables import Variable
-from stiction.methods.equilibrium.contact.path import N_STACKED, Contact, Status, follow
+from stiction.elasticity.rig import on_cells
+from stiction.methods.equilibrium.contact.path import N_STACKED, Status, follow
 from stiction.methods.equilibrium.contact.stages import (
     Friction,
-    averages,
     begin_push,
+    forces_of,
     make_matrices,
     press,
-    strengths,
 )
 from stiction.methods.equilibrium.events import (
-    MIN_ADDED_SLIP,
     elongation_of,
     event_variables,
-    moment_of,
+    patch_measures,
+    tabulate,
 )
-from stiction.methods.equilibrium.patches import critical_patch, largest_patch, patches_of
+from stiction.methods.equilibrium.patches import critical_patch, patches_of
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.resolution import warn_if_coarse
@@ -48,148 +48,35 @@ WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
 STRENGTH_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
 MIN_NODES = 16
-"""Nodes in a nucleation length without a warning about the bonded corner."""
+"""Nodes in a nucleation length without a warning about the ends of the slider."""
 MIN_TURNING = 1e-6
 """Opening over slip of a slider that topples, in the motion that does not end."""
 
 
 class PushState(NamedTuple):
-    """A slider under a load D and a force F (N/m)."""
+    """A slider under a load D and a force F (N/m), with arrays over cells, then edges (m,)."""
 
     load: float
     force: float
-    slip: Array  # (n,): slip of the push, m
-    opening: Array  # (n + 1,): of the edges, m
-    shear: Array  # (n,): shear force of the cells, N/m
-    pressing: Array  # (n + 1,): normal force of the edges, N/m
-    residual: bool  # whether a cell has reached its residual strength
+    moved: Array  # slip of the push, and opening, m
+    forces: Array  # shear force, and tension of edges, N/m
     direction: Array  # (n,): rate of slip
-
-
-class PushEvent(NamedTuple):
-    """An instability, before and after slip."""
-
-    before: PushState
-    after: PushState
+    residual: bool  # whether a cell has reached its residual strength
 
 
 class Push(NamedTuple):
     """The push of a sample until it slides. Without an instability, `first` is None.
 
-    `last` is the last equilibrium, and `peak` the largest force (N/m). `known` is false if the path
-    was not followed to its end.
+    `last` is the last equilibrium, and `peak` the largest force (N/m). `events` holds the states
+    before and after each. `known` is false if the path was not followed to its end.
     """
 
     first: PushState | None
     last: PushState
     peak: float
-    events: list[PushEvent]
+    events: list[tuple[PushState, PushState]]
     known: bool
     topples: bool
-
-
-class SliderPaths:
-    """The pushes of samples on the rig of a problem. It is thread-safe."""
-
-    def __init__(self, problem: Problem) -> None:
-        rig, slider = problem.rig, problem.specimen
-        machine: float = slider.machine  # type: ignore[union-attr]
-        relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
-        self.problem, self.C, self.T, self.relief = problem, rig.C, rig.T, relief
-        self.for_pressing = make_matrices(rig.K, rig.T_p)
-        self.for_push = make_matrices(rig.K, rig.T, relief)
-
-    def friction(self, rows: Sample, row: int) -> Friction:
-        """Return the law of a sample on the cells."""
-        pressure, spacing = rows.normal_pressure[row], self.problem.interface.spacing
-        peak, residual = rows.strength[row] / pressure, rows.residual_strength[row] / pressure
-        return Friction(peak, residual, rows.weakening_rate[row] * spacing)
-
-    def begin(self, rows: Sample, row: int, friction: Friction | None = None) -> "SliderPath":
-        """Return a sample that is pressed and not yet pushed."""
-        friction = friction or self.friction(rows, row)
-        force = float(rows.normal_pressure[row].mean()) * self.problem.interface.measure
-        start = press(self.for_pressing, friction, force)
-        return SliderPath(self, friction, begin_push(self.for_push, friction, start))
-
-    def travel(self, state: PushState) -> float:
-        """Return the travel of the push since its beginning, m."""
-        n, T = len(state.slip), self.T
-        return float(state.force / self.C + T[:n] @ state.slip + T[n:] @ state.opening)
-
-
-class SliderPath:
-    """A slider on its path. A path only goes on."""
-
-    def __init__(self, paths: SliderPaths, friction: Friction, contact: Contact) -> None:
-        self.paths, self.friction, self.contact = paths, friction, contact
-        self.start = contact.moved.copy()
-        self.load = self.force = self.peak = 0.0
-        self.status = int(Status.AT_TARGET)
-
-    def move(self, target: float = np.inf) -> int:
-        """Go on to a load, or to the next instability or arrest. Return the `Status`."""
-        stop = follow(self.contact, self.load, self.force, self.peak, target)
-        self.load, self.force, self.peak, status = stop
-        self.status = int(status)
-        return self.status
-
-    def state(self) -> PushState:
-        """Return a copy of the present state."""
-        contact, n = self.contact, len(self.friction.peak)
-        moved, overstress = contact.moved, contact.overstress
-        shear = overstress[:n] + strengths(self.friction, contact)
-        at_residual = (contact.difference == 0.0) & (
-            self.friction.peak > self.friction.residual
-        )
-        return PushState(
-            self.load, self.force, moved[:n] - self.start[:n], moved[n:].copy(), shear,
-            -overstress[n:], bool(at_residual.any()), np.maximum(contact.rate[:n], 0.0),
-        )  # fmt: skip
-
-
-def follow_push(path: SliderPath) -> Push:
-    """Follow a sample until it slides."""
-    events: list[PushEvent] = []
-    first: PushState | None = None
-    while path.move() == Status.UNSTABLE:
-        before = path.state()
-        first = first or before
-        if path.move() != Status.ARRESTED:
-            break
-        events.append(PushEvent(before, path.state()))
-    unstable = path.contact.counts[N_STACKED] > 0  # otherwise it slides stably
-    last = before if unstable else path.state()
-    rate, n = path.contact.rate, len(last.slip)
-    turns = bool(np.abs(rate[n:]).max() > MIN_TURNING * np.abs(rate[:n]).max())
-    known = path.status == Status.SLIDING
-    return Push(first, last, path.peak, events, known, known and unstable and turns)
-
-
-def push_event(paths: SliderPaths, event: PushEvent) -> dict[str, float]:
-    """Return the variables of an event, as `events.event_variables` names them."""
-    problem, (before, after) = paths.problem, event
-    interface, length = problem.interface, problem.interface.measure
-    added = after.slip - before.slip
-    inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
-    drop = (before.shear - after.shear) / interface.spacing
-    travel, stress = paths.travel(before), before.force / length
-    return {
-        "event_load": before.load / length,
-        "event_stress": stress,
-        "event_position": patch.centre[0],
-        "event_length": patch.area,
-        "event_mean_slip": float(added[inside].mean()),
-        "event_largest_slip": float(added.max()),
-        "event_moment": moment_of(problem, added),
-        "event_area_stress_drop": float(drop[inside].mean()),
-        "event_slip_stress_drop": float((drop * added).sum() / added.sum()),
-        "event_stress_drop": (before.force - after.force) / length,
-        "event_travel": travel,
-        "event_crosshead_travel": travel + elongation_of(problem, stress),
-        "event_travel_step": paths.travel(after) - travel,
-        "event_start": float(np.argmax(inside)) * interface.spacing,
-    }
 
 
 def push_variables(interface: Interface) -> dict[str, Variable]:
@@ -198,23 +85,57 @@ def push_variables(interface: Interface) -> dict[str, Variable]:
     return {name: variables[name] for name in variables if name not in WITH_FIXED_PRESSURE}
 
 
-def push_event_table(
-    paths: SliderPaths, events: list[PushEvent], most: int | None = None
-) -> dict[str, Array]:
-    """Return the variables of events as arrays, padded with NaN to `most` events."""
-    measured = [push_event(paths, event) for event in events[:most]]
-    table: dict[str, Array] = {}
-    for name in push_variables(paths.problem.interface):
-        table[name] = np.full(len(events) if most is None else most, np.nan)
-        table[name][: len(measured)] = [values[name] for values in measured]
-    return table
+class SliderPath:
+    """A slider on its path, which only goes on."""
+
+    def __init__(self, solver: "SliderSolver", friction: Friction, force: float) -> None:
+        start = press(solver.for_pressing, friction, force)
+        self.friction, self.contact = friction, begin_push(solver.for_push, start)
+        self.before = np.abs(start.moved)
+        self.before[len(friction.peak) :] = 0.0
+        self.load = self.force = self.peak = 0.0
+
+    def move(self, target: float = np.inf) -> int:
+        """Go on to a load, or to the next instability or arrest. Return the `Status`."""
+        stop = follow(self.contact, self.load, self.force, self.peak, target)
+        self.load, self.force, self.peak, status = stop
+        return int(status)
+
+    def state(self) -> PushState:
+        """Return a copy of the present state."""
+        contact, law = self.contact, self.friction
+        direction = np.maximum(contact.rate[: len(law.peak)], 0.0)
+        at_residual = bool(((contact.difference == 0.0) & (law.peak > law.residual)).any())
+        moved, forces = contact.moved - self.before, forces_of(contact, law)
+        return PushState(self.load, self.force, moved, forces, direction, at_residual)
+
+    def follow(self) -> Push:
+        """Follow the path until the slider slides."""
+        events, first = [], None
+        while (status := self.move()) == Status.UNSTABLE:
+            last = self.state()
+            first = first or last
+            if (status := self.move()) != Status.ARRESTED:
+                break
+            events.append((last, self.state()))
+        unstable = self.contact.counts[N_STACKED] > 0  # otherwise it slides stably
+        last = last if unstable else self.state()
+        rate, n = np.abs(self.contact.rate), len(self.friction.peak)
+        known = status == Status.SLIDING
+        turns = bool(rate[n:].max() > MIN_TURNING * rate[:n].max())
+        return Push(first, last, self.peak, events, known, known and unstable and turns)
 
 
 class SliderSolver:
     """Solver for samples of a slider by `Equilibrium` with given options. It is thread-safe."""
 
-    def __init__(self, problem: Problem, options: Any) -> None:
-        self.problem, self.options, self.paths = problem, options, SliderPaths(problem)
+    def __init__(self, problem: Problem, options: Any = None) -> None:
+        rig, machine = problem.rig, problem.specimen.machine  # type: ignore[union-attr]
+        relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
+        self.problem, self.options, self.rig = problem, options, rig
+        self.length = problem.interface.measure
+        self.for_pressing = make_matrices(rig.K, rig.T_p)
+        self.for_push = make_matrices(rig.K, rig.T, relief)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
@@ -225,108 +146,120 @@ class SliderSolver:
             "the stress at the ends of the slider is singular. Static friction is off by about"
             " 0.1 %, and the first instability by 1 %, at 16 nodes",
         )
-        table, flags = [], []
-        for row in range(rows.samples):
-            push = follow_push(self.paths.begin(rows, row))
-            flags.append((push.known, push.topples))
-            table.append(self._values(rows, row, push))
-        known, topples = np.array(flags).T
+        pushes = [self.path(rows, row).follow() for row in range(rows.samples)]
+        table = [self._values(rows, row, push) for row, push in enumerate(pushes)]
         warn_of_samples(
             "the path was not followed to its end in {samples}: static friction is a lower bound",
-            ~known,
+            np.array([not push.known for push in pushes]),
         )
         warn_of_samples(
             "the slider topples before it slides in {samples}: static friction is the force at"
             " which it topples. Push lower",
-            topples,
+            np.array([push.topples for push in pushes]),
         )
         warn_of_samples(
             "no patch becomes unstable in {samples}: the machine is so stiff that the slider slides"
             " stably, and first_instability is NaN",
-            np.array([np.isnan(row["first_instability"]) for row in table]),
+            np.array([push.first is None for push in pushes]),
         )
-        return {name: np.array([row[name] for row in table]) for name in table[0]}
+        return {name: np.array([values[name] for values in table]) for name in table[0]}
+
+    def path(self, rows: Sample, row: int, node: int = 0, step: float = 0.0) -> SliderPath:
+        """Return a sample before the push, whose friction coefficient has a step at a node."""
+        pressure, spacing = rows.normal_pressure[row], self.problem.interface.spacing
+        peak, residual = rows.strength[row] / pressure, rows.residual_strength[row] / pressure
+        peak[node] += step
+        friction = Friction(peak, residual, rows.weakening_rate[row] * spacing)
+        return SliderPath(self, friction, float(pressure.mean()) * self.length)
 
     def _values(self, rows: Sample, row: int, push: Push) -> dict[str, Any]:
-        interface, length = self.problem.interface, self.problem.interface.measure
-        first, last = push.first, push.last
-        nothing = np.zeros(interface.size)
-        patch = critical_patch(nothing if first is None else first.direction, interface)
-        sliding = critical_patch(last.direction, interface)
-        slip = nothing if first is None else first.slip
+        interface, first, last = self.problem.interface, push.first, push.last
+        n = interface.size
+        direction = np.zeros(n) if first is None else first.direction
+        slip = np.zeros(n) if first is None else first.moved[:n]
+        patch = critical_patch(direction, interface)
         values: dict[str, Any] = {
-            "critical_load": last.load / length,
-            "critical_stress": push.peak / length,
-            "first_instability": np.nan if first is None else first.force / length,
+            "critical_load": last.load / self.length,
+            "critical_stress": push.peak / self.length,
+            "first_instability": np.nan if first is None else first.force / self.length,
             "certificate_gap": np.nan,
             "critical_position": patch.centre[0],
             "critical_patch_length": patch.area,
-            "sliding_position": sliding.centre[0],
+            "sliding_position": critical_patch(last.direction, interface).centre[0],
             "slip_patches": patches_of(slip, interface),
             "arrested_events": len(push.events),
             "residual_reached": last.residual,
-            "open_fraction": float(np.trapezoid(last.opening > 0.0) / interface.size),
+            "open_fraction": float(np.trapezoid(last.moved[n:] > 0.0) / n),
         }
         if self.options.slip:
             values["slip"] = slip
         if self.options.sensitivity:
-            values["sensitivity"] = self._sensitivity(rows, row, first)
+            # Between events paths are straight, so a small step gives the exact derivative.
+            values["sensitivity"] = np.full(n, np.nan)
+            for node in range(n if first else 0):
+                path = self.path(rows, row, node, STRENGTH_STEP)
+                path.move()
+                rise = (path.force - first.force) / self.length  # type: ignore[union-attr]
+                step = STRENGTH_STEP * rows.normal_pressure[row, node]
+                values["sensitivity"][node] = rise / step
         if most := self.options.events:
-            values |= push_event_table(self.paths, push.events, most)
+            values |= self.event_table(push, most)
         return values
 
-    def _sensitivity(self, rows: Sample, row: int, first: PushState | None) -> Array:
-        """Return derivatives of the first instability as difference quotients.
+    def travels(self, state: PushState) -> dict[str, float]:
+        """Return the mean stress (Pa), and the travels of the push and of the machine (m)."""
+        stress, travel = state.force / self.length, state.force / self.rig.C
+        travel += float(self.rig.T @ state.moved)
+        far = travel + elongation_of(self.problem, stress)
+        return {"mean_stress": stress, "travel": travel, "crosshead_travel": far}
 
-        Between events paths are straight, so a small step gives the exact derivative.
-        """
-        derivative = np.full(self.problem.interface.size, np.nan)
-        if first is None:
-            return derivative
-        friction, length = self.paths.friction(rows, row), self.problem.interface.measure
-        for node in range(derivative.size):
-            peak = friction.peak.copy()
-            peak[node] += STRENGTH_STEP
-            path = self.paths.begin(rows, row, friction._replace(peak=peak))
-            path.move()
-            step = STRENGTH_STEP * float(rows.normal_pressure[row, node])
-            derivative[node] = (path.force - first.force) / length / step
-        return derivative
+    def event_table(self, push: Push, most: int | None = None) -> dict[str, Array]:
+        """Return the variables of events as arrays, padded with NaN to `most` events."""
+        measured, interface = [], self.problem.interface
+        for before, after in push.events[:most]:
+            added = (after.moved - before.moved)[: interface.size]
+            drop = (before.forces - after.forces)[: interface.size] / interface.spacing
+            stress, travel, far = self.travels(before).values()
+            values = patch_measures(self.problem, before.direction, added, drop)
+            measured.append(values | {
+                "event_load": before.load / self.length,
+                "event_stress": stress,
+                "event_stress_drop": stress - after.force / self.length,
+                "event_travel": travel,
+                "event_crosshead_travel": far,
+                "event_travel_step": self.travels(after)["travel"] - travel,
+            })  # fmt: skip
+        return tabulate(measured, push_variables(interface), most)
 
-
-def push_at_loads(
-    problem: Problem, rows: Sample, loads: Array
-) -> tuple[dict[str, Array], dict[str, Variable]]:
-    """Return values and further variables of `equilibrium_path` at rising loads, Pa."""
-    paths, interface = SliderPaths(problem), problem.interface
-    count, length, spacing = loads.size, interface.measure, interface.spacing
-    # The path to sliding gives all events, and a second path the states at the loads.
-    push, path = follow_push(paths.begin(rows, 0)), paths.begin(rows, 0)
-    narrow = ("mean_stress", "travel", "crosshead_travel")
-    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(narrow, (count,))
-    shapes |= dict.fromkeys(("slip", "stress", *ON_PATH), (count, interface.size))
-    values = {name: np.full(shape, np.nan) for name, shape in shapes.items()}
-    sliding = loads * length > push.last.load
-    for i in np.flatnonzero(~sliding):
-        while path.move(loads[i] * length) in (Status.UNSTABLE, Status.ARRESTED):
-            pass
-        state = path.state()
-        stress, travel = state.force / length, paths.travel(state)
-        at_load = {
-            "slip": state.slip,
-            "stress": state.shear / spacing,
-            "pressure": averages(state.pressing) / spacing,
-            "opening": 0.5 * (state.opening[:-1] + state.opening[1:]),
-            "mean_stress": stress,
-            "travel": travel,
-            "crosshead_travel": travel + elongation_of(problem, stress),
-        }
-        for name, value in at_load.items():
-            values[name][i] = value
-    if not push.known:
-        warn_accuracy(f"the path was not followed beyond {push.last.load / length:g} Pa")
-    at_events = [event.before.load / length for event in push.events]
-    values |= {"arrested_events": np.searchsorted(at_events, loads), "sliding": sliding}
-    values |= push_event_table(paths, push.events)
-    variables = {name: along(interface, variable) for name, variable in ON_PATH.items()}
-    return values, variables | push_variables(interface)
+    def at_loads(
+        self, rows: Sample, loads: Array
+    ) -> tuple[dict[str, Array], dict[str, Variable]]:
+        """Return values and further variables of `equilibrium_path` at rising loads, Pa."""
+        interface, n = self.problem.interface, self.problem.interface.size
+        # The path to sliding gives all events, and a second path the states at the loads.
+        push, path = self.path(rows, 0).follow(), self.path(rows, 0)
+        if not push.known:
+            warn_accuracy(
+                f"the path was not followed beyond {push.last.load / self.length:g} Pa"
+            )
+        sliding, states = loads * self.length > push.last.load, []
+        for load in loads[~sliding]:
+            while path.move(load * self.length) in (Status.UNSTABLE, Status.ARRESTED):
+                pass
+            state = path.state()
+            states.append(self.travels(state) | {
+                "slip": state.moved[:n],
+                "stress": state.forces[:n] / interface.spacing,
+                "pressure": on_cells(-state.forces[n:]) / interface.spacing,
+                "opening": 0.5 * (state.moved[n:-1] + state.moved[n + 1 :]),
+            })  # fmt: skip
+        values = self.event_table(push)
+        wide = {"slip", "stress", *ON_PATH}
+        for name in (*wide, "mean_stress", "travel", "crosshead_travel"):
+            values[name] = np.full((loads.size, *([n] if name in wide else [])), np.nan)
+            for i, at_load in enumerate(states):
+                values[name][i] = at_load[name]
+        starts = [before.load / self.length for before, _ in push.events]
+        values |= {"arrested_events": np.searchsorted(starts, loads), "sliding": sliding}
+        variables = {name: along(interface, variable) for name, variable in ON_PATH.items()}
+        return values, variables | push_variables(interface)

@@ -26,12 +26,13 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.methods.equilibrium.contact import path
+from stiction.elasticity.rig import on_cells
 from stiction.methods.equilibrium.contact.path import (
     N_INSIDE,
     N_STACKED,
     NOBODY,
     Contact,
+    PathStop,
     Status,
     follow,
 )
@@ -57,20 +58,12 @@ class Matrices(NamedTuple):
     relief: Array  # (m,): k' T
 
 
-def averages(edges: Array) -> Array:
-    """Return Q P along the first axis: (n + 1, ...) on edges to (n, ...) on cells."""
-    cells = 0.5 * (edges[:-1] + edges[1:])
-    cells[0] += 0.5 * edges[0]
-    cells[-1] += 0.5 * edges[-1]
-    return np.asarray(cells)
-
-
 def make_matrices(K: Array, T: Array, relief: float = 0.0) -> Matrices:
     """Return the matrices of a rig whose force falls by `relief` T'x (Pa)."""
     n = len(T) // 2
     if relief > 0.0:
         K = K + relief * np.outer(T, T)
-    return Matrices(np.ascontiguousarray(K.T), averages(K[n:]), T, relief * T)
+    return Matrices(np.ascontiguousarray(K.T), on_cells(K[n:]), T, relief * T)
 
 
 def make_contact(rig: Matrices, friction: Friction, overstress: Array, moved: Array) -> Contact:
@@ -80,21 +73,22 @@ def make_contact(rig: Matrices, friction: Friction, overstress: Array, moved: Ar
     equal `friction.residual`.
     """
     n, m = len(friction.peak), len(moved)
-    columns = rig.transposed.copy()
-    columns[:, :n] += friction.peak * rig.normal.T
-    falling = friction.peak > friction.residual
-    weakening = np.where(falling, friction.weakening, 0.0)
-    columns.flat[: n * (m + 1) : m + 1] -= weakening
-    normal_load = averages(rig.forces[n:])
-    load = rig.forces.copy()
-    load[:n] += friction.peak * normal_load
     difference = friction.peak - friction.residual
-    integers = np.zeros((3, m), np.int64)
-    place = np.full(m, NOBODY)
+    weakening = np.where(difference > 0.0, friction.weakening, 0.0)
+    columns, load, normal_load = (
+        rig.transposed.copy(),
+        rig.forces.copy(),
+        on_cells(rig.forces[n:]),
+    )
+    columns[:, :n] += friction.peak * rig.normal.T
+    columns.flat[: n * (m + 1) : m + 1] -= weakening
+    load[:n] += friction.peak * normal_load
+    inside, stack = np.zeros((2, m), np.int64)
+    place, counts = np.full(m, NOBODY), np.zeros(4, np.int64)
     state = Contact(
-        columns, load, rig.relief, rig.normal, normal_load, difference, weakening,
-        overstress, moved, np.empty((m, m)), integers[0], place, integers[1],
-        np.zeros(m, np.bool_), integers[2], np.zeros(5, np.int64), *np.empty((4, m)),
+        columns, load, rig.relief, rig.normal, normal_load, difference, weakening, overstress,
+        moved, np.empty((m, m)), inside, place, stack, np.zeros(m, np.bool_), counts,
+        *np.empty((4, m)),
     )  # fmt: skip
     opened = n + np.flatnonzero(moved[n:] > 0.0)
     if opened.size:
@@ -107,35 +101,34 @@ def make_contact(rig: Matrices, friction: Friction, overstress: Array, moved: Ar
 
 
 class Pressed(NamedTuple):
-    """A slider after the pressing: forces of cells and edges (m,), slip and opening (m,)."""
+    """A slider after the pressing."""
 
-    forces: Array  # shear force, and tension of edges, N/m
-    moved: Array  # slip with its sign, and opening, m
+    forces: Array  # (m,): shear force of cells, and tension of edges, N/m
+    moved: Array  # (m,): slip with its sign, and opening, m
+    friction: Friction  # the peak is the residual where it has been reached
 
 
 def press(rig: Matrices, friction: Friction, force: float) -> Pressed:
     """Steps 1 and 2: return a slider under a normal force (N/m). `rig.forces` is T_p."""
-    n = len(friction.peak)
-    linear = rig.forces * force
-    pressure = averages(-linear[n:])
-    if np.all(linear[n:] < 0.0) and np.all(np.abs(linear[:n]) < friction.peak * pressure):
-        return Pressed(linear, np.zeros_like(linear))
+    linear, n = rig.forces * force, len(friction.peak)
+    strength = friction.peak * on_cells(-linear[n:])
+    if np.all(linear[n:] < 0.0) and np.all(np.abs(linear[:n]) < strength):
+        return Pressed(linear, np.zeros_like(linear), friction)
     # 1. The same with slip along the shear.
-    sign = np.ones(len(linear))
-    sign[:n] = np.where(linear[:n] < 0.0, -1.0, 1.0)
+    sign = np.where(linear < 0.0, -1.0, 1.0)
+    sign[n:] = 1.0
     along = Matrices(
         rig.transposed * sign * sign[:, None], rig.normal * sign, rig.forces * sign, rig.relief
     )
     # 2.
     first = FIRST_PRESSING * force
     overstress = along.forces * first
-    overstress[:n] += friction.peak * averages(overstress[n:])
+    overstress[:n] -= FIRST_PRESSING * strength
     state = make_contact(along, friction, overstress, np.zeros_like(overstress))
     beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
-    state.stack[: beyond.size] = beyond
-    state.stacked[beyond] = True
+    state.stack[: beyond.size], state.stacked[beyond] = beyond, True
     state.counts[N_STACKED] = beyond.size
-    stop = path.PathStop(first, 0.0, 0.0, Status.ARRESTED)
+    stop = PathStop(first, 0.0, 0.0, Status.ARRESTED)
     while stop.status in (Status.ARRESTED, Status.UNSTABLE):
         stop = follow(state, stop.load, 0.0, 0.0, force)
     if stop.status != Status.AT_TARGET:
@@ -143,30 +136,22 @@ def press(rig: Matrices, friction: Friction, force: float) -> Pressed:
             "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
             " coefficients and the weakening rate"
         )
-    forces = state.overstress.copy()
-    strength = strengths(friction, state)
-    forces[:n] += strength
-    return Pressed(forces * sign, state.moved * sign)
+    present = friction._replace(peak=friction.residual + state.difference)
+    return Pressed(forces_of(state, friction) * sign, state.moved * sign, present)
 
 
-def strengths(friction: Friction, state: Contact) -> Array:
-    """Return the strength of each cell, N/m."""
-    n = len(friction.peak)
+def forces_of(state: Contact, friction: Friction) -> Array:
+    """Return the shear force of each cell, and the tension of each edge (m,), N/m."""
+    n, forces = len(friction.peak), state.overstress.copy()
     coefficient = friction.residual + state.difference
-    return coefficient * averages(-state.overstress[n:]) - state.weakening * state.moved[:n]
+    forces[:n] += coefficient * on_cells(-forces[n:]) - state.weakening * state.moved[:n]
+    return forces
 
 
-def begin_push(rig: Matrices, friction: Friction, start: Pressed) -> Contact:
+def begin_push(rig: Matrices, start: Pressed) -> Contact:
     """Step 3: return the slider before the push. Its slip adds to the slip of the pressing."""
-    n = len(friction.peak)
-    moved = np.abs(start.moved)
-    pressure = averages(-start.forces[n:])
-    # Cells that have passed their corner have the residual coefficient.
-    above = (friction.peak - friction.residual) * pressure - friction.weakening * moved[:n]
-    at_residual = (above <= 1e-12 * friction.peak * pressure) & (moved[:n] > 0.0)
-    peak = np.where(at_residual, friction.residual, friction.peak)
-    present = friction._replace(peak=peak)
-    overstress = start.forces.copy()
-    falls = np.where(at_residual, 0.0, friction.weakening)
-    overstress[:n] -= peak * pressure - falls * moved[:n]
-    return make_contact(rig, present, overstress, moved)
+    peak, residual, weakening = start.friction
+    moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
+    overstress[:n] -= peak * on_cells(-start.forces[n:])
+    overstress[:n] += np.where(peak > residual, weakening * moved[:n], 0.0)
+    return make_contact(rig, start.friction, overstress, moved)
