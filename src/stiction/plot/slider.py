@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stiction.base.units import unit_for
 from stiction.elasticity.rig import on_cells
-from stiction.methods.equilibrium.contact.solver import SliderPaths, follow_push
+from stiction.methods.equilibrium.contact.solver import SliderSolver
 from stiction.plot.axes import new_figure, with_unit
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
@@ -33,14 +33,13 @@ def draw(problem: Problem, sample: Sample | None) -> NDArray[Any]:
         lines["shear stress"] = mean * rig.T_p[:n]
         lines["pressure"] = -mean * on_cells(rig.T_p[n:])
     else:
-        push = follow_push(SliderPaths(problem).begin(sample, 0))
-        state = push.first or push.last
-        lines["shear stress"] = state.shear / interface.spacing
-        lines["pressure"] = on_cells(state.pressing) / interface.spacing
+        solver = SliderSolver(problem)
+        push = solver.path(sample, 0).follow()
+        profiles = solver.profiles(push.first or push.last)
+        lines["shear stress"], lines["pressure"] = profiles["stress"], profiles["pressure"]
         coefficient = sample.strength[0] / sample.normal_pressure[0]
         lines["peak strength"] = coefficient * lines["pressure"]
-        opening = 0.5 * (state.opening[:-1] + state.opening[1:])
-        moved = {"slip": state.slip, "opening": opening}
+        moved = {"slip": profiles["slip"], "opening": profiles["opening"]}
     panels = [("m", "slip", moved)] if moved else []
     figure = new_figure(1.35 * COLUMN, (1.5 + 0.5 * len(panels)) * COLUMN)
     with paper_style():

@@ -213,6 +213,16 @@ class SliderSolver:
         far = travel + elongation_of(self.problem, stress)
         return {"mean_stress": stress, "travel": travel, "crosshead_travel": far}
 
+    def profiles(self, state: PushState) -> dict[str, Array]:
+        """Return slip and opening (m), shear stress and pressure (Pa) at the nodes."""
+        n, spacing = self.problem.interface.size, self.problem.interface.spacing
+        return {
+            "slip": state.moved[:n],
+            "stress": state.forces[:n] / spacing,
+            "pressure": on_cells(-state.forces[n:]) / spacing,
+            "opening": 0.5 * (state.moved[n:-1] + state.moved[n + 1 :]),
+        }
+
     def event_table(self, push: Push, most: int | None = None) -> dict[str, Array]:
         """Return the variables of events as arrays, padded with NaN to `most` events."""
         measured, interface = [], self.problem.interface
@@ -235,7 +245,7 @@ class SliderSolver:
         self, rows: Sample, loads: Array
     ) -> tuple[dict[str, Array], dict[str, Variable]]:
         """Return values and further variables of `equilibrium_path` at rising loads, Pa."""
-        interface, n = self.problem.interface, self.problem.interface.size
+        interface = self.problem.interface
         # The path to sliding gives all events, and a second path the states at the loads.
         push, path = self.path(rows, 0).follow(), self.path(rows, 0)
         if not push.known:
@@ -247,16 +257,13 @@ class SliderSolver:
             while path.move(load * self.length) in (Status.UNSTABLE, Status.ARRESTED):
                 pass
             state = path.state()
-            states.append(self.travels(state) | {
-                "slip": state.moved[:n],
-                "stress": state.forces[:n] / interface.spacing,
-                "pressure": on_cells(-state.forces[n:]) / interface.spacing,
-                "opening": 0.5 * (state.moved[n:-1] + state.moved[n + 1 :]),
-            })  # fmt: skip
+            states.append(self.travels(state) | self.profiles(state))
         values = self.event_table(push)
         wide = {"slip", "stress", *ON_PATH}
         for name in (*wide, "mean_stress", "travel", "crosshead_travel"):
-            values[name] = np.full((loads.size, *([n] if name in wide else [])), np.nan)
+            values[name] = np.full(
+                (loads.size, *(interface.shape if name in wide else ())), np.nan
+            )
             for i, at_load in enumerate(states):
                 values[name][i] = at_load[name]
         starts = [before.load / self.length for before, _ in push.events]
