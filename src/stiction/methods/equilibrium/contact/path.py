@@ -219,10 +219,13 @@ def _remove(state: Contact, node: int) -> None:
         state.place[inside[r]] = r - 1
     if left[t] > 0.0:
         for r in range(k):
-            factor = inverse[r, t] / left[t]
-            for c in range(k):
-                if r != t and c != t:
-                    inverse[r - (r > t), c - (c > t)] = inverse[r, c] - factor * left[c]
+            if r != t:
+                row, factor = inverse[r], inverse[r, t] / left[t]
+                target = inverse[r - 1] if r > t else row
+                for c in range(t):
+                    target[c] = row[c] - factor * left[c]
+                for c in range(t + 1, k):
+                    target[c - 1] = row[c] - factor * left[c]
         state.counts[N_INSIDE] = k - 1
         return
     state.counts[N_BORDERED_AGAIN] += 1
