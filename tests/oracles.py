@@ -103,7 +103,9 @@ def relaxed(
     u, f = (np.r_[each] for each in (getattr(law, "slip", 1.0), getattr(law, "strength", 0.0)))
     residual = np.minimum(law.residual_strength, strength)
     drop = strength - residual
-    end = law.critical_slip or (1.0 - f[0]) / u[0] * drop / law.weakening_rate
+    slopes = -np.diff(f, prepend=1.0) / np.diff(u, prepend=0.0)
+    first = slopes[slopes > 0.0][0]  # of the first fall
+    end = law.critical_slip or first * drop / law.weakening_rate
 
     def present(slip: Any) -> Any:
         share = slip / np.maximum(end, 1e-30)  # some nodes do not weaken

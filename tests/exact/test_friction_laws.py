@@ -8,6 +8,7 @@ from checks import assert_close
 from scipy.integrate import quad
 
 import stiction as st
+from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.kernels import line_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
@@ -16,6 +17,9 @@ LAWS = {
     "linear": st.LinearWeakening(weakening_rate=RATE),
     "exponential": st.ExponentialWeakening(weakening_rate=RATE),
     "dual": st.PiecewiseWeakening(**TWO_PIECES, weakening_rate=RATE),
+    "plateau": st.PiecewiseWeakening(
+        slip=[0.2, 0.8, 1.0], strength=[1.0, 0.3, 0.0], weakening_rate=RATE
+    ),
     "steepening": st.PiecewiseWeakening(
         slip=[0.3, 0.8, 1.0], strength=[0.9, 0.2, 0.0], weakening_rate=RATE
     ),
@@ -43,7 +47,23 @@ def test_kernels_follow_the_law(law):
         assert steep == pytest.approx(slope_at(slip), rel=1e-12)
         reached = start - steep * (slip - 0.1 * critical)
         assert reached == pytest.approx(strength_at(*arguments, slip), rel=1e-14)
-    assert slope_at(0.0) == pytest.approx(RATE, rel=1e-14)
+    # W is the rate at which the strength first falls, just after a plateau.
+    assert slope_at(1.0001 * law.plateau * critical) == pytest.approx(RATE, rel=1e-14)
+    assert law.plateau == 0.0 or slope_at(0.9999 * law.plateau * critical) == 0.0
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_integral_and_inverse_of_a_law_follow_from_f(law):
+    """A law that states neither has those of its f: pieces are cubic, so a kink costs 1e-7."""
+    u = np.array([0.0, 0.1, 0.37, 0.95, 1.0, 3.0, np.inf])
+    np.testing.assert_allclose(FrictionLaw.area(law, u), law.area(u), rtol=1e-6, atol=1e-9)
+    for fraction in (0.95, 0.37, 0.01):
+        assert FrictionLaw.slip_at(law, fraction) == pytest.approx(
+            law.slip_at(fraction), rel=1e-12
+        )
+    assert FrictionLaw.slip_at(law, 0.0) == pytest.approx(law.slip_at(0.0), rel=1e-9) or (
+        law.type == "exponential" and FrictionLaw.slip_at(law, 0.0) > 700.0
+    )
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -18,6 +18,10 @@ LAWS = {
     "uniform critical slip": st.PiecewiseWeakening(
         slip=[0.3, 0.6, 1.0], strength=[0.5, 0.2, 0.0], **SLIP
     ),
+    "plateau": st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[1.0, 0.0], **RATE),
+    "plateau, then steepening": st.PiecewiseWeakening(
+        slip=[0.2, 0.5, 1.0], strength=[1.0, 0.8, 0.0], **GENTLE
+    ),
     "steepening": st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.7, 0.0], **GENTLE),
 }
 

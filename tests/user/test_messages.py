@@ -17,7 +17,6 @@ from typer.main import get_command
 import stiction as st
 from stiction.base import files
 from stiction.cli.commands import app
-from stiction.problem.friction import laws
 
 
 @pytest.fixture(autouse=True)
@@ -137,15 +136,6 @@ def test_commands_need_neither_a_backend_nor_all_letters(line, encoding, inside)
         PYTHONPATH=os.pathsep.join([str(files.Path(st.__file__).parents[1])]),
     )  # fmt: skip
     assert ("valid, '?'" in said) == (encoding == "cp1252")
-
-
-def test_a_law_whose_inverse_fails_at_zero_is_refused_by_name():
-    class Bad(laws.ExponentialWeakening):
-        def slip_at(self, fraction):
-            return 1.0 / fraction - 1.0
-
-    words = "friction: Bad: slip_at(0) fails ... ZeroDivisionError ... math.inf"
-    refuses(words, lambda: make_problem(friction=Bad(critical_slip=1e-6)))
 
 
 def test_a_cache_that_cannot_be_used_is_said_once(inside):

@@ -136,6 +136,11 @@ class LocalCriterion:
                 "problem.specimen: the pressure under a slider changes with the push and with slip,"
                 " so that no patch has a fixed strength. Use st.Equilibrium()"
             ]
+        if friction.plateau:
+            reasons.append(
+                "friction.strength: begins with a plateau, on which no patch is unstable, but the"
+                f" local criterion takes W from zero slip on{INSTEAD}"
+            )
         if friction.steepening > 1.0:
             reasons.append(
                 f"friction: this law falls up to {friction.steepening:.3g} times as steeply later"

@@ -158,6 +158,11 @@ class Equilibrium:
                 "friction: the strength of a slider falls linearly with slip. Use"
                 " st.LinearWeakening(weakening_rate=...)"
             )
+        if problem.friction.plateau and problem.interface.is_plane:
+            reasons.append(
+                "friction.strength: begins with a plateau, which is followed on lines only. Let it"
+                " fall slightly from zero slip on"
+            )
         if self.sensitivity and problem.interface.is_plane:
             reasons.append(
                 "sensitivity: applies to lines only. Leave it out, and take differences of st.onset"

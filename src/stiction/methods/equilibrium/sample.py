@@ -27,8 +27,8 @@ def pieces_of(law: FrictionLaw) -> Pieces:
         return LINEAR
     u, f = parameters.slip, parameters.fraction
     steep = np.append(-np.diff(f) / np.diff(u), 0.0)
-    starts = f + steep * u
-    return Pieces(u[1:].copy(), starts, steep / steep[0], float(steep[0]), law.integral)
+    starts, first = f + steep * u, law.initial_slope
+    return Pieces(u[1:].copy(), starts, steep / first, first, law.integral)
 
 
 def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:

@@ -29,14 +29,14 @@ and never ends."""
 class Pieces(NamedTuple):
     """Falling, piecewise linear function f of u = slip/d_c. It is the same at every node.
 
-    At a node, W is the weakening rate of the first piece. The relative
-    slope of this piece is therefore 1.
+    At a node, W is the weakening rate of the first piece that falls.
+    The relative slope of this piece is therefore 1.
     """
 
     ends: Array  # (M,): u at the end of each piece; the last is 1
     starts: Array  # (M + 1,): f on each piece, continued to u = 0; from 1 to 0 (residual)
-    slopes: Array  # (M + 1,): -f' on each piece, over `first_slope`; from 1 to 0 (residual)
-    first_slope: float  # -f' on the first piece
+    slopes: Array  # (M + 1,): -f' on each piece, over `first_slope`; to 0 (residual)
+    first_slope: float  # -f' on the first piece that falls
     area: float  # integral of f
     at_corner: float = 1.0 - 1e-12  # a node with this share of a corner's slip is beyond it
 

@@ -221,7 +221,7 @@ class DenseSearch:
         self, sample: StaticSample, state: EquilibriumState, from_rest: bool
     ) -> EquilibriumState | None:
         """Return the next instability by a linear programme, or `None` if a corner comes first."""
-        present = sample if from_rest else present_sample(sample, state.slip)
+        present = self._first_piece(sample) if from_rest else present_sample(sample, state.slip)
         solution = self.solve(present, state=None if from_rest else state)
         if solution is None or not (from_rest or solution.load >= state.load):
             return None
@@ -232,6 +232,12 @@ class DenseSearch:
             return None
         solution.K_direction = self._certify(present, solution, solution.direction)
         return solution
+
+    def _first_piece(self, sample: StaticSample) -> StaticSample:
+        """Return the linear sample of the first piece, which is flat if the law has a plateau."""
+        if self.pieces.slopes[0] > 0.0:
+            return sample
+        return present_sample(sample, np.zeros(self.nodes))
 
     def _certify(
         self, present: StaticSample, instability: EquilibriumState, multiplier: Array
@@ -251,7 +257,7 @@ class DenseSearch:
         # From rest, a programme that ends at
         # the load is faster than the events.
         if state.route == Route.PROGRAMME_FROM_REST and not self.driven:
-            solution = self.solve(sample, load)
+            solution = self.solve(self._first_piece(sample), load)
             if solution is not None and not exceeds(sample, solution.slip):
                 status = PathStatus.STABLE
                 return replace(solution, load=load, direction=state.direction, status=status)

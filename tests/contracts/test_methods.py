@@ -1,0 +1,340 @@
+"""Laws of every method: a method or an option without a line in a table fails."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+import pytest
+from contracts.bodies import BODIES, attempt, field_of, profiles_of
+
+import stiction as st
+from stiction import extensions
+from stiction.base import kinds
+from stiction.base.variables import FORCES, ONSET_VARIABLES
+from stiction.ensemble.limit_state import scales_with_strength
+from stiction.methods.protocol import METHODS, optional_member
+from stiction.random.fields import as_random_interface
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+FAST = {"loading_rate": 1e9}
+QUICK = {"progress": False, "pilot": False}
+
+
+@extensions.model
+class Weakest:
+    """A method from elsewhere: the load at which the first node slips."""
+
+    node: Literal["first", "second"] = "first"
+    type: Literal["weakest"] = "weakest"
+    label: ClassVar[str] = "weakest node"
+    scaling: ClassVar[str] = "affine"
+
+    def variables(self, problem):
+        return extensions.onset_variables(problem.interface)
+
+    def seconds_per_sample(self, problem):
+        return 1e-5
+
+    def supports(self, problem):
+        slider = isinstance(problem.specimen, st.Slider)
+        return ["problem.specimen: use st.Equilibrium()"] if slider else []
+
+    def bounded_by_strength(self, problem, event):
+        return True, False
+
+    def prepare(self, problem):
+        places = np.meshgrid(*problem.interface.coordinates.values(), indexing="ij")
+        places = np.stack([np.ravel(x) for x in places], axis=1)
+
+        def solve(rows):
+            load = (rows.strength - rows.initial_stress) / rows.load_profile
+            load = load.reshape(rows.samples, -1)
+            node = np.argsort(load, axis=1)[:, int(self.node == "second")]
+            load = np.take_along_axis(load, node[:, None], axis=1)[:, 0]
+            stress = rows.mean_stress(load)
+            place = places[node] if problem.interface.is_plane else places[node, 0]
+            values = load, stress, stress, place
+            return dict(zip(ONSET_VARIABLES, values, strict=True))
+
+        return solve
+
+
+@pytest.fixture(autouse=True, scope="module")
+def plugged():
+    """The method from elsewhere is registered while these tests run."""
+    extensions.register(Weakest)
+    yield
+    kinds._registered["methods"].pop("weakest")
+
+
+CLASSES = {**METHODS, "weakest": Weakest}
+
+
+def example(kind: str, problem: st.Problem, **options: Any) -> Any:
+    """A method that fits a problem, with the options that it needs there."""
+    return CLASSES[kind](**EXAMPLES[kind](problem) | options)
+
+
+EXAMPLES: dict[str, Any] = {  # type: what it needs on a problem
+    "local_criterion": lambda problem: {},
+    "equilibrium": lambda problem: {},
+    "rupture": lambda problem: {} if problem.specimen else FAST,
+    "weakest": lambda problem: {},
+}
+UNFIT = {("local_criterion", "slider"), ("rupture", "slider"), ("weakest", "slider")}
+"""Bodies that a method does not take; its `supports` says why."""
+OPTIONS: dict[str, dict[str, Any]] = {  # type: another value of each option
+    "local_criterion": {},
+    "weakest": {"node": "second"},
+    "equilibrium": {"sensitivity": True, "slip": True, "events": 2, "gap": 1e-4},
+    "rupture": {
+        "load": {"load": ([0.0, 1.0], [0.0, 2e9]), "loading_rate": None},
+        "loading_rate": 3e9, "end_time": 3e-4, "kernel_tolerance": 1e-4, "courant": 0.5,
+        "slip_step": 0.1, "load_step": 1e-2, "implicit": False, "arrival": 0.2,
+        "start": "rest", "stop": "onset", "max_steps": 3, "events": 2,
+    },
+}  # fmt: skip
+WRONG: dict[str, dict[str, Any]] = {  # type: a wrong value of each option
+    "local_criterion": {},
+    "weakest": {"node": "third"},
+    "equilibrium": {"sensitivity": 1.0, "slip": "yes", "events": -1, "gap": 0.1},
+    "rupture": {
+        "loading_rate": 0.0, "load": ([1.0, 2.0], [0.0, 1.0]), "end_time": -1.0,
+        "kernel_tolerance": 0.0, "courant": 1.1, "slip_step": 0.0, "load_step": 2.0,
+        "implicit": 0, "arrival": 0.0, "start": "slip", "stop": "never", "max_steps": 0,
+        "events": 1.5,
+    },
+}  # fmt: skip
+SILENT = {"start": ["line with ends", "plane", "plane with ends"]}  # as its docstring says
+CASES = [(kind, name) for kind in EXAMPLES for name in BODIES if (kind, name) not in UNFIT]
+every = pytest.mark.parametrize(("kind", "name"), CASES)
+every_option = pytest.mark.parametrize(
+    ("kind", "option"), [(kind, option) for kind in OPTIONS for option in OPTIONS[kind]]
+)
+SAMPLES = {
+    name: field_of(problem).sample(problem.interface, samples=4, seed=5)
+    for name, problem in BODIES.items()
+}
+
+
+def method_of(kind: str, option: str, problem: st.Problem) -> Any:
+    """The example, with another value of an option; a mapping also makes room for it."""
+    value = OPTIONS[kind].get(option, {})
+    return example(kind, problem, **(value if isinstance(value, dict) else {option: value}))
+
+
+def onset(name: str, method: Any, rows: Any = None, problem: Any = None) -> Any:
+    problem = problem or BODIES[name]
+    given = profiles_of(problem, SAMPLES[name] if rows is None else rows)
+    return st.onset(problem, given, method=method, progress=False)
+
+
+@cache
+def plain(kind: str, name: str) -> Any:
+    """The onsets by the example of a method."""
+    return onset(name, example(kind, BODIES[name]))
+
+
+def same(result: Any, expected: Any) -> bool:
+    """Whether results are equal to the bit, names and units included."""
+    return result.drop_attrs(deep=False).identical(expected.drop_attrs(deep=False))
+
+
+def test_every_method_and_option_has_a_line():
+    assert set(CLASSES) == EXAMPLES.keys() == OPTIONS.keys() == WRONG.keys()
+    for kind in CLASSES:
+        names = {field.name for field in dataclasses.fields(CLASSES[kind])} - {"type"}
+        assert names == OPTIONS[kind].keys() == WRONG[kind].keys()
+
+
+@pytest.mark.parametrize(("kind", "name"), sorted(UNFIT))
+def test_a_body_that_a_method_does_not_take_is_refused_with_its_reason(kind, name):
+    method = example(kind, BODIES[name])
+    (reason,) = method.supports(BODIES[name])
+    for call in (lambda: onset(name, method), lambda: study_by(kind, "", BODIES[name])):
+        with pytest.raises(st.InputError) as refused:
+            call()
+        assert reason in str(refused.value)
+
+
+@every
+def test_it_has_what_it_promises(kind, name):
+    """Its variables, and the forces and the coefficient that any method gets."""
+    problem, result = BODIES[name], plain(kind, name)
+    method = example(kind, problem)
+    assert method.supports(problem) == []
+    assert 0.0 < method.seconds_per_sample(problem) < 60.0
+    promised = method.variables(problem)
+    assert promised.keys() >= ONSET_VARIABLES.keys()
+    added = {FORCES[key][0] for key in promised if key in FORCES} | {"friction_coefficient"}
+    assert set(result) == promised.keys() | added
+    for key, variable in promised.items():
+        assert (result[key].dims, result[key].units) == (variable.dims, variable.units), key
+        assert result[key].long_name == variable.long_name
+
+
+@every
+def test_alone_equals_in_a_batch_in_any_order(kind, name):
+    method, order = example(kind, BODIES[name]), [2, 0, 3, 1]
+    batch = plain(kind, name)
+    turned = onset(name, method, SAMPLES[name][order])
+    assert same(batch.isel(sample=order).drop_vars("sample"), turned.drop_vars("sample"))
+    for number, strength in enumerate(SAMPLES[name]):
+        alone = onset(name, method, strength[None])
+        assert same(batch.isel(sample=[number]).drop_vars("sample"), alone.drop_vars("sample"))
+
+
+@every
+def test_it_comes_back_from_a_file(kind, name, tmp_path):
+    """With each of its options, and a run of the returned study gives the same numbers."""
+    problem = BODIES[name]
+    for option in OPTIONS[kind] or [""]:
+        study, refusal = attempt(lambda option=option: study_by(kind, option, problem))
+        if refusal:
+            assert option in refusal
+            continue
+        study.to_toml(tmp_path / "study.toml")
+        back = st.Study.from_toml(tmp_path / "study.toml")
+        assert back == study
+        assert str(back.method) == str(method_of(kind, option, problem))
+        if option in ("", "events", "node"):
+            assert same(study.run(**QUICK), back.run(**QUICK))
+
+
+def study_by(kind: str, option: str, problem: st.Problem) -> st.Study:
+    method = method_of(kind, option, problem)
+    return st.Study(problem=problem, random=field_of(problem), method=method)
+
+
+@every_option
+def test_a_wrong_option_is_refused_by_its_name(kind, option):
+    with pytest.raises(st.InputError, match=rf"\b{option}\b"):
+        example(kind, BODIES["line"], **{option: WRONG[kind][option]})
+
+
+@every_option
+def test_every_option_counts_or_is_refused(kind, option):
+    """On every body: another value of it changes the result, or the refusal names it."""
+    counts = []
+    for name, problem in BODIES.items():
+        if name in SILENT.get(option, ()) or (kind, name) in UNFIT:
+            continue
+        method, refusal = attempt(lambda problem=problem: supported(kind, option, problem))
+        if refusal:
+            assert option in refusal, (name, refusal)
+            continue
+        counts.append(name)
+        result, refusal = attempt(lambda name=name, method=method: onset(name, method))
+        if refusal:  # a budget that ends
+            assert option in refusal, (name, refusal)
+        else:
+            assert not same(plain(kind, name), result), f"{option} has no effect on {name}"
+    assert counts, f"{option} is refused everywhere"
+
+
+def supported(kind: str, option: str, problem: st.Problem) -> Any:
+    method = method_of(kind, option, problem)
+    if reasons := method.supports(problem):
+        raise st.InputError(reasons)
+    return method
+
+
+def smooth(problem: st.Problem) -> st.Problem:
+    """The problem without residual strength and initial stress, under a uniform load."""
+    if isinstance(problem.specimen, st.Slider):
+        return problem
+    return dataclasses.replace(
+        problem, load=st.Load(), friction=st.LinearWeakening(weakening_rate=0.3e12)
+    )
+
+
+@every
+def test_its_onsets_scale_with_strength_as_it_says(kind, name):
+    problem, strength = smooth(BODIES[name]), SAMPLES[name]
+    method = example(kind, problem)
+    if not scales_with_strength(problem, as_random_interface(field_of(problem)), method):
+        return
+    uniform = np.ptp(problem.load_profile) == 0.0
+    shift = {"stretch": 0.0, "affine": 1e5 * uniform}[optional_member(method, "scaling")]
+    before = onset(name, method, strength, problem)
+    after = onset(name, method, shift + 1.25 * strength, problem)
+    for key in ("critical_stress", "critical_load", "first_instability"):
+        np.testing.assert_allclose(
+            after[key], shift + 1.25 * before[key], rtol=1e-5, err_msg=key
+        )
+
+
+@every
+@pytest.mark.parametrize("spread", [0.0, 3e5])
+def test_strength_bounds_its_onsets_as_it_says(kind, name, spread):
+    """Also where the load is uneven, and where a node of each sample hardly holds."""
+    problem = BODIES[name]
+    strength = np.array(SAMPLES[name])
+    strength[(slice(None), *np.array(strength.shape[1:]) // 2)] -= spread
+    method = example(kind, problem)
+    if isinstance(problem.specimen, st.Slider):
+        assert method.bounded_by_strength(problem, "critical_stress") == (False, False)
+        return
+    rows = problem.sample(strength)
+    found = onset(name, method, strength)
+    free = np.broadcast_to(problem.interface.breakable, problem.interface.shape)
+    profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
+    first = ((rows.strength - rows.initial_stress) / profile)[:, free].min(axis=1)
+    initial, mean = rows.initial_stress[:, free].mean(axis=1), profile[free].mean()
+    for event in ("critical_stress", "first_instability"):
+        below, above = optional_member(method, "bounded_by_strength")(problem, event)
+        stress = found[event].values
+        stress = stress[np.isfinite(stress)]
+        if below:
+            low = (initial + mean * first)[np.isfinite(found[event].values)]
+            assert (stress >= low * (1.0 - 1e-9)).all(), event
+        if above:
+            assert (stress <= rows.strength[:, free].mean(axis=1).max() * (1 + 1e-9)).all(), (
+                event
+            )
+
+
+@cache
+def events_by(kind: str, name: str) -> dict[str, Any]:
+    """The variables of the events of the first sample, by every call that returns events."""
+    problem, strength = BODIES[name], SAMPLES[name]
+    if "events" not in OPTIONS[kind]:
+        return {}
+    method, inertia = example(kind, problem, events=2), kind == "rupture"
+    first = profiles_of(problem, strength[0])
+    drawn = st.monte_carlo(
+        problem, field_of(problem), method=method, samples=4, seed=5, **QUICK
+    )
+    calls = {"onset": onset(name, method), "monte_carlo": drawn}
+    if inertia:
+        calls["simulate_rupture"] = st.simulate_rupture(
+            problem, first, method=method, progress=False
+        )
+    if problem.specimen or not inertia:
+        how = {"method": method} if inertia else {}
+        calls["equilibrium_path"] = st.equilibrium_path(problem, first, [1e5], **how)
+    return {
+        call: result.isel(sample=0, missing_dims="ignore")[
+            [key for key in result if "event" in result[key].dims]
+        ]
+        for call, result in calls.items()
+    }
+
+
+@every
+def test_an_event_has_the_same_variables_and_numbers_by_every_call(kind, name):
+    for call, events in (tables := events_by(kind, name)).items():
+        names, known = (
+            {(key, each.dims, each.units, each.long_name) for key, each in table.items()}
+            for table in (events, tables["onset"])
+        )
+        assert names == known, (call, names ^ known)
+        for key in tables["onset"]:
+            have, want = events[key].values[:2], tables["onset"][key].values
+            np.testing.assert_allclose(
+                have, want[: len(have)], rtol=1e-5, err_msg=f"{call} {key}"
+            )
+            assert np.isnan(want[len(have) :]).all(), (call, key)
