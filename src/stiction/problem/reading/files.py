@@ -60,14 +60,15 @@ MAX_UNEVEN_CELLS = 2**19
 """Cells of a text that pandas cannot read. Each cell takes hundreds of bytes and microseconds."""
 SEPARATORS = (";", "\t", " ", ",", "")
 """Separators of columns. A single column has none."""
-END, MAX_LINES_COMPARED, HEADING = 100, 500, 2
+END, MAX_LINES_COMPARED, HEADING = 40, 150, 2
 """Lines at the start of a text, and in the rest of it, that show the separator, and the number of
 lines for which a heading counts."""
 _CELL = re.compile(
     rf"$|{NUMBER.pattern}|{GROUPS.pattern}(?:[.,]\d*)?$|[\W_]+$|[^\W\d][^;,\t]*$"
+    r"|\d+[^\W\d_]\w*$|\d+[-/]\d+$"
     r"|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[ T]\s*\d[\d:.,]*)?$|\d{1,2}:\d{2}[\d:.,]*$"
 )
-"""Cells of rows with data: nothing, numbers, marks, words, dates and times."""
+"""Cells of rows with data: nothing, numbers, marks, words, names such as 1a, dates and times."""
 MAX_COLUMNS = 2_000
 """Columns of a table. A file with more columns holds its values in a single line."""
 MAX_LETTERS = 1_000

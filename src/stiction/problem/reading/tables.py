@@ -276,35 +276,29 @@ def _rows_of_data(
     def has_number(row: Row) -> bool:
         return any(_is_value(row.cells[i], words) for i in numeric if i < len(row.cells))
 
-    start = next(i for i, row in enumerate(rows) if has_number(row) and not wrong(row))
-    header = list(rows[:start])
-    if header and not _are_units(header[-1].cells):
-        row = header[-1]
-        if has_number(row):  # a row of values, one of which is wrong
-            raise InputError(_not_a_number(row.number, wrong(row)[0]))
+    left_out, statistics = [], _statistics(rows, words)
+    start = next(
+        i
+        for i, row in enumerate(rows)
+        if i not in statistics and has_number(row) and not wrong(row)
+    )
+    header = [row for i, row in enumerate(rows[:start]) if i not in statistics]
+    if header and not _are_units(header[-1].cells) and has_number(row := header[-1]):
+        raise InputError(_not_a_number(row.number, wrong(row)[0]))  # one value is wrong
     data: list[Row] = []
-    left_out: list[str] = []
     known = [row.cells for row in header]
     begins, interrupted = [rows[start].number], False
-    labels = [next(filter(None, row.cells)).casefold().rstrip(" .:=()") for row in rows]
-    for place in range(start, len(rows)):
-        row, later = rows[place], labels[place + 1 : place + 2]
-        short = labels[place] in SHORT_STATISTICS and bool(
-            SHORT_STATISTICS.union(STATISTICS) & {*later, *labels[place - 1 : place]}
-        )
-        statistic = (
-            short or labels[place].split(" ")[0].split("(")[0].rstrip(" .:") in STATISTICS
-        )
-        if data and statistic and _is_word(next(filter(None, row.cells)), words):
+    for place, row in enumerate(rows):
+        if place in statistics:
             left_out.append(f"{row.text} (statistics)")
-            interrupted = True
+            interrupted = bool(data)
+        elif place < start or row.cells in known:
+            continue  # a heading may be repeated above each record
         elif not wrong(row):
             if interrupted and has_number(row):
                 begins.append(row.number)
             interrupted = False
             data.append(row)
-        elif row.cells in known:
-            continue  # a heading is repeated above each record
         elif not has_number(row) and (
             len([*filter(None, row.cells)]) < max(2, len(numeric)) or separator == " "
         ):
@@ -313,6 +307,19 @@ def _rows_of_data(
         else:
             raise InputError(_not_a_number(row.number, wrong(row)[0]))
     return header, data, left_out, tuple(begins) if len(begins) > 1 else ()
+
+
+def _statistics(rows: Sequence[Row], words: set[str]) -> set[int]:
+    """Return the rows that begin with the name of a statistic and hold a number (step 2)."""
+    labels = []
+    for row in rows:
+        label = next(filter(None, row.cells)).casefold()
+        has_number = any(_is_value(cell, words) for cell in row.cells)
+        labels.append(label.rstrip(" .:=") if has_number and _is_word(label, words) else "")
+    long = {i for i, label in enumerate(labels) if re.split(r"[\s(]", label)[0] in STATISTICS}
+    short = {i for i, label in enumerate(labels) if label in SHORT_STATISTICS}
+    known = long | short  # a short name counts beside another
+    return long | {i for i in short if known & {i - 1, i + 1}}
 
 
 def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[Row]:
