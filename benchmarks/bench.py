@@ -334,7 +334,7 @@ def ends():
     tau_p = strength.sample(plane, samples=1, seed=3)
     tau_p[:, np.hypot(x - 1.5e3, y - 1e3) < 250.0] = 30e6  # a patch that breaks at once
     loaded = dataclasses.replace(problem, load=st.Load(initial_stress=35e6))
-    at_once = st.Rupture(load=([0, 1], [0, 0]), stop="rest", end_time=20.0)
+    at_once = st.Rupture(load_history=([0, 1], [0, 0]), stop="rest", end_time=20.0)
     ours = solver_time(loaded, at_once, tau_p, 1)[0]
     row("rupture, 128 x 128 nodes", ours, [("budget", 5.0 * local / 57e-6)])
 

@@ -66,7 +66,7 @@ def simulate(spacing: float, end_time: float = 9.0) -> Found:
     middle = np.array(PERIOD) / 2
     none = ([0.0, 100.0], [0.0, 0.0])  # the initial stress is all there is
     method = st.Rupture(
-        load=none, implicit=False, stop="time", end_time=end_time, arrival=BROKEN
+        load_history=none, implicit=False, stop="time", end_time=end_time, arrival=BROKEN
     )
     stations = {name: middle + KM * np.array(at) for name, at in STATIONS.items()}
     save = st.Save(RECORDED, every=1000, stations=stations)  # of the frames the first is used

@@ -402,7 +402,7 @@ def held(run: Runner, count: int) -> xr.Dataset:
         rise = stress / setting.LOADING_RATE
         end = rise + 10.0 * setting.CROSSING
         load = ([0.0, rise, end], [0.0, stress, stress])
-        method = st.Rupture(load=load, stop="rest", end_time=end)
+        method = st.Rupture(load_history=load, stop="rest", end_time=end)
         saved = st.Save(["slip"], every=1_000_000)
         rupture = st.simulate_rupture(problem, tau_p, method=method, save=saved, progress=False)
         slip = rupture["slip"].values[-1]

@@ -29,7 +29,7 @@ def wavy_line(
 
 def simulate(problem: Any, strength: Any, save: Any = None, **method: Any) -> Any:
     """A rupture at 1e7 Pa/s, or under another load; of the fields only slip is kept."""
-    options = {} if "load" in method else {"loading_rate": 1e7}
+    options = {} if "load_history" in method else {"loading_rate": 1e7}
     return simulate_rupture(
         problem, strength, method=st.Rupture(**options | method), save=save or st.Save(["slip"])
     )
@@ -51,7 +51,7 @@ def stepped(
 ) -> Any:
     """A run of so many explicit steps at a constant load from t = 0 to `end`, and its state."""
     method = st.Rupture(
-        load=([0.0, 1.0], [load, load]), stop="time", end_time=1.0, implicit=False
+        load_history=([0.0, 1.0], [load, load]), stop="time", end_time=1.0, implicit=False
     )
     method = with_step(method, problem, end / steps)
     run = run_of(problem, strength, method, accept=("overstress",))

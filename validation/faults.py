@@ -60,7 +60,7 @@ def circular_rupture(nodes):
     start = radius < START_SHARE * RADIUS
     strength = RESIDUAL + DROP * np.where(start, 0.98, 1.0 + STRENGTH_RATIO)
     problem = st.Problem(solid, plane, law, st.Load(initial_stress=RESIDUAL + DROP))
-    method = st.Rupture(load=([0.0, 1.0], [0.0, 0.0]), stop="rest", end_time=8.0)
+    method = st.Rupture(load_history=([0.0, 1.0], [0.0, 0.0]), stop="rest", end_time=8.0)
     save = st.Save(["slip"], every=5)
     run = st.simulate_rupture(problem, strength, method=method, save=save, progress=False)
     return problem, run, places

@@ -46,7 +46,7 @@ def final_speed(driving, nodes=4096):
     run = st.simulate_rupture(
         problem,
         np.where(away < 0.75 * griffith, 0.98 * load, STRENGTH),
-        method=st.Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
+        method=st.Rupture(load_history=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=500),
     )
     found = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)

@@ -30,7 +30,7 @@ def test_strength_along_one_axis_equals_the_line(mode, across, load):
     strength = st.paper.strength(line, correlation_ratio=1.0)
     tau_p = strength.sample(line.interface, samples=3, seed=1)
     exact = exact_onset(line, tau_p)
-    options = {"gap": 1e-10, "slip": True}
+    options = {"tolerance": 1e-10, "slip": True}
     found = exact_onset(plane, repeated(tau_p, across, axis), **options)
     # 1e-10 is the gap that was asked for, and about that of the line.
     for name in ("first_instability", "critical_load", "critical_stress"):

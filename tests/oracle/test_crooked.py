@@ -157,7 +157,7 @@ def test_moving_and_mirroring_everything_moves_places_only(problem, strength):
         residual = change(problem.friction.residual_strength)
         friction = dataclasses.replace(problem.friction, residual_strength=residual)
         other = dataclasses.replace(problem, load=load, friction=friction)
-        closed = {"gap": 1e-10} if problem is PLANE else {}
+        closed = {"tolerance": 1e-10} if problem is PLANE else {}
         for onset, options in ((local_onset, {}), (exact_onset, closed)):
             here = onset(problem, strength, **options)
             there = onset(other, change(strength), **options)
@@ -237,7 +237,7 @@ def test_bounds_and_gradient_have_no_unit_of_load(problem, strength):
     one, other = (
         exact_onset(
             dataclasses.replace(problem, friction=friction, load=load), strength,
-            **({"gap": 1e-3} if problem is PLANE else {"sensitivity": True}),
+            **({"tolerance": 1e-3} if problem is PLANE else {"sensitivity": True}),
         )
         for load in (
             problem.load, dataclasses.replace(problem.load, profile=2.0 * problem.load.profile)

@@ -202,7 +202,7 @@ def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name):
     tau_p = beta_strength(3e-3, 0.3e6, 2.66e6).sample(line.interface, samples=4, seed=2)
     exact = exact_onset(line, tau_p)
     assert exact["residual_reached"].any()
-    found = exact_onset(strip, repeated(tau_p, 8), gap=1e-8)
+    found = exact_onset(strip, repeated(tau_p, 8), tolerance=1e-8)
     # Nothing is found more closely than the gap; measured 7e-9 at most.
     np.testing.assert_allclose(found["critical_load"], exact["critical_load"], rtol=2e-8)
     # A turn at a corner may be passed unseen: its jump is a step of the stable path.

@@ -69,7 +69,7 @@ def final_speed(ratio, nodes):
     run = simulate_rupture(
         problem,
         np.where(np.abs(x) < 0.75 * griffith, 0.98 * load, STRENGTH),
-        method=st.Rupture(load=([0.0, 1.0], [load, load]), implicit=False),
+        method=st.Rupture(load_history=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=1000),
     )
     speed = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)

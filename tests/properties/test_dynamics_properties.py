@@ -91,7 +91,7 @@ def test_creep_stops_where_the_load_falls_and_never_runs_back():
     high = 0.5 * (profile.min() + onset)
     low, end = 0.8 * high, 0.3
     load = ([0.0, 0.1, 0.2, end], [0.0, high, low, high])
-    method = Rupture(load=load, stop="time", end_time=end)
+    method = Rupture(load_history=load, stop="time", end_time=end)
     save = st.Save(["slip", "slip_rate", "shear_stress", "strength"])
     run = simulate_rupture(PROBLEM, profile, method=method, save=save)
     slip, time = run["slip"].values, run["time"].values
@@ -144,7 +144,9 @@ def test_an_arrested_rupture_radiates_no_more():
     x, y = np.meshgrid(*PLANE.coordinates.values(), indexing="ij")
     inside = (np.abs(x - 0.02) < 0.011) & (np.abs(y - 0.015) < 0.009)
     tau_p = 8e5 - 2e5 * dip(PLANE, (0.018, 0.014), 0.007)
-    method = st.Rupture(load=([0.0, 6e-3, 1.0], [0.0, 6.2e5, 6.2e5]), stop="time", end_time=0.5)
+    method = st.Rupture(
+        load_history=([0.0, 6e-3, 1.0], [0.0, 6.2e5, 6.2e5]), stop="time", end_time=0.5
+    )
     problem = within(BREAKING_PLANE, inside)
     run = break_plane(tau_p, method, problem, save=st.Save(every=20))
     slip = run.slip.values[-1]

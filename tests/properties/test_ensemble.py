@@ -45,7 +45,9 @@ CASES = {
     "equilibrium, line": (
         LINE, st.Equilibrium(**DETAILED), profiles(LINE, 6) | {"weakening_rate": RATES},
     ),
-    "equilibrium, plane": (PLANE, st.Equilibrium(gap=1e-9, slip=True), profiles(PLANE, 4, 0.01)),
+    "equilibrium, plane": (
+        PLANE, st.Equilibrium(tolerance=1e-9, slip=True), profiles(PLANE, 4, 0.01),
+    ),
     "rupture, line": (SHORT, st.Rupture(loading_rate=1e7), profiles(SHORT, 4)),
     "rupture, plane": (
         BREAKING_PLANE, st.Rupture(loading_rate=1e8),

@@ -27,7 +27,9 @@ def held(top, loading_rate=2e7, back=1.0, **options):
     """A load that rises to `top`, holds, and then goes to a share of it."""
     end = top / loading_rate
     values = [0.0, top, top, back * top, back * top]
-    return st.Rupture(load=(end * np.array([0.0, 1.0, 1.5, 2.0, 3.0]), values), **options)
+    return st.Rupture(
+        load_history=(end * np.array([0.0, 1.0, 1.5, 2.0, 3.0]), values), **options
+    )
 
 
 def simulate(method, strength=CROOKED_STRENGTH, problem=CROOKED, **save):
@@ -80,7 +82,7 @@ def test_what_the_load_does_before_the_first_slip_does_not_matter():
         load = (times, [0.0, 6e5, lowest, lowest + 1.5e6])
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            found = simulate(st.Rupture(load=load))
+            found = simulate(st.Rupture(load_history=load))
         assert [text in str(one.message) for one in caught] == [True] * (text is not None)
         assert found.critical_stress.item() == pytest.approx(
             straight.critical_stress.item(), rel=1e-5
@@ -160,7 +162,7 @@ def test_a_fault_between_barriers_is_followed_until_nothing_slips():
     problem, strength = fault_between_barriers()
     runs = {}
     for stop in ("rest", "sliding", "time"):
-        method = st.Rupture(load=([0.0, 20.0], [0.0, 0.0]), stop=stop, end_time=6.0)
+        method = st.Rupture(load_history=([0.0, 20.0], [0.0, 0.0]), stop=stop, end_time=6.0)
         runs[stop] = simulate(method, strength, problem)
     for stop in ("rest", "sliding"):
         run = runs[stop]
@@ -173,7 +175,7 @@ def test_a_fault_between_barriers_is_followed_until_nothing_slips():
 def test_an_interface_that_slid_is_at_rest_once_it_is_unloaded(exact):
     top = 1.003 * exact.critical_load.item()
     times = top / 2e7 + np.array([-top / 2e7, 0.0, 1e-4, 2e-4])
-    run = simulate(st.Rupture(load=(times, [0.0, top, 0.0, 0.0]), stop="rest"))
+    run = simulate(st.Rupture(load_history=(times, [0.0, top, 0.0, 0.0]), stop="rest"))
     assert run.attrs["stopped"] == "rest"
     assert run.critical_stress.item() == pytest.approx(exact.critical_stress.item(), rel=3e-4)
     assert run.weakened_fraction.values[-1] == 1.0
@@ -229,7 +231,7 @@ def test_a_fault_becomes_unstable_where_and_when_its_patch_breaks():
         plane.shape, plane.lengths, solid=SOLID, critical_slip=2e-6, residual_strength=4e5,
         load=st.Load(initial_stress=initial),
     )  # fmt: skip
-    method = st.Rupture(load=([0.0, 1.0], [0.0, 0.0]), stop="time", end_time=3e-4)
+    method = st.Rupture(load_history=([0.0, 1.0], [0.0, 0.0]), stop="time", end_time=3e-4)
     with warnings.catch_warnings(action="ignore"):
         run = simulate(method, strength, within(problem, inside), every=4)
     late = run.top_slip_rate[-1].item() / run.top_slip_rate.max().item()

@@ -44,12 +44,12 @@ INPUTS: dict[str, dict[str, Any]] = {  # owner: other values of its fields
         "weakening_rate": 0.4e12, "critical_slip": 2e-6, "fracture_energy": 1.0,
         "residual_strength": 0.5e6, "residual_ratio": 0.4,
     },
-    "load": {
+    "load_history": {
         "profile": 2.0, "initial_stress": 1e5, "normal_pressure": 3e6, "pressing_force": 1e3,
     },
     "": {
         "solid": st.Solid(2e9, 0.33, 1170.0), "interface": st.Interface(0.06, 128),
-        "friction": st.LinearWeakening(critical_slip=2e-6), "load": st.Load(initial_stress=1e5),
+        "friction": st.LinearWeakening(critical_slip=2e-6), "load_history": st.Load(initial_stress=1e5),
         "mode": "III", "specimen": st.Blocks(height=0.02),
     },
 }  # fmt: skip
@@ -63,14 +63,14 @@ OF_SPECIMENS: dict[str, dict[str, Any]] = {
         "mass": (st.Rupture(), 5.0),
     },
     "interface": {"width": 0.02},
-    "load": {"profile": np.linspace(0.5, 1.5, 64)},
+    "load_history": {"profile": np.linspace(0.5, 1.5, 64)},
 }  # fmt: skip
 COEFFICIENTS = {"friction_coefficient": 0.5 + 1e-7 * JOINT_STRENGTH}
 OPTIONS: list[tuple[Any, dict[str, Any]]] = [
-    (EXACT, {"sensitivity": True, "slip": True, "events": 1, "gap": 1e-4}),
+    (EXACT, {"sensitivity": True, "slip": True, "events": 1, "tolerance": 1e-4}),
     (SLOW, {
-        "loading_rate": 3e7, "load": ([0.0, 1.0], [0.0, 2e6]), "end_time": 0.02,
-        "kernel_tolerance": 1e-5, "courant": 0.5, "slip_step": 0.05, "load_step": 2e-3,
+        "loading_rate": 3e7, "load_history": ([0.0, 1.0], [0.0, 2e6]), "end_time": 0.02,
+        "kernel_tolerance": 1e-5, "courant": 0.5,
         "implicit": False, "arrival": 0.2, "start": "rest", "stop": "onset", "max_steps": 3,
         "events": 1,
     }),

@@ -37,7 +37,7 @@ def rough_strength(seed):
 
 
 def solve(strength, problem=PLANE, gap=1e-9):
-    return exact_onset(problem, strength, gap=gap, slip=True)
+    return exact_onset(problem, strength, tolerance=gap, slip=True)
 
 
 def first_of(strength, **options):

@@ -118,7 +118,7 @@ METHODS = {
     "local": LOCAL,
     "exact": EXACT,
     "rate": st.Rupture(loading_rate=3e9, start="rest", stop="onset"),
-    "up and down": st.Rupture(load=([0.0, 1e-3, 1.3e-3, 5e-3], [2e5, 8e5, 1e5, 3e6])),
+    "up and down": st.Rupture(load_history=([0.0, 1e-3, 1.3e-3, 5e-3], [2e5, 8e5, 1e5, 3e6])),
 }
 
 

@@ -35,7 +35,7 @@ def barred():
 
 @calls(ORACLE, close=1e-4)
 def exact_onsets_with_slip():
-    method = st.Equilibrium(slip=True, gap=1e-9)
+    method = st.Equilibrium(slip=True, tolerance=1e-9)
     return st.onset(PLANE, TWO, method=method)
 
 
@@ -89,7 +89,7 @@ def an_ensemble_with_two_random_properties():
     )
     friction = dataclasses.replace(PLANE.friction, residual_strength=0.0)
     problem = dataclasses.replace(PLANE, friction=friction)
-    method = st.Equilibrium(gap=1e-8)
+    method = st.Equilibrium(tolerance=1e-8)
     return st.monte_carlo(problem, random, method=method, samples=3, seed=5, keep=("strength",))
 
 

@@ -18,7 +18,7 @@ problem = st.Problem(
     st.LinearWeakening(critical_slip=0.4, residual_strength=63e6),
     st.Load(initial_stress=np.where(np.abs(x) <= 1.5e3, 81.6e6, 70e6)),
 )
-method = st.Rupture(load=([0, 20], [0, 0]), stop="time", end_time=8.0)
+method = st.Rupture(load_history=([0, 20], [0, 0]), stop="time", end_time=8.0)
 tau_p = np.full(1200, 81.24e6)
 stations = {"6 km": 36e3, "12 km": 42e3}
 run = st.simulate_rupture(

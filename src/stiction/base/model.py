@@ -382,6 +382,27 @@ def _named_keys(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
         raise named(error, valid_keys(cls)) from None
 
 
+INTERNAL_MEMBERS = (
+    "accepts", "bounded_by_strength", "counted_only", "first_stage", "exact_method", "label",
+    "may_differ", "medium", "prepare", "samples_at_point", "scaling", "search",
+    "seconds_per_sample", "supports", "type", "unfit_as_guide", "variables",
+)  # fmt: skip
+"""Members that a method has for other parts of the package."""
+
+
+class _Listing(type):
+    """Type of `Listed`."""
+
+    def __dir__(cls) -> list[str]:
+        """Return public names, less fields, which the signature shows, and internal members."""
+        hidden = {*getattr(cls, "__dataclass_fields__", ()), *getattr(cls, "_internal", ())}
+        return [name for name in super().__dir__() if name not in hidden and name[0] != "_"]
+
+
+class Listed(metaclass=_Listing):
+    """Base of models whose `dir` and `help` show what users need only."""
+
+
 @typing.overload
 def model(cls: type[T]) -> type[T]: ...
 @typing.overload

@@ -49,7 +49,7 @@ from stiction.inference.prior import Prior
 from stiction.inference.scaling import Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import optional_member
-from stiction.problem.problem import Problem
+from stiction.problem.problem import Problem, warn_of_weld
 from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
@@ -237,6 +237,8 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
         raise InputError(
             "peaks: forces need an area. Give Blocks(thickness=...) or Interface(width=...)"
         )
+    if variable == "critical_force":
+        warn_of_weld(problem, "peaks")
     pressed = problem.given_pressure is not None or "normal_pressure" in random.names
     if variable == "friction_coefficient" and not pressed:
         raise InputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,16 @@ from pydantic import BeforeValidator, PlainSerializer, ValidationInfo, model_val
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Converted, Positive, as_count, as_number, in_si, model, to_plain
+from stiction.base.model import (
+    Converted,
+    Listed,
+    Positive,
+    as_count,
+    as_number,
+    in_si,
+    model,
+    to_plain,
+)
 from stiction.base.units import factor_to, number_and_unit
 
 Mask = NDArray[np.bool_]
@@ -148,7 +157,7 @@ Counts: TypeAlias = Converted[Annotated[int | tuple[int, int], _counts], int | S
 
 
 @model
-class Interface:
+class Interface(Listed):
     """Interface with equally spaced nodes: a periodic line or plane, or a line in a specimen.
 
     Parameters
@@ -201,6 +210,12 @@ class Interface:
     width: Positive | None = None
     ends: Literal["periodic", "free"] = "periodic"
     extent: Extent = None
+    _internal: ClassVar[tuple[str, ...]] = (
+        "axes", "breakable_measure", "cell", "describe_node", "dims", "embedding", "first",
+        "in_plane_share", "inverse_transform", "is_free", "is_held", "is_plane", "lengths",
+        "mean", "measure", "reach", "size", "spacings", "transform", "wave_vectors",
+        "wavenumbers",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:

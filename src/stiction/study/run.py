@@ -246,11 +246,12 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     slip that an event adds. Length or area, mean slip and the area stress drop refer
     to the patch around the largest slip.
 
-    The event of a `Rupture` ends when the interface is calm. Slow slip
-    after `event_duration`, which the load drives, counts too: on a
-    plane it was 8 % of a moment. An instability in which no node
-    reaches dynamic slip rates is no event. A run at rest can therefore
-    have a `critical_stress` and no row.
+    The event of a `Rupture` ends when shear waves have crossed half of the
+    part that can break since the last fast slip, so that later creep,
+    which the load drives, is left out. `event_settled` is 0 if the run
+    ended before. An instability in which no node reaches dynamic slip
+    rates is no event. A run at rest can therefore have a
+    `critical_stress` and no row.
 
     Examples
     --------

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Reason, RuptureState, value_at
 from stiction.problem.problem import Problem
@@ -19,6 +19,8 @@ from stiction.problem.sample import Sample
 FAST_RISE = 1e-3
 """Rise of the load while shear waves cross the nucleation length, as a share of the stress scale,
 above which arrested events depend on the rate of loading."""
+MISSED_PERCENT = 2.0
+"""Distance of a first instability from equilibrium, %, from which there is a warning."""
 # Shares of the stress scale:
 _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
@@ -106,13 +108,26 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         )
 
 
-def warn_of_cut_events(count: int) -> None:
-    """Warn about events in which slip was still fast, or had just been, as their run ended."""
-    if count:
-        warn_accuracy(
-            f"end_time: {count} events had not ended when their run did. Their moments, energies"
-            " and stress drops are values at this time (event_settled is 0). Raise end_time"
-        )
+def warn_of_cut_events(cut: Iterable[bool]) -> None:
+    """Warn about samples whose last event had not ended when their run did."""
+    warn_of_samples(
+        "end_time: the last event had not ended when its run did in {samples}. Its moment,"
+        " energies and stress drops are values at this time (event_settled is 0). Raise end_time",
+        list(cut),
+    )
+
+
+def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
+    """Warn about first instabilities above those of equilibrium. Both have shape (samples,), Pa."""
+    excess = 100.0 * (found / np.array(in_equilibrium) - 1.0)
+    warn_of_samples(
+        "first_instability is up to {worst:.2g} % above the first instability in equilibrium in"
+        " {samples}: a jump that lowers the mean stress by less than 1e-4 of the stress scale was"
+        " not noticed, as of few nodes on a coarse grid, or the load rises too fast. Take more"
+        " nodes, load more slowly, or use st.Equilibrium()",
+        excess > MISSED_PERCENT,
+        excess,
+    )
 
 
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:

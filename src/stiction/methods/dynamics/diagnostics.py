@@ -6,10 +6,12 @@ Waves carry away the unbalanced stress, so the mean stress on the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-All means are over the nodes that can break, so that nothing beyond an
-extent has an effect. If the interface has an extent, the nodes beyond
-take over stress without any waves. Then (1) includes the stress that
-they take over (`whole_stress`), and results do not (`mean_stress`).
+<p> and <tau_i> are means over the nodes that can break, so that nothing
+beyond an extent has an effect. If the interface has an extent, the nodes
+beyond take over stress without any waves. Then (1) includes the stress
+that they take over (`whole_stress`), and results do not (`mean_stress`).
+<V> and the mean strength refer to a period of two extents
+(`Thresholds.period_nodes`), or to the true period if it is shorter.
 
 An instability is slip that the load does not drive: after a maximum of
 <tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
@@ -240,13 +242,14 @@ def finish_step(
     whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
     now.time, now.size, now.load = step.time, step.size, step.load
     now.whole_stress, now.weakened_nodes = whole_stress, weakened
-    now.strength_change = change / thresholds.breakable
+    now.strength_change = change / thresholds.period_nodes
     # Without locked nodes, equation (1) has less round-off than the sum.
     now.mean_stress = stress_sum / thresholds.breakable if thresholds.held else whole_stress
     now.top_slip_rate, now.top_node = top_slip_rate, top_node
     now.reverse_margin, now.reverse_node = margin, margin_node
     now.work, now.mean_slip = now.work + step.work, slip_sum / thresholds.breakable
-    now.mean_slip_rate = step.radiated / grid.impedance
+    per_node = thresholds.period_nodes / thresholds.breakable
+    now.mean_slip_rate = step.radiated / grid.impedance * per_node
     now.scale = max(now.scale, value_at(setting.scale, step.load))
     fall = observe(now, thresholds, step.radiated)
     if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:

@@ -182,7 +182,7 @@ def explicit_steps(
             grid.poles.size, grid.multiplicity,
         )  # fmt: skip
         # 4. Diagnostics, and the end.
-        rise, radiated = abs(load - now.load), impedance * total / thresholds.breakable
+        rise, radiated = abs(load - now.load), impedance * total / thresholds.period_nodes
         now.explicit_steps += 1
         done = TakenStep(time, step, load, work * grid.cell, radiated)
         fall = finish_step(

@@ -180,7 +180,7 @@ def _effect(
             largest = max(largest, u[i] / residual_slip[i])
         total += u[i]
         radiated += max(u[i] / size * (1.0 + ratio) - ratio * past[i], 0.0)
-    return largest, total, radiated * (impedance / setting.thresholds.breakable)
+    return largest, total, radiated * (impedance / setting.thresholds.period_nodes)
 
 
 @jit_inside

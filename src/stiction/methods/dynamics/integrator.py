@@ -153,11 +153,11 @@ class Run:
         now["load"] = now["maximum_load"] = now["start_load"] = load
         # The mean stress before the first slip, when no waves are radiated.
         now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
-        radiated = impedance * slip_rate.sum() / thresholds.breakable
+        radiated = impedance * slip_rate.sum() / thresholds.period_nodes
         now["whole_stress"] = now["maximum_stress"] - radiated
         weakens = np.isfinite(limit)
         change = (limit[weakens] - nodes.peak[weakens]).sum()
-        now["strength_change"] = change / thresholds.breakable
+        now["strength_change"] = change / thresholds.period_nodes
         # Stress above the strength counts as strength.
         now["maximum_strength"] = now["strength_change"] + radiated
         now["maximum_breakable"] = now["maximum_stress"]
@@ -305,9 +305,9 @@ class Run:
         self._keep_event(state, state.slip, "load", "work", settled=False)
 
     @property
-    def cut_events(self) -> int:
-        """Number of events that the end of the run cut short, 0 or 1."""
-        return sum(not event["settled"] for event in self.events)
+    def cut_short(self) -> bool:
+        """Whether the end of the run cut the last event short."""
+        return bool(self.events) and not self.events[-1]["settled"]
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
@@ -345,5 +345,5 @@ class Run:
         state.past[:] = state.slip_rate
         state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
         state.now["two_step"] = 0  # the first implicit step is of first order
-        mean_rate = state.slip_rate.sum() / self.setting.thresholds.breakable
+        mean_rate = state.slip_rate.sum() / self.setting.thresholds.period_nodes
         state.now["previous_radiated"] = self.medium.impedance * mean_rate

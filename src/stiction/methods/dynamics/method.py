@@ -8,16 +8,26 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, PlainSerializer
+from pydantic import AliasChoices, BeforeValidator, Field, PlainSerializer
 
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Flag, Number, Positive, Real, model, real_array
+from stiction.base.model import (
+    INTERNAL_MEMBERS,
+    Count,
+    Flag,
+    Listed,
+    Number,
+    Positive,
+    Real,
+    model,
+    real_array,
+)
 from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks, specimens
 from stiction.methods.dynamics.diagnostics import stress_scale
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.medium import Medium, prepare_medium
-from stiction.methods.dynamics.slow_start import slow_start, static_search
+from stiction.methods.dynamics.slow_start import first_instability, slow_start, static_search
 from stiction.methods.dynamics.state import (
     UNSTABLE_STRESS,
     Nodes,
@@ -34,6 +44,8 @@ from stiction.problem.sample import Sample
 
 ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
+SLIP_STEP = 0.02  # largest slip of a weakening node in an implicit step, in units of its d_c
+LOAD_STEP = 1e-3  # largest rise of the load in an implicit step, in units of the stress scale
 _EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
 _SETTLING_CROSSINGS = 0.5  # times shear waves cross the part that can break after fast slip
@@ -68,71 +80,44 @@ LoadHistory = Annotated[Any, BeforeValidator(_load_history), PlainSerializer(_wr
 
 
 @model(kw_only=True)
-class Rupture:
+class Rupture(Listed):
     """Onset from an elastodynamic simulation under a slowly rising load.
 
-    Adaptive implicit steps follow the creeping interface, and explicit
-    steps follow its rupture. Initial stress may exceed the strength.
-    Such a patch breaks at once, at zero load.
+    Implicit steps follow creep, and explicit steps follow ruptures. A
+    patch whose initial stress exceeds its strength breaks at once.
 
     Parameters
     ----------
     loading_rate : float, optional
-        d tau_0/dt, Pa/s, positive. Between half-spaces, give either
-        this or `load`.
+        d tau_0/dt, Pa/s. Between half-spaces, give this or `load_history`.
+    end_time : float, optional
+        Latest end of a run, s. A warning counts the events that it cuts.
+    load_history : (times, values), optional
+        tau_0(t), Pa, from t = 0 s, interpolated linearly. The last slope
+        continues.
     kernel_tolerance : float
-        Largest error (1) of the memory kernel. The kernel is a sum of
-        exponentials, which is fitted once for each solid and stored on
-        disk. The fit takes 1 s at 1e-6 (22 pairs) or half a minute at
-        1e-8 (35 pairs). Above about 1e-3, waves may grow at any time
-        step. This raises an error.
+        Largest error (1) of the memory kernel.
     courant : float
         Explicit time step in units of the stability limit, in (0, 1].
-    slip_step : float
-        Largest slip of a weakening node in an
-        implicit step, in units of its d_c.
-    load_step : float
-        Largest rise of the load in an implicit step, in units of the
-        stress scale (see Notes).
-    start : {"equilibrium", "rest"}
-        "rest" starts at the first slip. "equilibrium" starts on the
-        quasi-static path, as close below the first instability as the
-        estimated error allows. `start_load` is the load at the start,
-        and `start_error` the estimated error (Pa). These runs always
-        start at the first slip: with `load`, if the loading rate is too
-        high, if a node loses half of its strength before the first
-        instability, on planes, with curved friction laws, with an
-        extent, and with stress above the strength.
-    end_time : float, optional
-        Latest end of a run, s. The last explicit step may exceed it.
-    load : (times, values), optional
-        Samples of tau_0(t), Pa, from t = 0 s, instead
-        of a constant rate. They are interpolated
-        linearly, and the last slope continues.
+    implicit : bool
+        If false, take explicit steps only, a million for slow loading.
     arrival : float
         Share of tau_p - tau_r that a node has lost when the front
-        arrives, in (0, 1]. Use 0.5 for the middle of the cohesive zone,
-        and 1e-3 for its tip.
+        arrives: 0.5 for the middle of the cohesive zone, 1e-3 for its tip.
+    start : {"equilibrium", "rest"}
+        Start of a run: close below the first instability in equilibrium,
+        where this state is known to `start_error` (Pa), or at the first slip.
     stop : {"sliding", "onset", "rest", "time"}
         End of a run. "sliding": every node that can break is at its
-        residual strength and, if the interface has an extent, has come
-        to rest. "onset": the first instability has begun. "rest": after
-        an instability, slip has ended or only follows the load. An
-        interface that slides and is never unloaded also ends there.
-        "time": at `end_time`. A sliding interface takes explicit steps
-        until then. Every run but "time" also ends when no node slips
-        and the load has stopped rising.
-    implicit : bool
-        If false, only explicit steps are taken. Slow loading then needs
-        a million steps.
+        residual strength and, with an extent, at rest. "onset": the
+        first instability has begun. "rest": after an instability, slip
+        has ended or follows the load. "time": `end_time`.
     max_steps : int
-        Number of steps after which a run, or
-        an event on a specimen, is abandoned.
+        Number of steps after which a run, or an event on a specimen, is
+        abandoned.
     events : int
-        Also return this number of events for each sample over 'event',
-        padded with NaN. Events have the variables of `equilibrium_path`
-        and `event_duration` (s). Between half-spaces they also have
-        `event_time` (s) and `event_radiated_energy` (J/m).
+        Also return so many events for each sample over 'event', padded
+        with NaN, with the variables of `equilibrium_path` and more.
 
     Raises
     ------
@@ -141,91 +126,26 @@ class Rupture:
 
     Notes
     -----
-    **Specimens.** Loading is slow. The path follows `Equilibrium` up to each instability. Then
-    waves run through the blocks until they are at rest, and the path continues from there.
-    The options `courant`, `arrival`, `max_steps` and `events` have an effect. The
-    attenuation and the masses of the specimen (`Blocks.quality_factor`, `Platen.mass`,
-    `Pusher.mass`) also have an effect. The result has the variables of `Equilibrium`, and
-    `rupture_speed` and `median_rupture_speed` for the sliding event.
+    Specimens are loaded slowly. Waves run during events, and only
+    `courant`, `arrival`, `max_steps` and `events` have an effect.
 
-    **Instabilities between half-spaces.** An instability is slip that the load
-    does not drive. It begins when the mean shear stress has a maximum, after
-    which waves lower it by 1e-4 of the stress scale. A fall by the load does not
-    count, nor a fall while strength falls less. If the stress is above the
-    strength at the start, it begins there.
-    `first_instability` is the mean stress at the beginning of the first
-    instability. The highest instability has `onset_time`, `critical_position` and
-    `applied_load` (the load factor at that time). If the interface slides, it
-    also has `critical_stress` and `critical_load`, the load factor that carries
-    this stress statically. The two load factors differ by the stress that waves
-    radiate. Events that did not happen have the value NaN, with a warning. An
-    overstressed start has no `critical_load`.
-
-    **Speeds.** Use `median_rupture_speed` as the speed of a rupture.
-    `rupture_speed` is the largest apparent speed. It exceeds all wave
-    speeds if a part twice as long as the nucleation length breaks
-    almost at once.
-
-    **Arrested events.** `arrested_events` counts instabilities in which
-    Z V at a node exceeds 7.5 % of the median tau_p - tau_r before the
-    mean stress is as high again or all is calm. `Equilibrium` also
-    counts smaller jumps. If the last nodes beside the end of an extent
-    creep to their residual strength, the interface slides in the last
-    instability before, which is not arrested. A run that stops at
-    "rest" ends before this can be known.
-
-    **Stress scale.** At each node, it is the smaller of tau_p - tau_r
-    and three times the drop tau_0 p + tau_i - tau_r at the largest load
-    so far, so that nodes far stronger than the load do not count. The
-    stress scale is the mean over nodes.
-
-    **End.** `kinetic_stress` is the mean stress after the first step in
-    which every node that can break is at its residual strength.
-    Energies and moment refer to the end of the run. A sliding interface
-    ends with that step, in which radiated energy and moment grow by
-    about 2 %. The last nodes beside the end of an extent may creep to
-    their residual strength while the load still rises. This is no
-    instability, and `critical_stress` remains the mean stress at the
-    highest instability before. It is NaN if all nodes that can break
-    did so without an instability.
-
-    With "onset" and "rest", critical values belong to the highest
-    instability, which need not end in sliding. With "onset", all values
-    that are not final are NaN: kinetic stress, stress drop, moment,
-    energies, rupture speeds and arrested events.
-
-    **Events.** An event is followed from its onset until the interface
-    is calm, or until the next event begins. The table of `events` holds
-    it if a node slipped so fast as an arrested event must. Its moment,
-    energies and stress drops are the values at its end, and
-    `event_duration` is the time from its first to its last fast slip.
-    An event that the end of the run cuts short is left out, such as the
-    sliding of an interface without ends.
-
-    **Slow loading.** Let r be the rise of the load while shear waves
-    cross the nucleation length, as a share of the stress scale. On 60
-    heterogeneous faults of 43 nucleation lengths (mode III, peak
-    strength 25.2 to 36 MPa, residual strength 25 MPa), the moment of
-    all events together was too large by 2 % at r = 1e-4, 15 % at 3e-4,
-    38 % at 1e-3 and 97 % at 3e-3, and the critical load by 0.06, 0.2,
-    0.6 and 2 %. The number of arrested events rose from 9 to 14, 13, 14
-    and 19 (``validation/faults.py``). If there are arrested events and
-    r is above 1e-3, a warning gives r and the rate to use.
-
-    **No reverse slip.** A node whose slip rate would become negative
-    sticks, keeps its weakened strength, and slips again only when the
-    stress reaches it. If the stress fell below minus the strength, a
-    warning gives the place. The boundary integral in Fourier space
-    follows Breitenfeld and Geubelle (1998).
+    Values of events that did not happen are NaN, with a warning.
+    `rupture_speed` is the largest apparent speed and can exceed all wave
+    speeds. Use `median_rupture_speed` as the speed of a rupture.
+    Energies and `seismic_moment` are values at the end of the run. See
+    docs/ruptures.md for the definitions of instabilities, events and
+    their ends, and for the error by fast loading. A node never slips
+    backwards (Breitenfeld and Geubelle, 1998).
     """
 
     loading_rate: Positive | None = None
     end_time: Positive | None = None
-    load: LoadHistory = None
+    # The second name is a former one, which is documented nowhere.
+    load_history: LoadHistory = Field(
+        default=None, validation_alias=AliasChoices("load_history", "load")
+    )
     kernel_tolerance: Positive = 1e-6
     courant: ShareUpToOne = 0.9
-    slip_step: ShareUpToOne = 0.02
-    load_step: ShareUpToOne = 1e-3
     implicit: Flag = True
     arrival: ShareUpToOne = 0.5
     start: Literal["equilibrium", "rest"] = "equilibrium"
@@ -236,21 +156,16 @@ class Rupture:
     # Profiles that `Problem.sample` refuses for other methods.
     accepts: ClassVar[tuple[str, ...]] = ("overstress",)
     label = "rupture"
+    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
     counted_only: ClassVar[bool] = True
 
     @pydantic.model_validator(mode="after")
     def _consistent(self) -> Rupture:
         problems = []
-        if self.loading_rate is not None and self.load is not None:
-            problems.append("loading_rate: give either loading_rate or load. Got both")
+        if self.loading_rate is not None and self.load_history is not None:
+            problems.append("loading_rate: give either loading_rate or load_history. Got both")
         if self.stop == "time" and self.end_time is None:
             problems.append("end_time: is needed with stop='time', in s. Got None")
-        if not self.implicit:
-            problems += [
-                f"{name}: has no effect with implicit=False, leave it out"
-                for name in ("slip_step", "load_step")
-                if getattr(self, name) != type(self).__dataclass_fields__[name].default
-            ]
         if problems:
             raise InputError(problems)
         return self
@@ -273,8 +188,10 @@ class Rupture:
         if problem.specimen is not None:
             return specimens.refusals(self, problem)
         reasons = []
-        if self.loading_rate is None and self.load is None:
-            reasons.append("loading_rate: give either loading_rate or load. Got neither")
+        if self.loading_rate is None and self.load_history is None:
+            reasons.append(
+                "loading_rate: give either loading_rate or load_history. Got neither"
+            )
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
@@ -311,20 +228,23 @@ class Rupture:
             return specimens.RuptureSolver(problem, self.events, self.search(problem))
         medium, loading_rate = self.medium(problem), self.loading_rate
         from_rest = self.start != "equilibrium" or not self.implicit
-        static = None if from_rest or loading_rate is None else static_search(problem)
+        static = None if loading_rate is None else static_search(problem)
 
         def solve(rows: Sample) -> dict[str, NDArray[Any]]:
             checks.warn_of_coarse_grid(problem, rows)
-            summaries, rises, cut = [], [], 0
+            summaries, rises, cut, expected = [], [], [], []
             for i in range(rows.samples):
                 run = make_run(self, medium, rows, i)
                 start = None
-                if static and loading_rate:
+                if static and loading_rate and not from_rest:
                     start = slow_start(static, run, rows, i, loading_rate)
                 summaries.append(self._summary_of(run, start, rows, i))
                 rises.append(checks.rise_in_crossing(run, summaries[-1]))
-                cut += run.cut_events
+                cut.append(run.cut_short)
+                expected.append(first_instability(static, rows, i) if static else np.nan)
             checks.warn_of_cut_events(cut)
+            first = np.array([row["first_instability"] for row in summaries])
+            checks.warn_of_missed_jumps(first, expected)
             checks.warn_of_survival(self.stop, summaries)
             checks.warn_of_fast_loading(rises)
             names = self.variables(problem)
@@ -392,7 +312,7 @@ def make_run(
     profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
     steepest = rows.part(slice(sample, sample + 1)).steepest_weakening_rate
-    load = method.load
+    load = method.load_history
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
     # Implicit steps end at these times, because a step across a peak
@@ -456,11 +376,12 @@ def _thresholds(
         rest_stop=method.stop == "rest",
         end_time=np.inf if method.end_time is None else method.end_time,
         breakable=breakable,
+        period_nodes=min(2 * breakable, medium.interface.size),
         calm_slip=reach / medium.problem.effective_modulus,
         calm_count=max(_MIN_CALM_STEPS, int(np.ceil(crossing))),
         settling_time=_SETTLING_CROSSINGS * reach / medium.problem.solid.shear_wave_speed,
-        slip_step=method.slip_step,
-        load_step=method.load_step,
+        slip_step=SLIP_STEP,
+        load_step=LOAD_STEP,
         smallest_step=_EXPLICIT_STEPS_IN_IMPLICIT * medium.step,
         unstable_slip_rate=UNSTABLE_STRESS * typical / medium.impedance,
         front_share=float(front_share),

@@ -151,7 +151,7 @@ def simulate_rupture(
     checks.warn_of_slip(run, state)
     recorder.flush(state, last=True)
     run.cut_event(state)
-    checks.warn_of_cut_events(run.cut_events)
+    checks.warn_of_cut_events([run.cut_short])
     dataset = recorder.take() if save.to is None else open_rupture(save.to, fields=())
     dataset.attrs["stopped"] = stopped
     result = _complete(dataset, method, run, state, rows)

@@ -41,6 +41,7 @@ from stiction.methods.dynamics.memory import grown_memory
 from stiction.methods.dynamics.state import Phase, RuptureState
 from stiction.methods.dynamics.summary import energy_balance
 from stiction.methods.equilibrium.dense.search import DenseSearch
+from stiction.methods.equilibrium.endings import PathStatus
 from stiction.methods.equilibrium.sample import refused, sample_of
 from stiction.methods.equilibrium.strength import StaticSample, exceeds
 from stiction.problem.problem import Problem
@@ -57,6 +58,17 @@ def static_search(problem: Problem) -> DenseSearch | None:
     if problem.interface.is_plane or refused(problem.friction):
         return None
     return DenseSearch(problem)
+
+
+def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
+    """Return the mean stress of the first instability in equilibrium, Pa. NaN if there is none."""
+    if np.any(rows.strength[number] <= rows.initial_stress[number]):  # overstressed
+        return np.nan
+    state = search.next(sample_of(rows, search.pieces, number))
+    if state.status != PathStatus.UNSTABLE:
+        return np.nan
+    load = state.load - search.problem.relief(state.slip)
+    return float(rows.part(slice(number, number + 1)).mean_stress(np.array([load]))[0])
 
 
 def slow_start(

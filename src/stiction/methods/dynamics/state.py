@@ -187,6 +187,7 @@ class Thresholds(NamedTuple):
     rest_stop: bool  # return when all is at rest after an event
     end_time: float  # s
     breakable: int  # number of nodes that can break
+    period_nodes: int  # nodes of a period of two extents, to which means in `diagnostics` refer
     calm_slip: float  # slip of a calm step per rise of the load, m/Pa; see `explicit._calm`
     calm_count: int  # calm steps in a row after which implicit steps take over
     settling_time: float  # time after the last fast slip at which an event has ended, s

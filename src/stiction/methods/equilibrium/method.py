@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from numpy.typing import NDArray
 from pydantic import Field
 
-from stiction.base.model import Flag, Number, Real, model
+from stiction.base.model import INTERNAL_MEMBERS, Flag, Listed, Number, Real, model
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.contact.solver import (
     OF_SLIDERS,
@@ -21,7 +21,7 @@ from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
-Gap: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
+Tolerance: TypeAlias = Annotated[Real, Field(ge=1e-10, le=1e-2)]
 
 VARIABLES = {
     "certificate_gap": Variable("Pa", "distance between the bounds of the first instability"),
@@ -49,7 +49,7 @@ ON_NODES = {
 
 
 @model(kw_only=True)
-class Equilibrium:
+class Equilibrium(Listed):
     """Exact quasi-static onset with all interactions between patches.
 
     A line of 1024 nodes takes under a millisecond, a plane of 128 x 128
@@ -66,7 +66,7 @@ class Equilibrium:
     stress and load profile may vary along the interface.
 
     On planes the programme is solved with Fourier transforms. The
-    distance between its bounds is the share `gap` of the load. Results
+    distance between its bounds is the share `tolerance` of the load. Results
     contain the lower bound, at which there is an equilibrium.
 
     Parameters
@@ -85,7 +85,7 @@ class Equilibrium:
         which it slides is included. The events form a sequence: stress
         and slip continue from event to event. The variables are
         described in `equilibrium_path`.
-    gap : float
+    tolerance : float
         On planes, the distance between the bounds as a share of the
         load, 1e-10 to 1e-2. Lines are solved to round-off, or to 1e-9
         if thousands of nodes slip.
@@ -126,12 +126,13 @@ class Equilibrium:
     sensitivity: Flag = False
     slip: Flag = False
     events: Number = 0
-    gap: Gap = 1e-6
+    tolerance: Tolerance = 1e-6
     type: Literal["equilibrium"] = "equilibrium"
     first_stage: ClassVar[str] = "local_criterion"
     scaling: ClassVar[str] = "stretch"
     samples_at_point: ClassVar[int] = 500
     label = "equilibrium"
+    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time for a sample on a core, s."""
@@ -168,9 +169,9 @@ class Equilibrium:
                 "sensitivity: applies to lines only. Leave it out, and take differences of st.onset"
                 " with the strength of a few nodes raised"
             )
-        if not problem.interface.is_plane and self.gap != type(self)().gap:
+        if not problem.interface.is_plane and self.tolerance != type(self)().tolerance:
             reasons.append(
-                "gap: applies to planes only. Lines are solved to round-off. Leave it out"
+                "tolerance: applies to planes only. Lines are solved to round-off. Leave it out"
             )
         return reasons
 
@@ -216,4 +217,4 @@ class Equilibrium:
         """Return a solver for samples of a problem."""
         if isinstance(problem.specimen, Slider):
             return SliderSolver(problem, self)
-        return OnsetSolver(problem, self, make_search(problem, self.gap))
+        return OnsetSolver(problem, self, make_search(problem, self.tolerance))

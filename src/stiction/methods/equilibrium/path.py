@@ -138,7 +138,9 @@ def equilibrium_path(
         Over 'event', all arrested events up to global sliding, even
         beyond the given loads, and the event in which an interface that
         ends slides: `event_load` (tau_0, Pa), `event_stress` (mean
-        stress on the interface, Pa), `event_position` (m),
+        stress on the interface, Pa), `event_hypocentre`, from which the
+        event starts, `event_position`, the centre of the slip,
+        `event_start` and `event_end`, the ends of the patch (m),
         `event_length` of the patch that slipped (m), `event_mean_slip`
         over that length (m), `event_largest_slip` (m), `event_moment`,
         G times the integral of the added slip (N per unit depth), and
@@ -158,8 +160,7 @@ def equilibrium_path(
         machine, force over stiffness, and is NaN under a dead load.
         Events also have `event_stress_drop` (fall of the mean stress,
         Pa), `event_travel` and `event_crosshead_travel` before the
-        event (m), `event_travel_step` (m) and `event_start`, the left
-        end of the patch (m). With a thickness, width or area, mean
+        event (m), and `event_travel_step` (m). With a thickness, width or area, mean
         stresses are also given as forces: `force`, `event_force` and
         `event_force_drop` (N).
 

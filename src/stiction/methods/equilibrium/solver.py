@@ -235,6 +235,9 @@ class OnsetSolver:
         stable = first.status == PathStatus.STABLE
         if stable:
             names = OF_INSTABILITY & values.keys()
+            if interface.is_held and self.problem.specimen is None:
+                # As in a rupture, which knows the onset of an instability only.
+                names |= {"critical_load", "critical_stress"}
             values |= {name: np.full_like(values[name], np.nan) for name in names}
         if self.options.slip:
             values["slip"] = first.slip.reshape(shape)
@@ -290,7 +293,7 @@ class OnsetSolver:
         cause = "machine is so stiff" if self.problem.has_machine else "extent is so small"
         warn_of_samples(
             f"no patch becomes unstable in {{samples}}: the {cause} that the interface slides"
-            " stably, and first_instability is NaN",
+            " stably. Values of an instability are NaN",
             np.isnan(first),
         )
         warn_of_samples(
