@@ -44,12 +44,12 @@ INPUTS: dict[str, dict[str, Any]] = {  # owner: other values of its fields
         "weakening_rate": 0.4e12, "critical_slip": 2e-6, "fracture_energy": 1.0,
         "residual_strength": 0.5e6, "residual_ratio": 0.4,
     },
-    "load_history": {
+    "load": {
         "profile": 2.0, "initial_stress": 1e5, "normal_pressure": 3e6, "pressing_force": 1e3,
     },
     "": {
         "solid": st.Solid(2e9, 0.33, 1170.0), "interface": st.Interface(0.06, 128),
-        "friction": st.LinearWeakening(critical_slip=2e-6), "load_history": st.Load(initial_stress=1e5),
+        "friction": st.LinearWeakening(critical_slip=2e-6), "load": st.Load(initial_stress=1e5),
         "mode": "III", "specimen": st.Blocks(height=0.02),
     },
 }  # fmt: skip
@@ -63,7 +63,7 @@ OF_SPECIMENS: dict[str, dict[str, Any]] = {
         "mass": (st.Rupture(), 5.0),
     },
     "interface": {"width": 0.02},
-    "load_history": {"profile": np.linspace(0.5, 1.5, 64)},
+    "load": {"profile": np.linspace(0.5, 1.5, 64)},
 }  # fmt: skip
 COEFFICIENTS = {"friction_coefficient": 0.5 + 1e-7 * JOINT_STRENGTH}
 OPTIONS: list[tuple[Any, dict[str, Any]]] = [
