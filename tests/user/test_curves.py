@@ -204,3 +204,101 @@ def test_p_values_hold_for_four_tests():
         error = (level * (1.0 - level) / p.size) ** 0.5
         assert np.mean(p <= level) < level + 3.0 * error
         assert np.mean(p <= level) > 0.6 * level
+
+
+def test_slip_loads_over_clamping_forces(tmp_path):
+    """EN 1090-2, annex G: two surfaces, a force of each test, and two slip loads of a specimen."""
+    path = tmp_path / "slip.csv"
+    loads, forces = (
+        np.array([196.1, 173.4, 188.7, 183.6]),
+        np.array([392.0, 388.5, 390.1, 391.7]),
+    )
+
+    def written(loads=loads, forces=forces, names=(1, 1, 2, 3), head="clamping force [N]"):
+        rows = [f"{n};{a};{f}" for n, a, f in zip(names, loads, forces, strict=True)]
+        path.write_text("\n".join([f"specimen;slip load [kN];{head}", *rows]))
+        return path
+
+    expected = loads / (2.0 * forces)
+    peaks = st.read_peaks(written(forces=1e3 * forces), normal="clamping force [N]", surfaces=2)
+    np.testing.assert_allclose(peaks.values[0], expected, rtol=1e-12)
+    np.testing.assert_allclose(peaks.normal_forces[0], 1e3 * forces, rtol=1e-12)
+    assert (peaks.unit, peaks.specimens[0].tolist()) == ("1", ["1", "1", "2", "3"])
+    assert "normal force" in str(peaks)
+    for normal in (196e3, "196 kN"):
+        peaks = st.read_peaks(written(), normal=normal, surfaces=2)
+        np.testing.assert_allclose(peaks.values[0], loads / 392.0, rtol=1e-12)
+    clamping = {"normal": "clamping force [N]", "surfaces": 2}
+    refuses("0.05 and 1 ... swapped", lambda: st.read_peaks(written(), **clamping))
+    swapped = {"value": 2, "normal": "slip load [kN]"}
+    refuses("swapped", lambda: st.read_peaks(written(forces=1e3 * forces), **swapped))
+    holes = [392e3, "", 390e3, 391e3]
+    refuses("no force in line 3", lambda: st.read_peaks(written(forces=holes), **clamping))
+    refuses("2 specimens", lambda: st.read_peaks(written(names=(1, 1, 2, 2))))
+    refuses("unit ... normal force", lambda: st.read_peaks(
+        written(head="clamping force"), normal="clamping force"))  # fmt: skip
+    refuses("surfaces: needs normal", lambda: st.read_peaks(written(), surfaces=2))
+    mu = tmp_path / "mu.csv"
+    mu.write_text("test,COF\n1,0.3\n2,0.4\n3,0.35\n")
+    refuses("coefficients already", lambda: st.read_peaks(mu, normal=1e3))
+
+
+def test_readings_that_are_no_friction():
+    """A spike is left out; saturation and a missing tare are named; noise moves no peak."""
+    noise = np.random.default_rng(0).standard_normal((20, 2001))
+
+    def read(force, **options):
+        return st.read_curve((TRAVEL, force), unit="N", travel_unit="m", **options)[0]
+
+    force = machine(noise=0.1)
+    force[700] = 180.0
+    with pytest.warns(st.AccuracyWarning, match="above both neighbours"):
+        assert is_machine(read(force), 0.1)
+    with pytest.warns(st.AccuracyWarning, match="saturated"):
+        read(np.minimum(machine(noise=0.1), 90.0))
+    with pytest.warns(st.AccuracyWarning, match="tared"):
+        read(machine(noise=0.1) + 20.0)
+    flat = 100.0 * np.tanh(TRAVEL / 2e-4)
+    found = [read(flat + row) for row in noise]
+    # The largest of hundreds of readings lies 3 standard deviations too
+    # high; the parabola is off by the curvature of the top.
+    assert np.mean([curve.peak for curve in found]) == pytest.approx(flat.max(), abs=0.25)
+    sharp = np.array([read(machine() + 0.3 * row).peak for row in noise])
+    errors = np.array([read(machine() + 0.3 * row).peak_error for row in noise])
+    assert sharp.mean() == pytest.approx(103.0, abs=4.0 * errors.mean() / 20**0.5 + 0.1)
+    assert sharp.std() == pytest.approx(errors.mean(), rel=0.6)  # of 20 records
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_plateaus_of_records_that_end_in_other_ways(noise):
+    t = np.linspace(0.0, 100.0, 2000)
+    added = noise * np.random.default_rng(0).standard_normal(t.size)
+    slides = np.where(t < 50, 2 * t, 70.0)
+    again = np.interp(t, [0, 40, 40.1, 60, 60.1, 100], [0, 100, 80, 95, 50, 50])
+    for force, plateau in (
+        (slides, 70.0),
+        (np.where(t > 80, 70 * (1 - (t - 80) / 20), slides), 70.0),  # unloads
+        (np.where(t > 50, 70 - 0.2 * (t - 50), slides), 65.0),  # decays from 70 to 60
+        (again, 50.0),  # a drop at the peak is arrested
+    ):
+        curve = st.read_curve((t, force + added), unit="N", travel_unit="s")[0]
+        assert curve.plateau == pytest.approx(plateau, abs=0.5)
+
+
+def test_cycles_of_stick_slip():
+    rng = np.random.default_rng(0)
+    force, strengths, now = [], [45.0 + 2.7 * rng.normal()], 0.0
+    while len(strengths) < 40:
+        now += 0.11
+        if now > strengths[-1]:
+            now = 0.65 * strengths[-1]
+            strengths.append(45.0 + 2.7 * rng.normal())
+        force.append(now)
+    force = np.array(force) + 0.05 * rng.standard_normal(len(force))
+    t = 0.01 * np.arange(force.size)
+    refuses("stick-slip ... split='cycles'", lambda: st.read_curve((t * u.s, force * u.N)))
+    curves = st.read_curve((t * u.s, force * u.N), split="cycles")
+    assert len(curves) == 39
+    assert curves[4].name == "test, cycle 5"
+    # A cycle ends between two readings, which are 0.11 N apart.
+    np.testing.assert_allclose(curves.peaks, strengths[:-1], atol=0.11 + 3.5 * 0.05)

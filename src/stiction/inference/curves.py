@@ -576,7 +576,7 @@ def _curve(name: str, readings: Readings, noise: float | None, split: Split | No
         peak=peak, peak_error=error,
         peak_travel=float(travel[top]),
         drops=Drops(travel[starts], force[starts], force[starts] - force[ends]),
-        plateau=_plateau(force, threshold),
+        plateau=math.nan if split == "cycles" else _plateau(force, threshold),
     )  # fmt: skip
 
 

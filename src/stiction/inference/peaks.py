@@ -331,7 +331,9 @@ def _of_table(
         values, si = _coefficients(values, forces, si, surfaces), "1"
     elif surfaces != 1:
         raise InputError("surfaces: needs normal=, the normal force. Leave it out")
-    labels = np.array(names[0].cells or names[0].values.astype(str))[kept] if names else None
+    labels = (
+        np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept] if names else None
+    )
     if labels is not None and 1 < np.unique(labels).size < MIN_PEAKS:
         raise InputError(
             f"holds {np.unique(labels).size} specimens in {names[0]}, at least {MIN_PEAKS} are"

@@ -66,6 +66,9 @@ def read_profile(
 ) -> xr.DataArray:
     """Read a profile along the interface from a file or a labelled array, in SI units.
 
+    A column is read if its heading, or the caller, says that it is the
+    wanted quantity; if more than one column could be it, none is read.
+
     Parameters
     ----------
     source : path, array, or table with labels
@@ -79,11 +82,13 @@ def read_profile(
         below comments that state its width and height (Gwyddion), or
         a binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
-        Name, heading or number (from 0) of the column, coordinate or
-        variable. By default, columns are recognised by a name such as
-        ``x`` or ``position``, and ``strength`` or ``tau_p``, or else as
-        the single column in a unit of length or of `quantity`. If two
-        columns have no headings, the first is x.
+        Heading, name or number (from 0) of the column, coordinate or
+        variable. By default `value` is the column called as the
+        quantity, tau_p, shear strength, COF, Reibzahl, ... or the only
+        column with numbers besides x, specimens and times, and `x` is
+        the column called x, position, travel, Weg, ... or the only
+        column in a unit of length. If two columns have no headings, the
+        first is x.
     unit, x_unit : str, optional
         Units of the values and the positions, if the source does not
         state them. By default SI.
@@ -117,7 +122,8 @@ def read_profile(
     -------
     xarray.DataArray
         Profile over 'x' (m), or over 'x' and 'y' on a plane, with
-        `units`.
+        `units`. Attributes state what was read: file, column, unit,
+        number of values, other columns, and rows that were left out.
 
     Raises
     ------
