@@ -221,7 +221,7 @@ def modes(run: Runner) -> xr.Dataset:
     parts = []
     for ratio in RATIOS:
         field, interface = strength(ratio), PROBLEM.interface
-        spectrum = dataclasses.replace(field.spectrum, truncation=None, power_kept=1.0 - 1e-7)
+        spectrum = dataclasses.replace(field.spectrum, power_kept=1.0 - 1e-7)
         more = dataclasses.replace(field, spectrum=spectrum)
         tau_p = field.sample(interface, samples=200, seed=run.seed)
         usual = st.theory.nucleation_stress(PROBLEM, tau_p).min(axis=1)

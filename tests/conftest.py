@@ -98,7 +98,7 @@ def make_strength(problem):
     from setups import beta_strength
 
     def make(ratio=0.5, **options):
-        return beta_strength(ratio * problem.nucleation_length, truncation=2.5, **options)
+        return beta_strength(ratio * problem.nucleation_length, **options)
 
     return make
 

@@ -86,13 +86,13 @@ def beta_strength(
     correlation_length: float,
     low: float = 0.66e6,
     high: float = 1.66e6,
-    truncation: float | None = None,
+    power_kept: float | None = None,
     **options: Any,
 ) -> st.RandomField:
     """The paper's marginal, on other bounds perhaps, with its spectrum of another length."""
     return st.RandomField(
         st.Beta(alpha=1.5, beta=3.0, low=low, high=high),
-        st.PowerLawSpectrum(correlation_length, truncation=truncation),
+        st.PowerLawSpectrum(correlation_length, power_kept=power_kept),
         **options,
     )
 

@@ -60,5 +60,5 @@ def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.Rando
     length = correlation_ratio * problem.nucleation_length
     return st.RandomField(
         marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        spectrum=st.PowerLawSpectrum(correlation_length=length, exponent=4.0, truncation=2.5),
+        spectrum=st.PowerLawSpectrum(correlation_length=length, exponent=4.0),
     )

@@ -43,10 +43,9 @@ def field_of(marginal, correlation_length=2e-3, **options):
     ("exponent", "kept"), [(4.0, 0.9997), (2.0, 0.977), (1.5, 0.93), (1.0, 0.76)]
 )
 def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
-    spectrum = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent, truncation=2.5)
-    digits = len(str(kept)) - 2  # as many as are printed
-    assert round(spectrum.power_within(spectrum.cutoff()), digits) == kept
     usual = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent)
+    digits = len(str(kept)) - 2  # as many as are printed
+    assert round(usual.power_within(2.5 * usual.scale), digits) == kept
     assert usual.power_within(usual.cutoff()) == pytest.approx(0.9997, abs=3e-5)
 
 
@@ -91,7 +90,7 @@ def test_a_cut_of_a_plane_has_the_correlation_of_the_line(spectrum):
 
 
 def test_efolding_lengths():
-    whole = st.SquaredExponentialSpectrum(correlation_length=0.7, truncation=3.0)
+    whole = st.SquaredExponentialSpectrum(correlation_length=0.7, power_kept=1.0 - 1e-15)
     assert whole.efolding_length == pytest.approx(0.7, rel=1e-12)
     # The power left out by truncation at 1 - 1e-6 lengthens it by about as much.
     rough = st.ExponentialSpectrum(correlation_length=0.7, power_kept=1.0 - 1e-6)
@@ -203,7 +202,7 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
     exponential = st.ExponentialSpectrum(0.3, power_kept=0.8)
     fields = [
         beta_strength(0.25),
-        beta_strength(0.25, truncation=1.5),
+        beta_strength(0.25, power_kept=0.99),
         beta_strength(0.25, anisotropy=2.5),
         dataclasses.replace(beta_strength(1.0), spectrum=exponential, mean_mode=True),
     ]
@@ -328,7 +327,9 @@ def test_tails_too_heavy_for_a_correlation_are_said(distribution):
 @pytest.mark.parametrize("exponent", [0.7, 1.0])
 def test_efolding_length_is_that_of_the_modes_that_are_sampled(exponent):
     """On an interface of a thousand lengths, by its modes."""
-    spectrum = st.PowerLawSpectrum(1.0, exponent=exponent, truncation=2.5)
+    spectrum = st.PowerLawSpectrum(1.0, exponent=exponent)
+    kept = spectrum.power_within(2.5 * spectrum.scale)
+    spectrum = dataclasses.replace(spectrum, power_kept=kept)
     spectrum = spectrum.with_efolding_length(0.05)
     field = st.RandomField(beta_strength(1.0).marginal, spectrum, mean_mode=True)
     interface = st.Interface(length=50.0, nodes=1000 * 64)

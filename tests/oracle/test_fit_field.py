@@ -246,8 +246,8 @@ def test_what_mean_and_trend_take_is_given_back():
 
 def test_a_truncation_that_is_given_is_where_the_spectrum_ends():
     """Faded out over a fifth, as it was, the correlation length came out 2.5 % too long."""
-    spectrum = st.PowerLawSpectrum(1e-2, exponent=2.0, truncation=2.5)
-    told = SIMPLE | {"spectrum": {"type": "power_law", "exponent": 2.0, "truncation": 2.5}}
+    spectrum = st.PowerLawSpectrum(1e-2, exponent=2.0, power_kept=0.9773)
+    told = SIMPLE | {"spectrum": {"type": "power_law", "exponent": 2.0, "power_kept": 0.9773}}
     fit = st.fit_field(records_of(spectrum, 1, 40), PIECE, **told)
     assert fit.parameters["efolding_length"] == pytest.approx(
         spectrum.efolding_length, rel=0.01

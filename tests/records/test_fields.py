@@ -24,7 +24,7 @@ MARGINALS = {
 }
 SPECTRA = {
     "power": st.PowerLawSpectrum(3.1e-3, exponent=1.3, power_kept=0.97),
-    "cut": st.PowerLawSpectrum(3.7e-3, truncation=2.5),
+    "cut": st.PowerLawSpectrum(3.7e-3),
     "exponential": st.ExponentialSpectrum(2.9e-3, power_kept=0.93),
     "gauss": st.SquaredExponentialSpectrum(2.3e-3),
 }

@@ -31,7 +31,7 @@ RECORDS = [record(180, 0.036, 1, 9e4), in_mm(record(130, 0.026, 2, -7e4))]
 PEAKS = np.array([7.31e5, 7.55e5, 7.02e5, 7.74e5, 7.18e5, 7.43e5])
 LENGTHS = {0.031: PEAKS[:4], 0.062: 0.98 * PEAKS[2:]}
 PROBLEM = make_problem(96, 0.031, weakening_rate=0.42e12, load=st.Load(normal_pressure=2.3e6))
-BOUNDED = beta_strength(2.3e-3, truncation=2.5)
+BOUNDED = beta_strength(2.3e-3)
 
 
 def inferred(peaks=PEAKS, problem=PROBLEM, field=BOUNDED, **more):

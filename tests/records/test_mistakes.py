@@ -208,7 +208,7 @@ def planned(designs):
 EVEN = st.RandomField(st.Lognormal(mean=1e6, cv=1e-4), st.PowerLawSpectrum(4e-3))
 SLOW = st.Rupture(loading_rate=9e8)
 SEVEN = 0.7e6 + 1e4 * np.arange(7.0)
-FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "truncation"]
+FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "power_kept"]
 FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (4e11, 6e11)}
 MEAN = "marginal.mean"
 PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})

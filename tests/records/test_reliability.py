@@ -18,7 +18,7 @@ from stiction.random.stresses import share_below_residual
 
 calls = Calls()
 COUNTED = "counting of many samples, tests/oracle/test_reliability.py"
-BOUNDED = beta_strength(2.3e-3, truncation=2.5)
+BOUNDED = beta_strength(2.3e-3)
 LOAD = gradient_load(
     st.Interface(0.031, 96), 0.2, 0.3, initial_stress=4e4, normal_pressure=2.3e6
 )

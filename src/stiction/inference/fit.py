@@ -393,8 +393,7 @@ def fit_field(
     spectrum : str or dict
         'power_law', 'squared_exponential' or 'exponential'. A
         table fixes parameters, such as ``{"type": "power_law",
-        "exponent": 4.0}``. If the table has ``"truncation"``
-        or ``"power_kept"``, the spectrum of the record is
+        "exponent": 4.0}``. If the table has ``"power_kept"``, the spectrum of the record is
         truncated there. Otherwise only the spectrum of the
         resulting field is truncated, by default values.
     detrend : int

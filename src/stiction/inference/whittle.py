@@ -206,7 +206,7 @@ class SpectrumFamily:
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
         noise = values.pop("noise_share", known)
         options = self.fixed | values
-        end_given = not {"truncation", "power_kept"}.isdisjoint(options)
+        end_given = "power_kept" in options
         return Model(
             SPECTRA[self.name](**options), anisotropy, noise, variance, shares, end_given
         )

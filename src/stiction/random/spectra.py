@@ -158,16 +158,9 @@ class ScaledSpectrum(SpectralDensity):
     """
 
     correlation_length: Magnitude
-    truncation: Magnitude | None = dataclasses.field(default=None, kw_only=True)
     power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
     default_power: ClassVar[float] = 0.9997
     """Share of the power retained by the default truncation."""
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Any:
-        if self.truncation is not None and self.power_kept is not None:
-            raise InputError("give either truncation or power_kept. Got both")
-        return self
 
     @abstractmethod
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
@@ -187,8 +180,6 @@ class ScaledSpectrum(SpectralDensity):
         return 1.0 / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
-        if self.truncation is not None:
-            return self.truncation * 2.0 * math.pi / self.correlation_length
         return self.quantile(self.power_kept or self.default_power, dimensions)
 
     @property
@@ -236,12 +227,12 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         Correlation length xi_0 = 2 pi/lambda, m.
     exponent : float
         Exponent in [0.6, 64], 4 in Albertini et al. (2020, Eq. 4).
-    truncation : float, optional
-        Truncation in multiples of lambda. By default it retains 0.99969
-        of the power on a line, but it is at least 2.5. It is 2.5 for
-        the exponent 4 (as in the paper), 11 for 2 and 2,100 for 1.
     power_kept : float, optional
-        Share of the power retained by truncation, in (0, 1).
+        Fraction of the power retained by truncation, in (0, 1). By
+        default the spectrum ends where 0.99969 of the power on a line
+        is retained, but not below 2.5 lambda. It ends at 2.5 lambda for
+        the exponent 4 (as in the paper), at 11 lambda for 2, and at
+        2,100 lambda for 1.
 
     Notes
     -----
@@ -265,7 +256,7 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return 2.0 * math.pi / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
-        if self.truncation is None and self.power_kept is None:
+        if self.power_kept is None:
             # The same wavenumber on a line and on a plane.
             return max(2.5 * self.scale, self.quantile(self.default_power))
         return super().cutoff(dimensions)
@@ -291,9 +282,8 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     correlation_length : float
         Correlation length xi_0, m, at which the correlation of z is 1/e
         without truncation.
-    truncation, power_kept : float, optional
-        Truncation in multiples of 2 pi/xi_0, or share of the power to
-        retain, by default 0.9997.
+    power_kept : float, optional
+        Fraction of the power to retain, by default 0.9997.
     """
 
     type: Literal["squared_exponential"] = "squared_exponential"
