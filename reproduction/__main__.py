@@ -27,7 +27,8 @@ def main(arguments: list[str] | None = None) -> None:
     from reproduction import claims, page, runner
     from reproduction.studies import jobs
 
-    size, out = runner.QUICK if options.quick else runner.USUAL, options.out
+    usual = runner.FULL if options.full else runner.USUAL
+    size, out = runner.QUICK if options.quick else usual, options.out
     run = runner.Runner(out, size, options.seed, options.workers)
     wanted = list(jobs(options.full or options.figure is not None))
     if options.figure:
@@ -39,28 +40,27 @@ def main(arguments: list[str] | None = None) -> None:
         with run.started(wanted) as studies:
             data = runner.Data(studies, size)
             so_far = runner.Data(studies, size, wait=False)
-            for number in _drawn(data, options.figure):
+            known = {"printed", *studies}  # printed results are left out with other parameters
+            drawn = [int(n) for n, about in FIGURES.items() if {*about["needs"]} <= known]
+            for number in [options.figure] if options.figure else drawn:
                 images[number] = _draw(data, number, out / "figures")
                 run.say(f"figure {number}: {images[number]}")
                 if not options.figure:
-                    page.write(out / "report.html", so_far, {}, images, run, [], done=False)
+                    page.write(out / "report.html", so_far, images, run)
             if options.figure:
                 return
-            judged = {
-                title: [finding for claim in rows if (finding := claims.judge(claim, data))]
-                for title, rows in claims.GROUPS.items()
-            }
+            judged, left = claims.judge_all(data)
     texts = (str(w.message) for w in caught if issubclass(w.category, st.AccuracyWarning))
     warned = sorted({re.sub(r"\d\S*", "", text): text for text in texts}.values())
     claims.write_csv(judged, out / "claims.csv")
-    page.write(out / "report.html", data, judged, images, run, warned, done=True)
+    page.write(out / "report.html", data, images, run, judged, left, warned)
     run.say(f"done: {out / 'report.html'}")
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python reproduction", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="500 samples, for a first look")
-    parser.add_argument("--full", action="store_true", help="also what is not in the paper")
+    parser.add_argument("--full", action="store_true", help="also what needs long studies")
     parser.add_argument("--figure", type=int, metavar="N", help="draw this figure only")
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="other parameters")
     parser.add_argument("--out", type=Path, default="stiction-paper", metavar="FOLDER")
@@ -72,32 +72,16 @@ def _options(arguments: list[str] | None) -> argparse.Namespace:
     if options.figure is not None and str(options.figure) not in FIGURES:
         parser.error(f"--figure: must be 1 to {len(FIGURES)}, got {options.figure}")
     if options.parameters:
-        _read_parameters(parser, options.parameters)
+        try:
+            PARAMETERS.update(tomllib.loads(options.parameters.read_text(encoding="utf-8")))
+            importlib.import_module("reproduction.setting")
+        except (OSError, ValueError, importlib.import_module("stiction").UnitWarning) as error:
+            text = " | ".join(str(error).splitlines())
+            parser.error(f"--parameters: {options.parameters}: {text}")
         what_ifs = {path.stem for path in Path(__file__).parent.glob("what_if/*.toml")}
         if options.figure and what_ifs & {*FIGURES[str(options.figure)]["needs"]}:
-            mistake = f"--figure: {options.figure} is about what-ifs"
-            parser.error(f"{mistake}; draw it without --parameters")
+            parser.error(f"--figure: {options.figure} is about what-ifs; drop --parameters")
     return options
-
-
-def _read_parameters(parser: argparse.ArgumentParser, path: Path) -> None:
-    """Read a parameter file, and refuse it before anything is computed."""
-    import stiction as st
-
-    try:
-        PARAMETERS.update(tomllib.loads(path.read_text(encoding="utf-8")))
-        importlib.import_module("reproduction.setting")
-    except (OSError, ValueError, st.UnitWarning) as error:
-        parser.error(f"--parameters: {path}: {' | '.join(str(error).splitlines())}")
-
-
-def _drawn(data, chosen: int | None) -> list[int]:
-    """Return the numbers of the figures whose studies are computed in this run."""
-    if chosen:
-        return [chosen]
-    optional = {"printed", "readings"}  # left out with the reader's own parameters
-    known = optional | {*data.studies}
-    return [int(key) for key, about in FIGURES.items() if {*about["needs"]} <= known]
 
 
 def _draw(data, number: int, folder: Path) -> Path:
@@ -111,7 +95,7 @@ def _draw(data, number: int, folder: Path) -> Path:
         figure = getattr(module, f"figure_{number}")(data)
         common.label(figure, FIGURES[str(number)]["panels"])
         path = folder / f"figure_{number:02}.png"
-        figure.savefig(path, dpi=200)
+        figure.savefig(path, dpi=160)
     return path
 
 

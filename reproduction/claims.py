@@ -24,6 +24,8 @@ NAMES = {"abs": abs} | vars(setting) | vars(estimates) | vars(measures)
 """All that an expression in `statements.toml` and a text in `page.toml` may name."""
 OVER = {"r": RATIOS, "s": SIMULATED, "t": SIMULATED[1:]}
 """An expression that names one of these letters is computed at each of its xi_0/h_n."""
+SCALED = ("Pa", "m", "J/m²")
+"""Units of expressions that are printed with a prefix by the size of the numbers."""
 JINJA = jinja2.Environment(undefined=jinja2.StrictUndefined)
 
 
@@ -41,7 +43,7 @@ class Series:
     rows: Sequence[tuple[float | str, Number]]
 
     def text(self) -> str:
-        """Return the numbers in a line."""
+        """Return the numbers in a line, each with the unit that suits the largest."""
         parts = []
         for key, number in self.rows:
             shown = rounded(number) + (f" {self.unit}" if self.unit else "")
@@ -63,7 +65,9 @@ class Claim:
     judged: Sequence[Sequence[str]]
     beside: Sequence[Sequence[str]] = ()
     note: str = ""
+    correction: str = ""
     kind: str = "finding"
+    own: bool = True
 
 
 def _read() -> dict[str, list[Claim]]:
@@ -78,6 +82,7 @@ def _read() -> dict[str, list[Claim]]:
 
 
 GROUPS = _read()  # all claims by the title of their group
+CLAIMS = {claim.name: claim for rows in GROUPS.values() for claim in rows}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,24 +113,33 @@ def series(quantity: Sequence[str], data: Data, key: str = "") -> Series:
     else:
         value = function(names)
         values = value if isinstance(value, list) else [("", number_of(value))]
-    return Series(f"({key}) {label}" if key else label, unit, values)
+    if unit in SCALED:
+        factor, unit = estimates.prefixed([number.value for _, number in values], unit)
+        values = [(key, number * factor) for key, number in values]
+    return Series(f"({key}) {label}" if key and len(READINGS) > 1 else label, unit, values)
 
 
-def judge(claim: Claim, data: Data) -> Finding | None:
-    """Compute the numbers of a claim and apply its rule; None if a study is left out.
+def judge_all(data: Data) -> tuple[dict[str, list[Finding]], list[tuple[Claim, str]]]:
+    """Return the findings by title, and the claims left out with what each of them needs."""
+    groups, left = {title: [] for title in GROUPS}, []
+    for title, rows in GROUPS.items():
+        for claim in rows:
+            try:
+                groups[title].append(judge(claim, data))
+            except LeftOut as missing:
+                left.append((claim, str(missing)))
+    return groups, left
 
-    Printed numbers are those of the paper's parameters, and are left out with others.
-    """
-    if PARAMETERS and claim.kind == "arithmetic":
-        return None
+
+def judge(claim: Claim, data: Data) -> Finding:
+    """Compute the numbers of a claim and apply its rule, or raise `LeftOut`."""
+    if PARAMETERS and not claim.own:
+        raise LeftOut("printed")
     by_reading = any(re.search(r"\b(v|key)\b", source) for *_, source in claim.judged)
-    try:
-        cases = {
-            key: [series(quantity, data, key) for quantity in claim.judged]
-            for key in (READINGS if by_reading else ("",))
-        }
-    except LeftOut:
-        return None
+    cases = {
+        key: [series(quantity, data, key) for quantity in claim.judged]
+        for key in (READINGS if by_reading else ("",))
+    }
     beside = []
     for quantity in claim.beside:
         with contextlib.suppress(LeftOut):

@@ -3,38 +3,31 @@
 Expressions in `statements.toml` and texts in `page.toml` name functions of this file.
 """
 
+import functools
+import itertools
 import math
-from itertools import pairwise
 
 import numpy as np
 from scipy import stats
 from scipy.special import ndtr
 
-from reproduction import PARAMETERS, TEXTS, setting
+from reproduction import TEXTS, setting
 from reproduction import numbers_with_errors as estimates
-from reproduction.modulus import compare, odds  # noqa: F401  # named in statements.toml
-from reproduction.numbers_with_errors import Number, lower_spread, mean, share
+from reproduction.numbers_with_errors import Number, mean, share
 from reproduction.runner import Data, LeftOut
-from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
-from reproduction.studies import NORMAL, infinite_variance_ratio
+from reproduction.setting import DROP, FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
+from reproduction.studies import NORMAL, READINGS, infinite_variance_ratio
 from stiction.statistics.estimates import density
 
-KPA, MPA = 1e-3, 1e-6
+RESIDUAL, SECOND = setting.RESIDUAL, setting.SECOND
 SPACING = setting.PROBLEM.interface.spacing
 POINT_SKEWNESS = float(setting.MARGINAL.distribution.stats(moments="s"))
 Rows = list[tuple[float | str, Number]]
 
 
-def modulus_excess() -> float:
-    """Return how far the printed modulus exceeds the modulus of plane stress, %."""
-    if PARAMETERS:
-        raise LeftOut("printed")
-    return 100.0 * (setting.STRAIN.effective_modulus / setting.G_STAR - 1.0)
-
-
 def relative_error(function, d: Data, ratio: float) -> float:
-    """Return the relative error of a statistic of tau_cr from 10,000 samples, %."""
-    number = function(d.stress(ratio))
+    """Return the relative error of a statistic of tau_cr - tau_r from 10,000 samples, %."""
+    number = function(d.stress(ratio) - RESIDUAL)
     return 100.0 * number.error / number.value * math.sqrt(d.size.samples / 10_000)
 
 
@@ -42,14 +35,14 @@ def relative_error(function, d: Data, ratio: float) -> float:
 
 
 def tau_n_moments(d: Data, ratio: float) -> tuple[Number, Number, Number]:
-    """Return mean and standard deviation over <tau_p>, and skewness, of tau_n."""
+    """Return mean and deviation of tau_n - tau_r over <tau_p - tau_r>, and skewness of tau_n."""
     shift, spread, skew = estimates.pooled_moments(d.at("moments", "powers", ratio))
     return shift + 1.0, spread, skew
 
 
 def variance(d: Data, ratio: float) -> Number:
     """Return the sampled Var[tau_n]/Var[tau_p]."""
-    spread = tau_n_moments(d, ratio)[1] * (MEAN / setting.DEVIATION)
+    spread = tau_n_moments(d, ratio)[1] * (DROP / setting.DEVIATION)
     return Number(spread.value**2, 2.0 * spread.value * spread.error)
 
 
@@ -75,12 +68,6 @@ def if_skewed_low(number):
     return number
 
 
-def ties(d: Data, ratio: float, gap: float) -> Number:
-    """Return the share of samples with a second minimum within a relative gap."""
-    second, least = (d.at("moments", name, ratio) for name in ("second_tau_n", "least_tau_n"))
-    return share(second < (1.0 + gap) * least)
-
-
 # The onset
 
 
@@ -92,11 +79,14 @@ def trend(d: Data, function, factor: float, low: float = 0.0, high: float = np.i
 
 
 def short_stress(d: Data) -> Rows:
-    """Return 1 - <tau_cr>/<tau_p> towards vanishing correlation."""
-    fine = d["vanishing"]["critical_stress"]
-    rows = [(float(row.correlation_ratio), mean(row.values) / MEAN) for row in fine]
-    rows += trend(d, mean, 1.0 / MEAN, high=0.5)
-    return [(ratio, Number(1.0) - number) for ratio, number in rows]
+    """Return <tau_p - tau_cr>/<tau_p - tau_r> towards vanishing correlation."""
+    rows = ((1 / 64, d.stress(1 / 64, "vanishing")), (FIRST, d.stress(FIRST)))
+    return [(ratio, mean((MEAN - stress) / DROP)) for ratio, stress in rows]
+
+
+def from_vanishing(d: Data, function, ratio: float = FIRST) -> Number:
+    """Return a statistic of tau_cr less that at the shortest length of the vanishing range, Pa."""
+    return function(d.stress(ratio)) - function(d["vanishing"]["critical_stress"][0])
 
 
 def window(d: Data, function) -> Rows:
@@ -107,8 +97,8 @@ def window(d: Data, function) -> Rows:
 
 
 def above_weakest(stress, weakest) -> Number:
-    """Return the mean of tau_cr less the least strength, over <tau_p>."""
-    return mean((stress - weakest) / MEAN)
+    """Return the mean of tau_cr less the least strength, over <tau_p - tau_r>."""
+    return mean((stress - weakest) / DROP)
 
 
 def distance_of_halves(stress, weakest) -> Number:
@@ -130,17 +120,42 @@ def towards_bound(stress, weakest=None) -> Number:
 
 
 def stress_density(d: Data, ratio: float):
-    """Return the density of tau_cr."""
-    return density(d.stress(ratio), bounds=setting.DENSITY_BOUNDS)
+    """Return tau_cr, its density and error, smoothed in ln(tau_cr - tau_p,min), so 0 there."""
+    bound = setting.SUPPORT[0]
+    above = np.maximum(d.stress(ratio) - bound, 1e-9 * setting.DEVIATION)
+    smooth = density(np.log(above))
+    distance = np.exp(smooth.x)
+    return bound + distance, smooth.value / distance, smooth.error / distance
 
 
 # Theory against simulation
 
 
+def paired(d: Data, ratio: float, study: str, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return a variable of the ruptures, and of the same samples of a static study.
+
+    Samples in which an event is arrested are left out: equilibrium counts small jumps that a
+    rupture passes over, so that their first events need not be the same.
+    """
+    moving, static = (d.at(k, "arrested_events", ratio) for k in ("ruptures", "exact"))
+    whole = (moving == 0) & (static[: moving.size] == 0)
+    return tuple(d.at(k, name, ratio)[: moving.size][whole] for k in ("ruptures", study))
+
+
 def offsets(d: Data, ratio: float, study: str) -> np.ndarray:
-    """Return a static prediction over the rupture of the same sample, less one."""
-    stress = d.stress(ratio, "ruptures")
-    return d.at(study, "first_instability", ratio)[: stress.size] / stress - 1.0
+    """Return a static prediction less the rupture of the same sample, over tau_cr - tau_r."""
+    stress, predicted = paired(d, ratio, study, "critical_stress")
+    return (predicted - stress) / (stress - RESIDUAL)
+
+
+def largest_offset(d: Data, study: str) -> float:
+    """Return the largest absolute value of these differences, %."""
+    return 100.0 * max(np.abs(offsets(d, s, study)).max(initial=0.0) for s in SIMULATED)
+
+
+def pairs(d: Data) -> int:
+    """Return the number of ruptures in samples without an arrested event."""
+    return sum(offsets(d, ratio, "exact").size for ratio in SIMULATED)
 
 
 def dynamic_mean(d: Data, ratio: float) -> Number:
@@ -151,8 +166,7 @@ def dynamic_mean(d: Data, ratio: float) -> Number:
 
 def is_misplaced(d: Data, ratio: float, study: str = "local"):
     """Return simulated and predicted positions of onset, and whether they are h_n/2 apart."""
-    place = d.at("ruptures", "critical_position", ratio)
-    predicted = d.at(study, "critical_position", ratio)[: place.size]
+    place, predicted = paired(d, ratio, study, "critical_position")
     length = setting.PRINTED_H if study == "printed" else H
     return place, predicted, setting.distance(place, predicted) > 0.5 * length
 
@@ -167,6 +181,28 @@ def right_where_misplaced(v) -> Number:
     return share(np.concatenate([v("excess", r)[v("misplaced", r)] for r in SIMULATED]) < 0.03)
 
 
+def chance_of(v, least: int = 8) -> Number:
+    """Return the chance of so many misplaced onsets or more, with 20 at each correlation length."""
+    shares = [share(v("misplaced", ratio)) for ratio in SIMULATED]
+
+    def chance(values) -> float:
+        rows = [stats.binom.pmf(np.arange(21), 20, p) for p in values]
+        return 1.0 - float(functools.reduce(np.convolve, rows)[:least].sum())
+
+    values = np.array([number.value for number in shares])
+    errors = np.diag([number.error for number in shares])
+    changes = [chance(np.clip(values + row, 0.0, 1.0)) - chance(values) for row in errors]
+    return Number(chance(values), math.hypot(*changes))
+
+
+def shown(d: Data, name: str, unit: float = 1.0) -> Number:
+    """Return a number of the rupture of Figure 3, left out if one of its events was arrested."""
+    study = d["representative"]
+    if study["arrested_events"] > 0 or name not in study:
+        raise LeftOut("arrested")
+    return Number(float(study[name]) / unit)
+
+
 def front_speed(d: Data) -> Number:
     """Return the median speed of the fronts of all ruptures over c_s, mean."""
     speeds = [d.at("ruptures", "median_rupture_speed", ratio) for ratio in SIMULATED]
@@ -177,12 +213,13 @@ def front_speed(d: Data) -> Number:
 
 
 def growth(d: Data, steps: bool = False) -> Rows:
-    """Return the number of slipping patches at shares of the onset, or its steps."""
+    """Return the number of slipping patches on the way from tau_r to tau_cr, or its steps."""
     study = d["growth"]["patches"].sel(correlation_ratio=FIRST)
     rows = {x: study.sel(level=x).values for x in (0.92, 0.96, 0.999)}
     if steps:  # in the same samples
-        return [(f"{b:g} less {a:g}", mean(rows[b] - rows[a])) for a, b in pairwise(rows)]
-    return [(f"{x:g} tau_cr", mean(row)) for x, row in rows.items()]
+        pairs = itertools.pairwise(rows)
+        return [(f"{b:g} less {a:g}", mean(rows[b] - rows[a])) for a, b in pairs]
+    return [(f"{x:g}", mean(row)) for x, row in rows.items()]
 
 
 def lowering(d: Data) -> Rows:
@@ -198,8 +235,23 @@ def runaway_length(stress, key: str):
     """Return the length over h_n from which on no fracture energy suffices, in a reading."""
     modulus = setting.STRAIN.effective_modulus if key == "b" else setting.G_STAR
     length = H if key == "a" else setting.PRINTED_H
-    drop = np.asarray(stress) - setting.residual(MEAN)
+    drop = np.asarray(stress) - RESIDUAL
     return 4.0 * modulus * largest_energy() / (math.pi * drop**2) / length
+
+
+def runaways(d: Data) -> list[Number]:
+    """Return the smallest and the largest mean of this length over readings and xi_0/h_n."""
+    keys = itertools.product(READINGS, SIMULATED)
+    rows = [mean(runaway_length(d.reading(key, "simulated", s), key)) for key, s in keys]
+    return [function(rows, key=lambda number: number.value) for function in (min, max)]
+
+
+def energy_variation() -> float:
+    """Return the coefficient of variation of the fracture energy."""
+    second, fourth = (
+        setting.MARGINAL.distribution.expect(lambda s, n=n: (s - RESIDUAL) ** n) for n in (2, 4)
+    )
+    return math.sqrt(fourth / second**2 - 1.0)
 
 
 def largest_energy() -> float:
@@ -212,29 +264,37 @@ def arrested(d: Data, ratio: float, study: str = "exact") -> Number:
     return share(d.at(study, "arrested_events", ratio) > 0)
 
 
-def most_arrested(d: Data) -> tuple[float, Number]:
-    """Return the xi_0/h_n with the most arrested samples without inertia, and their share, %."""
-    shares = {ratio: arrested(d, ratio) * 100.0 for ratio in RATIOS}
+def arrested_again(d: Data, ratio: float) -> Number:
+    """Return the share of samples that are arrested without inertia and with it."""
+    events, usual = d["arrest"], arrested(d, ratio)
+    again = events["dynamic"].values[events["ratio"].values == ratio] > 0
+    part = share(again) if again.size else Number(1.0)
+    error = math.hypot(usual.error * part.value, usual.value * part.error)
+    return Number(usual.value * part.value, error)
+
+
+def most_arrested(d: Data, function=arrested) -> tuple[float, Number]:
+    """Return the xi_0/h_n with the most arrested samples, and their share, %."""
+    shares = {ratio: function(d, ratio) * 100.0 for ratio in RATIOS}
     return max(shares.items(), key=lambda item: item[1].value)
 
 
-def rarer(d: Data, study: str) -> Rows:
+def rarer(d: Data, function) -> Rows:
     """Return by how much the last share of arrested samples exceeds the first two."""
-    shares = {ratio: arrested(d, ratio, study) for ratio in (*RATIOS[:2], LAST)}
-    return [(f"less the share at {r:g}", shares[LAST] - shares[r]) for r in RATIOS[:2]]
+    last = function(d, LAST)
+    return [(f"less the share at {r:g}", last - function(d, r)) for r in RATIOS[:2]]
 
 
 def griffith(d: Data, name: str) -> Number:
     """Return the median over samples of the median length of their events over Griffith's."""
     edge = d["driving"].sel(case="edge")
     lengths = edge[name].values.reshape(edge.sizes["sample"], -1)
-    ratios = lengths / edge["griffith"].values[:, : lengths.shape[1]]
-    rows = [row[np.isfinite(row)] for row in ratios]
-    medians = [np.median(row) for row in rows if row.size]
-    low, high = np.quantile(medians, (0.25, 0.75))
-    # A normal distribution has 1.349 deviations between its quartiles.
-    error = 1.2533 * float(high - low) / 1.349 / math.sqrt(len(medians))
-    return Number(float(np.median(medians)), error)
+    expected = edge["griffith"].values[:, : lengths.shape[1]]  # infinite if nothing arrests
+    ratios = np.where(np.isfinite(expected), lengths / expected, np.nan)
+    medians = [np.nanmedian(row) for row in ratios if np.isfinite(row).any()]
+    if not medians:
+        raise LeftOut("griffith")
+    return estimates.quantile(np.array(medians), 0.5)
 
 
 # What if
@@ -254,10 +314,9 @@ def arrest_shares(d: Data, name: str, chosen=None) -> Rows:
     return points(d, name, lambda v: share(v > 0), 1.0, chosen, "arrested_events")
 
 
-def so_many(d: Data, name: str, point: int) -> Number:
-    """Return the chance of as many ruptures with an arrested event as at a point of a what-if."""
-    events = d[f"{name}-inertia"]["arrested_events"].isel(point=point).values > 0
-    return estimates.chance_of_so_many(events, arrested(d, setting.SECOND, "dynamic"))
+def so_many(d: Data, events) -> Number:
+    """Return the chance of so many ruptures with arrested events if the strength alone varied."""
+    return estimates.chance_of_so_many(np.asarray(events) > 0, arrested_again(d, SECOND))
 
 
 def skewed(d: Data, skew: int, ratio: float) -> np.ndarray:
@@ -275,23 +334,9 @@ def exponents(d: Data, index: int) -> Rows:
     ]
 
 
-# Words of the texts
-
-
-def stress(d: Data, ratio: float) -> Number:
-    """Return the mean tau_cr by the local criterion, MPa."""
-    return mean(d.stress(ratio)) * MPA
-
-
-def spread(d: Data, ratio: float) -> Number:
-    """Return the median less the lower quartile of tau_cr, kPa."""
-    return lower_spread(d.stress(ratio)) * KPA
-
-
-def moves(d: Data, function, factor: float = 1.0, first=FIRST, last=LAST) -> str:
-    """Return how a quantity changes from the first to the last correlation length, in words."""
-    start, end = function(d, first) * factor, function(d, last) * factor
+def moves(start: Number, end: Number) -> str:
+    """Return how a stress changes, in words."""
     change = end - start
     word = "falls" if change.value < 0.0 else "rises"
     word = word if abs(change.value) > 2.0 * change.error else "hardly changes"
-    return f"{word} from {estimates.short(start)} to {estimates.short(end)}"
+    return f"{word} from {estimates.si(start, 'Pa')} to {estimates.si(end, 'Pa')}"

@@ -43,6 +43,27 @@ def number_of(value) -> Number:
     return value if isinstance(value, Number) else Number(float(value))
 
 
+PREFIXES = {"T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "": 1.0, "m": 1e-3, "µ": 1e-6}
+
+
+def prefixed(values, unit: str) -> tuple[float, str]:
+    """Return the factor and the name of the unit in which the largest value is 0.1 to 100."""
+    size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    most = 1e3 if unit == "m" else math.inf  # there are kilometres, and no megametres
+    fitting = (name for name, value in PREFIXES.items() if value <= min(10.0 * size, most))
+    prefix = next(fitting, "") if size else ""
+    return 1.0 / PREFIXES[prefix], prefix + unit
+
+
+def si(value, unit: str) -> str:
+    """Return a value or a number, without its error, with the unit that suits its size."""
+    number = number_of(value)
+    factor, name = prefixed([number.value], unit)
+    text = short(number * factor)
+    exact = "." in text and not number.error
+    return f"{text.rstrip('0').rstrip('.') if exact else text} {name}"
+
+
 def rounded(number: Number) -> str:
     """Return a number with its error, to two digits of the error."""
     value, error = number.value, number.error
@@ -81,6 +102,8 @@ def _estimate(value, influence) -> Number:
 
 def mean(values) -> Number:
     values = np.ravel(values)
+    if values.size < 2:
+        return Number(math.nan, math.nan)
     return Number(float(values.mean()), float(values.std(ddof=1)) / math.sqrt(values.size))
 
 

@@ -1,4 +1,4 @@
-"""The page: eight sentences, the figures, and an appendix with statements and provenance.
+"""The page: verdicts on the abstract, what is new, the figures, and an appendix.
 
 The page is written whenever a figure is ready. A text whose studies are not ready is left out.
 """
@@ -14,11 +14,12 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup, escape
 
-from reproduction import PARAMETERS, TEXTS, modulus
-from reproduction.claims import GROUPS, JINJA, NAMES, judge
+from reproduction import PARAMETERS, TEXTS
+from reproduction.claims import CLAIMS, JINJA, NAMES, series
 from reproduction.numbers_with_errors import rounded, short
-from reproduction.rules import Verdict, below
+from reproduction.rules import Verdict
 from reproduction.runner import Data, LeftOut
+from reproduction.studies import READINGS, jobs
 
 _NAME = re.compile(r"\b(xi|tau|h|d|x|v|G|c|L)_(\w+(?:,\w+)?)")
 
@@ -37,29 +38,25 @@ def physics(text: str) -> Markup:
     return Markup(plain.replace(" +- ", " ± "))
 
 
-OUTCOMES = {Verdict[name]: text for name, text in TEXTS["outcome"].items()}
+JINJA.filters |= {"number": rounded, "short": short}
+JINJA.filters["listed"] = lambda ratios: ", ".join(f"{ratio:g}" for ratio in ratios)
+_template = functools.cache(JINJA.from_string)
+_PAGE = jinja2.Environment(autoescape=True, trim_blocks=True)
+_PAGE.filters |= JINJA.filters | {"physics": physics}
+_page = functools.cache(_PAGE.from_string)
 
 
-def outcome(data: Data, name: str) -> str:
-    """Return the verdict on a statement as the beginning of a sentence."""
-    (claim,) = (claim for rows in GROUPS.values() for claim in rows if claim.name == name)
-    if (finding := judge(claim, data)) is None:
-        raise LeftOut(name)
-    return OUTCOMES[finding.verdict]
+def write(path: Path, data: Data, images, runner, groups=None, left=(), warned=()) -> None:
+    """Write the page: images by figure number, and as soon as all is done findings by title.
 
-
-def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool) -> None:
-    """Write the page: groups of findings by title, images by figure number, texts of warnings."""
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True)
-    JINJA.filters |= {"number": rounded, "short": short}
-    environment.filters |= JINJA.filters | {"physics": physics}
-    known = NAMES | {"d": data, "own": PARAMETERS, "OUTCOMES": OUTCOMES, "below": below}
-    known["outcome"] = functools.partial(outcome, data)
+    `left` are claims left out with the study that each needs, `warned` the texts of warnings.
+    """
+    known = NAMES | {"d": data, "own": PARAMETERS, "READINGS": READINGS}
 
     def filled(text: str) -> str:
         """Return a text with its numbers, or nothing if one of its studies is left out."""
         try:
-            return " ".join(JINJA.from_string(text).render(known).split())
+            return " ".join(_template(text).render(known).split())
         except LeftOut:
             return ""
 
@@ -71,11 +68,20 @@ def write(path: Path, data: Data, groups, images, runner, warned, *, done: bool)
         }
         for number in images if (about := TEXTS["figure"][str(number)])
     ]  # fmt: skip
-    template = environment.from_string(Path(__file__).with_name("page.html").read_text("utf-8"))
-    known |= {"texts": TEXTS, "figures": figures, "groups": groups, "done": done}
-    known |= {"verdicts": Verdict, "modulus": modulus, "runner": runner, "warnings": warned}
-    text = template.render(
-        known, short=[line for line in map(filled, TEXTS["short"]) if line], version=version,
+    findings = {row.claim.name: row for rows in (groups or {}).values() for row in rows}
+    abstract = []
+    for row in TEXTS["abstract"] if groups else ():
+        claim, found = CLAIMS[row["claim"]], findings.get(row["claim"])
+        abstract.append((row["sentence"], claim, found, found and series(row["number"], data)))
+    computable = {name for name, *_ in jobs(full=True)}
+    known |= {"texts": TEXTS, "figures": figures, "groups": groups, "abstract": abstract,
+              "later": [claim for claim, study in left if study in computable],
+              "never": [claim for claim, study in left if study not in computable],
+              "filled": filled, "verdicts": Verdict, "runner": runner,
+              "warnings": warned}  # fmt: skip
+    source = Path(__file__).with_name("page.html").read_text("utf-8")
+    text = _page(source).render(
+        known, new=[line for line in map(filled, TEXTS["short"]) if line], version=version,
         platform=platform, seconds=time.monotonic() - runner.began,
     )  # fmt: skip
     unfinished = path.with_suffix(".unfinished")

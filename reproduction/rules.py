@@ -110,7 +110,7 @@ def _monotonic(sign: float, word: str) -> Rule:
         rises = [later - earlier for earlier, later in combinations(row, 2)]
         wrong = any(_range(rise)[1] < 0.0 for rise in rises)
         doubtful = any(rise.value < -rise.error for rise in rises)
-        if least <= 0.0:
+        if not least > 0.0:
             return Verdict.FAILS if most < 0.0 or wrong else Verdict.OPEN
         return Verdict.CORRECTED if wrong else Verdict.OPEN if doubtful else Verdict.HOLDS
 

@@ -7,7 +7,6 @@ decorator `kept`: its result is a file, and each part that it maps is a file unt
 import collections
 import contextlib
 import copy
-import dataclasses
 import functools
 import hashlib
 import inspect
@@ -30,24 +29,12 @@ with contextlib.suppress(ImportError):  # xarray would import it in several thre
     import dask.base  # noqa: F401
 
 
-@dataclasses.dataclass(frozen=True)
-class Size:
-    """How much of each kind is computed; from `few` on by `--full` alone."""
-
-    samples: int
-    ruptures: int
-    readings: int
-    few: int
-    trend: int
-    what_if: int
-    arrests: int
-    dynamic: int
-
-
-QUICK = Size(samples=500, ruptures=4, readings=200, few=6, trend=300, what_if=40, arrests=2,
-             dynamic=4)  # fmt: skip
-USUAL = Size(samples=10_000, ruptures=20, readings=1000, few=60, trend=10_000, what_if=400,
-             arrests=60, dynamic=1000)  # fmt: skip
+_KINDS = "samples ruptures readings few driven vanishing what_if arrests dynamic"
+Size = collections.namedtuple("Size", _KINDS)
+"""How much of each kind is computed. The last three belong to `--full` alone."""
+QUICK = Size(500, 4, 200, 6, 4, 300, 40, 2, 4)
+USUAL = Size(10_000, 20, 500, 12, 8, 2000, 400, 60, 1000)
+FULL = USUAL._replace(readings=1000, few=60, driven=16, vanishing=10_000)
 
 
 class LeftOut(Exception):
@@ -84,9 +71,13 @@ class Data:
         return self.at(study, "critical_stress", ratio)
 
     def excess(self, ratio: float) -> np.ndarray:
-        """Return the first instability by the local criterion over the exact one, less one."""
+        """Return how far the first instability by the local criterion is above the exact one.
+
+        Relative to tau_cr - tau_r.
+        """
         name = "first_instability"
-        return self.at("local", name, ratio) / self.at("exact", name, ratio) - 1.0
+        local, exact = self.at("local", name, ratio), self.at("exact", name, ratio)
+        return (local - exact) / (exact - setting.RESIDUAL)
 
 
 class Runner:
@@ -121,8 +112,9 @@ class Runner:
                 for future in futures.values():
                     future.result()
             except BaseException:
-                for pool in (studies, self.pool):
-                    pool.shutdown(wait=False, cancel_futures=True)
+                # A run waits for the futures of its batches. Cancelled, they would never end.
+                self.pool.shutdown(wait=False)
+                studies.shutdown(wait=False, cancel_futures=True)
                 raise
 
     def say(self, text: str) -> None:
@@ -183,19 +175,22 @@ class Runner:
         return parts[0]
 
     def batches(self, function, dim: str, values, samples: int) -> xr.Dataset:
-        """Return function(value, first, count) of all samples at each value, by batches.
+        """Return function(value, first, count) of all samples at each value, by equal batches.
 
-        Variables along 'sample' are joined, others are added.
+        Variables along 'draw' are joined along 'sample', others are added.
         """
-        firsts = range(0, samples, 256)  # draws come in blocks of 256
-        items = [(v, first, min(256, samples - first)) for v in values for first in firsts]
-        parts, rows = self.map(function, items), []
-        for i in range(0, len(parts), len(firsts)):
-            row = parts[i : i + len(firsts)]
-            joined = [name for name in row[0] if "sample" in row[0][name].dims]
-            added = sum(part.drop_vars(joined) for part in row)
-            rows.append(xr.concat([part[joined] for part in row], dim="sample").merge(added))
-        return along(dim, values, rows)
+        count = min(samples, 1000)
+        axes = {dim: values, "first": range(0, samples, count)}
+        parts = self.grid(lambda value, first: function(value, first, count), **axes)
+        added = parts.drop_dims("draw").sum("first")
+        joined = parts.drop_vars(added.data_vars).stack(
+            sample=("first", "draw"), create_index=False
+        )
+        return (
+            joined.drop_vars("first", errors="ignore")
+            .transpose(dim, "sample", ...)
+            .merge(added)
+        )
 
 
 def kept(**inputs):

@@ -6,10 +6,12 @@ replaces the paper's table of the same name as a whole.
 """
 
 import dataclasses
+import math
 import warnings
 from pathlib import Path
 
 import numpy as np
+import scipy.fft
 
 import stiction as st
 from reproduction import PARAMETERS
@@ -35,12 +37,17 @@ def _study(plane: str | None = None) -> st.Study:
         raise st.InputError(f"{unknown[0]}: unknown key (valid: {', '.join(valid)})")
     given = {key: value for key, value in PARAMETERS.items() if key not in OWN_KEYS}
     _replace(plain, given)
-    spectrum = plain["random"]["strength"]["spectrum"]
-    if given and spectrum.setdefault("correlation_length", unscaled) != unscaled:
-        raise st.InputError("random.strength.spectrum.correlation_length: give correlation_ratios"
-                            " instead, in multiples of the nucleation length")  # fmt: skip
     if plane:
         plain["problem"]["solid"]["plane"] = plane
+    field = plain["random"]["strength"]
+    if given and field["spectrum"].setdefault("correlation_length", unscaled) != unscaled:
+        raise st.InputError("random.strength.spectrum.correlation_length: give correlation_ratios"
+                            " instead, in multiples of the nucleation length")  # fmt: skip
+    # The number of modes is checked, so the correlation length must be in proportion to h_n.
+    field["spectrum"]["correlation_length"] = 1e12
+    endless = plain | {"random": {"strength": field | {"mean_mode": True}}}
+    length = st.Study.from_dict(endless, folder=Path.cwd()).problem.nucleation_length
+    field["spectrum"]["correlation_length"] = RATIOS[0] * length
     return st.Study.from_dict(plain, folder=Path.cwd())
 
 
@@ -127,10 +134,14 @@ def residual(strength):
     return float(law.residual_strength or 0.0)
 
 
+RESIDUAL = residual(MEAN)
+DROP = MEAN - RESIDUAL
+"""The mean strength above the residual strength, Pa. Only differences to tau_r matter before the
+onset, so that relative differences of stresses refer to it, or to tau_cr - tau_r."""
+
+
 def _loading_rate() -> float:
-    if not PARAMETERS:
-        return PRINTED_RATE
-    scaled = float(f"{PRINTED_RATE * (MEAN / 1e6) / (CROSSING / 1.08e-4):.2g}")
+    scaled = float(f"{PRINTED_RATE * (DROP / 1e6) / (CROSSING / 1.08e-4):.2g}")
     given = PARAMETERS.get("loading_rate", scaled)
     if not (isinstance(given, int | float) and 0.0 < given < np.inf):
         raise st.InputError(f"loading_rate: give a positive number, Pa/s, got {given!r}")
@@ -139,8 +150,8 @@ def _loading_rate() -> float:
 
 CROSSING = L / PROBLEM.solid.shear_wave_speed  # time of a shear wave along the interface, s
 LOADING_RATE = _loading_rate()
-"""Of the ruptures, Pa/s; by default the load rises by the same share of the mean strength while
-a shear wave runs along the interface as it does with the paper's parameters."""
+"""Of the ruptures, Pa/s; by default the load rises by the same part of `DROP` while a shear wave
+runs along the interface as it does with the paper's parameters."""
 WHAT_IF = Path(__file__).parent / "what_if"
 
 
@@ -151,9 +162,9 @@ def strength(ratio: float, **changes):
     return dataclasses.replace(FIELD, spectrum=spectrum, **changes)
 
 
-def grid(problem, *, nodes: float):
-    """Return the problem with its number of nodes multiplied."""
-    count = 2 * round(0.5 * problem.interface.size * nodes)
+def grid(problem, *, span: float):
+    """Return the problem with so many nodes in the nucleation length, or a few more."""
+    count = scipy.fft.next_fast_len(math.ceil(problem.interface.measure / H * span / 2.0)) * 2
     interface = st.Interface(length=problem.interface.measure, nodes=count)
     return dataclasses.replace(problem, interface=interface)
 

@@ -13,14 +13,14 @@ from reproduction.runner import Runner, along, kept
 from reproduction.setting import FIRST, MEAN, PROBLEM, RATIOS, SIMULATED, STRAIN, H, strength
 
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
-RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE)
+RUPTURE = st.Rupture(loading_rate=setting.LOADING_RATE, start="rest")
 CELLS = 2048
 NORMAL = np.linspace(-2.0, 2.0, 17)
 """Places in standard deviations at which tau_n is compared with a normal distribution."""
 TREND = (0.0625, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 30.0)
 WINDOWS = (2.0, 4.0, 8.0, 16.0)
 LOAD_SHARES = (0.88, 0.90, 0.92, 0.94, 0.95, 0.96, 0.97, 0.98, 0.985, 0.99, 0.995, 0.999)
-READINGS = TEXTS["reading"]  # the interpretations of the modulus, by their letters
+READINGS = ["a"] if PARAMETERS else list(TEXTS["reading"])  # letters of those of the modulus
 SWEEPS = {
     "local": ("Onsets by the local criterion", PROBLEM, LOCAL, "samples", RATIOS),
     "exact": ("Onsets by exact equilibrium, with interaction", PROBLEM, EXACT, "samples", RATIOS),
@@ -28,7 +28,7 @@ SWEEPS = {
     "printed": ("Onsets by the printed modulus", STRAIN, LOCAL, "readings", SIMULATED),
     "dynamic": ("Monte Carlo study by ruptures", PROBLEM, RUPTURE, "dynamic", RATIOS),
     "vanishing": ("Onsets at vanishing correlation length, by the local criterion",
-                  setting.grid(PROBLEM, nodes=4.0), LOCAL, "trend", (1 / 64, 1 / 32)),
+                  setting.grid(PROBLEM, span=175.0), LOCAL, "vanishing", (1 / 64,)),
 }  # fmt: skip
 """Progress line, problem, method, number of samples and xi_0/h_n of Monte Carlo studies."""
 
@@ -50,25 +50,27 @@ def moments(run: Runner, samples: int) -> xr.Dataset:
         seed = run.seed_of(ratio)
         tau_p = strength(ratio).sample(interface, samples=count, seed=seed, first=first)
         tau_n = st.theory.nucleation_stress(PROBLEM, tau_p)
-        d = tau_n / MEAN - 1.0
+        d = (tau_n - MEAN) / setting.DROP
         powers = [d.mean(axis=1), (d * d).mean(axis=1), (d * d * d).mean(axis=1)]
         # Least tau_n away from its minimum by more than h_n.
         where = tau_n.argmin(axis=1) * interface.spacing
         near = setting.distance(interface.x[None, :], where[:, None]) < H
+        least = tau_n.min(axis=1)
+        second = np.where(near, np.inf, tau_n).min(axis=1)
         variables = {
             "weakest_strength": tau_p.min(axis=1),
             "weakest_position": tau_p.argmin(axis=1) * interface.spacing,
             "largest_tau_n": tau_n.max(axis=1),
-            "second_tau_n": np.where(near, np.inf, tau_n).min(axis=1),
-            "least_tau_n": tau_n.min(axis=1),
+            "least_tau_n": least,
+            "tie": (second - least) / (least - setting.RESIDUAL),
         }
-        extremes = xr.Dataset({name: ("sample", row) for name, row in variables.items()})
+        extremes = xr.Dataset({name: ("draw", row) for name, row in variables.items()})
         counts = np.histogram(tau_n[:, ::16], edges)[0]
         spread = setting.DEVIATION * variances[ratio] ** 0.5
         limits = [MEAN + level * spread for level in NORMAL]
         return extremes.assign(
-            below=(("sample", "level"), np.array([(tau_n < s).mean(axis=1) for s in limits]).T),
-            powers=(("sample", "order"), np.array(powers).T),
+            below=(("draw", "level"), np.array([(tau_n < s).mean(axis=1) for s in limits]).T),
+            powers=(("draw", "order"), np.array(powers).T),
             counts=("cell", counts),
         )
 
@@ -110,7 +112,7 @@ def infinite_variance_ratio(ratio: float) -> float:
 
 
 def readings(run: Runner) -> xr.Dataset:
-    """Onsets under four readings of the modulus, for all that is printed and depends on it."""
+    """Theory and exact equilibrium, in each reading of the modulus."""
     count, interface = run.size.readings, PROBLEM.interface
 
     def in_printed(ratio: float):
@@ -120,22 +122,25 @@ def readings(run: Runner) -> xr.Dataset:
         return dataset.sel(correlation_ratio=list(SIMULATED)).isel(sample=slice(count))
 
     consistent = first(sweep(run, "exact")), first(sweep(run, "local"))
-    strain = run.sweep("strain-exact", STRAIN, in_printed, EXACT, count, SIMULATED)
-    strain_local = run.sweep("strain-local", STRAIN, in_printed, LOCAL, count, SIMULATED)
-    mixed = run.sweep("mixed-exact", PROBLEM, in_printed, EXACT, count, SIMULATED)
-    mixed_own = run.sweep("mixed-local", PROBLEM, in_printed, LOCAL, count, SIMULATED)
     # Of each reading: the simulation, its prediction, the prediction with its own modulus, the
     # strength, and the problem of the prediction.
-    cases = {
-        "a": (*consistent, consistent[1], strength, PROBLEM),
-        "b": (strain, strain_local, strain_local, in_printed, STRAIN),
-        "c": (mixed, strain_local, mixed_own, in_printed, STRAIN),
-        "c'": (consistent[0], sweep(run, "printed"), consistent[1], strength, STRAIN),
-    }
+    cases = {"a": (*consistent, consistent[1], strength, PROBLEM)}
+    if not PARAMETERS:
+        strain, strain_local, mixed, mixed_local = (
+            run.sweep(name, problem, in_printed, method, count, SIMULATED)
+            for name, problem, method in (
+                ("strain-exact", STRAIN, EXACT), ("strain-local", STRAIN, LOCAL),
+                ("mixed-exact", PROBLEM, EXACT), ("mixed-local", PROBLEM, LOCAL),
+            )
+        )  # fmt: skip
+        printed = first(sweep(run, "printed"))
+        cases["b"] = (strain, strain_local, strain_local, in_printed, STRAIN)
+        cases["c"] = (mixed, strain_local, mixed_local, in_printed, STRAIN)
+        cases["c'"] = (consistent[0], printed, consistent[1], strength, STRAIN)
     parts = []
     for simulated, predicted, by_one_modulus, field_of, problem in cases.values():
         stress, place = simulated["first_instability"], simulated["critical_position"]
-        length = problem.nucleation_length
+        length, drop = problem.nucleation_length, stress - setting.RESIDUAL
         gap = setting.distance(predicted["critical_position"], place)
         least = []  # tau_n at the place of the simulated onset
         for ratio, row in zip(SIMULATED, place.values, strict=True):
@@ -146,16 +151,16 @@ def readings(run: Runner) -> xr.Dataset:
         variables = {
             "simulated": stress,
             "predicted": predicted["first_instability"],
-            "excess": predicted["first_instability"] / stress - 1.0,
-            "consistent_excess": by_one_modulus["first_instability"] / stress - 1.0,
+            "excess": (predicted["first_instability"] - stress) / drop,
+            "consistent_excess": (by_one_modulus["first_instability"] - stress) / drop,
             "misplaced": (("correlation_ratio", "sample"), gap > 0.5 * length),
             "patches": simulated["slip_patches"],
-            "contest": least / predicted["first_instability"] - 1.0,
-            "helped": least / stress - 1.0,
+            "contest": (least - predicted["first_instability"]) / drop,
+            "helped": (least - stress) / drop,
             "length": length / setting.L,
         }
         parts.append(xr.Dataset(variables).drop_vars("sample", errors="ignore"))
-    return along("reading", list(READINGS), parts)
+    return along("reading", READINGS, parts)
 
 
 @kept()
@@ -165,22 +170,28 @@ def representative(run: Runner) -> xr.Dataset:
     tau_p = strength(FIRST).sample(interface, seed=run.seed_of(FIRST))[0]
     save = st.Save(["slip_rate", "slip"], every=6)
     result = st.simulate_rupture(PROBLEM, tau_p, method=RUPTURE, save=save, progress=False)
-    # The patch around the onset when the mean stress is largest.
-    slip = result["slip"].values[int(result["mean_stress"].argmax())]
-    node = round(float(result["critical_position"]) / interface.spacing) % interface.size
-    labels = patches(slip > 0.0)
-    length = np.sum(labels == labels[node]) if labels[node] >= 0 else np.nan
-    return xr.Dataset(
-        {
-            "slip_rate": (("time", "x"), result["slip_rate"].values.astype(np.float32)),
-            "mean_stress": ("time", result["mean_stress"].values),
-            "critical_position": float(result["critical_position"]),
-            "patch_length": length * interface.spacing,
-            "strength": ("x", tau_p),
-            "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
-        },
-        coords={"time": result["time"].values, "x": interface.x},
-    )
+    critical = float(result["critical_position"])
+    variables = {
+        "slip_rate": (("time", "x"), result["slip_rate"].values.astype(np.float32)),
+        "mean_stress": ("time", result["mean_stress"].values),
+        "critical_position": critical,
+        "arrested_events": int(result["arrested_events"]),
+        "strength": ("x", tau_p),
+        "tau_n": ("x", np.ravel(st.theory.nucleation_stress(PROBLEM, tau_p))),
+    }
+    critical_slip = (tau_p - setting.residual(tau_p)) / setting.W
+    peak, node = int(result["mean_stress"].argmax()), round(critical / interface.spacing)
+    for slip in result["slip"].values[peak:]:  # from the largest mean stress on
+        labels, broken = patches(slip > 0.0), slip >= critical_slip
+        patch = (labels == labels[node % interface.size]) & (labels >= 0)
+        length = patch.sum() * interface.spacing
+        variables.setdefault("patch_length", length)
+        if broken.any():  # when the first point reaches its residual strength
+            variables.setdefault("weakening_length", length)
+        if length > 0.5 * setting.L:
+            variables.setdefault("broken_share", broken[patch].mean())
+    coordinates = {"time": result["time"].values, "x": interface.x}
+    return xr.Dataset(variables, coordinates)
 
 
 def trend(run: Runner) -> xr.Dataset:
@@ -189,7 +200,7 @@ def trend(run: Runner) -> xr.Dataset:
         problem=PROBLEM,
         random=strength(1.0),
         method=LOCAL,
-        samples=run.size.trend,
+        samples=run.size.vanishing,
         seed=run.seed,
         sweep=[{"random.strength.spectrum.correlation_length": [r * H for r in TREND]}],
     )
@@ -197,10 +208,10 @@ def trend(run: Runner) -> xr.Dataset:
     return result[["critical_stress"]].assign_coords(ratio=list(TREND))
 
 
-@kept(samples=lambda size: size.trend // 2)
+@kept(samples=lambda size: size.vanishing // 2)
 def window(run: Runner, samples: int) -> xr.Dataset:
     """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
-    fine = setting.grid(PROBLEM, nodes=2.0)
+    fine = setting.grid(PROBLEM, span=16.5 * WINDOWS[-1] / setting.LAST)
     field = strength(setting.LAST)
 
     def batch(ratio, first, count):
@@ -210,7 +221,7 @@ def window(run: Runner, samples: int) -> xr.Dataset:
         tau_p = field.sample(fine.interface, samples=count, seed=run.seed, first=first)
         least = st.theory.nucleation_stress(problem, tau_p).min(axis=1)
         weakest = tau_p.min(axis=1)
-        return xr.Dataset({"stress": ("sample", least), "weakest": ("sample", weakest)})
+        return xr.Dataset({"stress": ("draw", least), "weakest": ("draw", weakest)})
 
     return run.batches(batch, "ratio", WINDOWS, samples)
 
@@ -254,7 +265,8 @@ def growth(run: Runner, count: int) -> xr.Dataset:
         tau_p = strength(ratio).sample(interface, seed=run.seed_of(ratio), first=sample)[0]
         onset = st.onset(PROBLEM, tau_p, method=EXACT, progress=False)
         load = float(onset["first_instability"][0])
-        path = st.equilibrium_path(PROBLEM, tau_p, load * np.array(LOAD_SHARES))
+        loads = setting.RESIDUAL + (load - setting.RESIDUAL) * np.array(LOAD_SHARES)
+        path = st.equilibrium_path(PROBLEM, tau_p, loads)
         labels = [patches(row > 0.0) for row in np.nan_to_num(path["slip"].values)]
         node = round(float(onset["critical_position"][0]) / interface.spacing) % interface.size
         slipping = np.flatnonzero(labels[-1] >= 0)
@@ -275,54 +287,45 @@ def growth(run: Runner, count: int) -> xr.Dataset:
 
 
 def dips(*places):
-    """Return the mean strength with smooth dips; places are (centre in h_n, relative depth)."""
+    """Return the mean strength with smooth dips at places (in h_n) to 0.7 of the way from tau_r."""
     x = (PROBLEM.interface.x - 0.5 * setting.L) / H
-    shape = sum(depth * np.exp(-2.0 * ((x - centre) / 0.8) ** 2) for centre, depth in places)
-    return MEAN * (1.0 - shape)
+    shape = sum(0.3 * np.exp(-2.0 * ((x - place) / 0.8) ** 2) for place in places)
+    return MEAN - setting.DROP * shape
 
 
 @kept()
 def mechanism(run: Runner) -> xr.Dataset:
     """Patches that act on each other: one, and two at a distance."""
 
-    def onset(profile, problem=PROBLEM):
-        return st.onset(problem, profile, method=EXACT, progress=False)
+    def onset(profile, problem=PROBLEM) -> float:
+        result = st.onset(problem, profile, method=EXACT, progress=False)
+        return float(result["first_instability"][0])
 
-    def local_stress(profile):
-        return float(st.theory.nucleation_stress(PROBLEM, profile).min())
+    def excess(profile) -> float:
+        return float(st.theory.nucleation_stress(PROBLEM, profile).min()) - onset(profile)
 
-    result = xr.Dataset(coords={"x": PROBLEM.interface.x})
-    dip = dips((0.0, 0.30))
-    single = float(onset(dip)["first_instability"][0])
-    path = st.equilibrium_path(PROBLEM, dip, [0.999 * single]).isel(load=0)
-    result["one_strength"], result["one_stress"] = ("x", dip), ("x", path["stress"].values)
-    result["one_load"] = 0.999 * single
-    slipping = path["slip"].values > 0.0
-    change = path["stress"].values / (0.999 * single) - 1.0
-    x = PROBLEM.interface.x - 0.5 * setting.L
-    edge = np.abs(x[slipping]).max()
-    result["inside"] = change[slipping].mean()
-    result["beside"] = np.interp(edge + 0.25 * H, x, change)
-    apart = (1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
-    lowering = []
-    for distance in apart:
-        two = dips((-0.5 * distance, 0.30), (0.5 * distance, 0.30))
-        stress = float(onset(two)["first_instability"][0])
-        # What a single dip misses is no interaction.
-        missed = (local_stress(dip) - single) / single
-        lowering.append((local_stress(two) - stress) / stress - missed)
-    result["lowering"] = ("distance", lowering)
-    result = result.assign_coords(distance=list(apart))
+    x, dip = PROBLEM.interface.x - 0.5 * setting.L, dips(0.0)
+    drop = onset(dip) - setting.RESIDUAL
+    load = setting.RESIDUAL + 0.999 * drop
+    path = st.equilibrium_path(PROBLEM, dip, [load]).isel(load=0)
+    stress, slipping = path["stress"].values, path["slip"].values > 0.0
+    edge, change = np.abs(x[slipping]).max(), (stress - load) / drop
+    apart = [1.25, 1.5, 2.0, 3.0, 5.0, 8.0]
+    # What a single dip misses is no interaction.
+    lowering = [(excess(dips(-0.5 * way, 0.5 * way)) - excess(dip)) / drop for way in apart]
     # Load and strength exchanged: tau_p(x), and max tau_p with an initial stress in its place.
-    field, gaps = strength(setting.SECOND), []
-    for tau_p in field.sample(PROBLEM.interface, samples=16, seed=run.seed):
-        highest = tau_p.max()
-        loaded = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=highest - tau_p))
-        level = onset(np.full(tau_p.size, highest), loaded)["first_instability"][0]
-        usual = float(onset(tau_p)["first_instability"][0])
-        gaps.append((float(level) - (highest - tau_p).mean()) / usual - 1.0)
-    result["exchange"] = float(np.abs(gaps).max())
-    return result
+    gaps = []
+    for tau_p in strength(setting.SECOND).sample(PROBLEM.interface, samples=16, seed=run.seed):
+        missing = tau_p.max() - tau_p
+        loaded = dataclasses.replace(PROBLEM, load=st.Load(initial_stress=missing))
+        level, usual = onset(tau_p + missing, loaded) - missing.mean(), onset(tau_p)
+        gaps.append(abs(level - usual) / (usual - setting.RESIDUAL))
+    variables = {
+        "one_strength": ("x", dip), "one_stress": ("x", stress), "one_load": load,
+        "inside": change[slipping].mean(), "beside": np.interp(edge + 0.25 * H, x, change),
+        "lowering": ("distance", lowering), "exchange": max(gaps),
+    }  # fmt: skip
+    return xr.Dataset(variables, {"x": PROBLEM.interface.x, "distance": apart})
 
 
 @kept(samples=lambda size: size.samples, most=lambda size: 10)
@@ -340,39 +343,40 @@ def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
         static = st.onset(PROBLEM, tau_p, method=st.Equilibrium(events=1), progress=False)
         moving = st.onset(PROBLEM, tau_p, method=RUPTURE, progress=False)
         length, count = static["event_length"].values[0, 0], moving["arrested_events"].values[0]
-        return xr.Dataset({"length": length, "dynamic": count})
+        return xr.Dataset({"ratio": ratio, "length": length, "dynamic": count})
 
     parts = run.map(again, chosen)
-    rows = {name: [float(part[name]) for part in parts] for name in ("length", "dynamic")}
-    return xr.Dataset({name: ("event", row) for name, row in rows.items()})
+    names = ("ratio", "length", "dynamic")
+    return xr.Dataset({k: ("event", [float(part[k]) for part in parts]) for k in names})
 
 
-DRIVING = {
-    "uniform": np.ones_like,
-    "gradient": lambda away: 1.0 + 0.9 * (1.0 - 4.0 * away),
-    "edge": lambda away: 1.0 + 4.0 * np.exp(-away / 0.1),
-}
-"""Load profiles over the distance from the middle, as a share of the length."""
+def loads() -> dict[str, np.ndarray]:
+    """Return the profiles of the study of non-uniform driving. tau_0 is the mean of each."""
+    away = setting.distance(driven().interface.x, 0.5 * setting.L) / setting.L
+    profiles = {
+        "uniform": 1.0 + 0.0 * away,
+        "gradient": 1.0 + 0.9 * (1.0 - 4.0 * away),
+        "edge": 1.0 + 4.0 * np.exp(-away / 0.1),
+    }
+    return {name: profile / profile.mean() for name, profile in profiles.items()}
 
 
-def driven(case: str):
-    """Return the problem under one of these loads, with a residual strength of 0.6 tau_p,min."""
-    problem = setting.grid(PROBLEM, nodes=0.5)
-    friction = dataclasses.replace(problem.friction, residual_strength=0.6 * setting.LOW)
-    x = problem.interface.x / problem.interface.length
-    profile = DRIVING[case](np.abs(x - 0.5))
-    load = st.Load(profile=profile / profile.mean())  # tau_0 is the mean
-    return dataclasses.replace(problem, friction=friction, load=load)
+def driven(profile=1.0):
+    """Return the problem under a load. Where tau_r is zero, it is set to 0.6 of the least tau_p."""
+    problem = setting.grid(PROBLEM, span=16.0)
+    friction = problem.friction
+    if setting.RESIDUAL == 0.0:
+        friction = dataclasses.replace(friction, residual_strength=0.6 * setting.LOW)
+    return dataclasses.replace(problem, friction=friction, load=st.Load(profile=profile))
 
 
 def driving(run: Runner) -> xr.Dataset:
     """Arrested fronts under non-uniform loads, by equilibrium and with inertia."""
-    count = 16 if run.size.few >= 24 else 4
-    parts = []
-    for case in DRIVING:
-        problem = driven(case)
-        residual = problem.friction.residual_strength
-        energy = setting.MARGINAL.distribution.expect(lambda s, r=residual: (s - r) ** 2)
+    count, parts = run.size.driven, []
+    for case, profile in loads().items():
+        problem = driven(profile)
+        residual = setting.RESIDUAL or problem.friction.residual_strength
+        energy = setting.DEVIATION**2 + (MEAN - residual) ** 2
         study = st.Study(problem=problem, random=strength(setting.SECOND),
                          method=st.Equilibrium(events=12),
                          samples=count, seed=run.seed)  # fmt: skip
@@ -385,13 +389,13 @@ def driving(run: Runner) -> xr.Dataset:
                 centre=0.5 * problem.interface.measure, arrest=True,
             )  # fmt: skip
         parts.append(events.assign(griffith=(("sample", "event"), griffith)))
-    return along("case", list(DRIVING), parts).assign(dynamic_length=held(run)["length"])
+    return along("case", list(loads()), parts).assign(dynamic_length=held(run)["length"])
 
 
-@kept(count=lambda size: 16 if size.few >= 24 else 4)
+@kept(count=lambda size: size.driven)
 def held(run: Runner, count: int) -> xr.Dataset:
     """Ruptures under an edge load that is held just above that of the first arrested event."""
-    problem, field = driven("edge"), strength(setting.SECOND)
+    problem, field = driven(loads()["edge"]), strength(setting.SECOND)
 
     def rest(sample):
         tau_p = field.sample(problem.interface, seed=run.seed, first=sample)[0]
@@ -408,9 +412,35 @@ def held(run: Runner, count: int) -> xr.Dataset:
         slip = rupture["slip"].values[-1]
         labels = patches(slip > 1e-2 * slip.max())
         longest = np.bincount(labels[labels >= 0]).max(initial=0)
-        return xr.Dataset({"length": longest * problem.interface.spacing})
+        unstable = np.isfinite(float(rupture["first_instability"]))
+        return xr.Dataset(
+            {"length": longest * problem.interface.spacing if unstable else np.nan}
+        )
 
     return run.grid(rest, sample=range(count))
+
+
+@kept(samples=lambda size: 10 * size.driven, ruptures=lambda size: size.ruptures)
+def stress_drop(run: Runner, samples: int, ruptures: int) -> xr.Dataset:
+    """Arrest if the residual strength is random, too, and with it the stress drop."""
+    field, low = strength(setting.SECOND), setting.RESIDUAL
+    marginal = st.Beta(alpha=2.0, beta=2.0, low=low, high=low + 0.9 * (setting.LOW - low))
+    tau_p = field.sample(PROBLEM.interface, samples=samples, seed=run.seed)
+    random = strength(4.0, marginal=marginal, mean_mode=True)
+    tau_r = random.sample(PROBLEM.interface, samples=samples, seed=run.seed + 1)
+    friction = st.LinearWeakening(weakening_rate=setting.W)
+    problem = dataclasses.replace(PROBLEM, friction=friction)
+    profiles = {"strength": tau_p, "residual_strength": np.minimum(tau_r, 0.95 * tau_p)}
+
+    def part(method, first, last):
+        rows = {name: row[first:last] for name, row in profiles.items()}
+        onset = st.onset(problem, rows, method=method, progress=False)
+        return xr.Dataset({"arrested_events": ("sample", onset["arrested_events"].values)})
+
+    each = [(RUPTURE, number, number + 1) for number in range(min(ruptures, samples))]
+    static, *moving = run.map(part, [(EXACT, 0, samples), *each])
+    dynamic = xr.concat(moving, "sample")["arrested_events"].rename(sample="rupture")
+    return static.assign(with_inertia=dynamic)
 
 
 ARRESTS = ("wide_strength", "random_load", "random_residual")
@@ -421,7 +451,7 @@ WHAT_IFS = (*ARRESTS, "normal_load", "length", "exponent", "skewness")
 def what_if(run: Runner, name: str, suffix: str) -> xr.Dataset:
     """A study file of `what_if/`, its points stacked along 'point'; with a suffix by ruptures."""
     study = st.Study.from_toml(setting.WHAT_IF / f"{name}.toml")
-    most = run.size.trend if study.method == LOCAL else run.size.what_if
+    most = run.size.vanishing if study.method == LOCAL else run.size.what_if
     if suffix:
         study, most = dataclasses.replace(study, method=RUPTURE), run.size.arrests
     changed = dataclasses.replace(study, samples=min(most, study.samples), seed=run.seed)
@@ -431,16 +461,15 @@ def what_if(run: Runner, name: str, suffix: str) -> xr.Dataset:
     return numbered.stack(point=swept, create_index=False).transpose("point", ...)
 
 
-PAPER = ("local", moments, "exact", "ruptures", theory, representative)
-"""What the paper does, in the order in which it is computed."""
-MODULUS = ("printed", readings)  # asked with the paper's parameters only
-BEYOND = (trend, "vanishing", window, modes, growth, mechanism, arrest, driving, "dynamic")
-"""What `--full` adds."""
+USUAL = ("local", moments, "exact", "ruptures", theory, representative, readings, "vanishing",
+         window, modes, growth, mechanism, arrest, driving, stress_drop)  # fmt: skip
+"""What the statements of abstract and conclusions need, in the order of computation."""
+LONG = (trend, "dynamic")  # what `--full` adds
 
 
 def jobs(full: bool):
     """Yield the name, the progress line and the function of every study."""
-    for study in (*PAPER, *(() if PARAMETERS else MODULUS), *(BEYOND if full else ())):
+    for study in (*USUAL, *(() if PARAMETERS else ("printed",)), *(LONG if full else ())):
         if isinstance(study, str):
             yield study, SWEEPS[study][0], functools.partial(sweep, name=study)
         else:

@@ -1,6 +1,5 @@
 """Figures 8 to 13, beyond the paper."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -8,11 +7,17 @@ import numpy as np
 from reproduction import setting
 from reproduction.figures import common
 from reproduction.figures.common import XI
-from reproduction.measures import arrest_shares, arrested, largest_energy, trend
+from reproduction.measures import (
+    arrest_shares,
+    arrested,
+    arrested_again,
+    largest_energy,
+    trend,
+)  # fmt: skip
 from reproduction.numbers_with_errors import deviation, lower_spread, mean
 from reproduction.runner import Data
 from reproduction.setting import MEAN, PROBLEM, RATIOS, H, L
-from reproduction.studies import ARRESTS, DRIVING, LOAD_SHARES
+from reproduction.studies import ARRESTS, LOAD_SHARES, loads
 
 
 def figure_8(d: Data):
@@ -24,8 +29,11 @@ def figure_8(d: Data):
         axes.plot(ordered, left, **common.line(ratio), label=f"{ratio:g}")
     axes.axvline(0, color="grey", lw=0.8)
     axes.set_xscale("symlog", linthresh=0.1, linscale=0.5)
-    axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(-0.06, 10))
-    common.plain_ticks(axes.xaxis, (0, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10))
+    values = np.concatenate([100 * d.excess(ratio) for ratio in RATIOS])
+    left, right = min(-0.06, 1.3 * values.min()), max(0.2, 1.3 * values.max())
+    axes.set(yscale="log", ylim=(0.7 / d.size.samples, 1.3), xlim=(left, right))
+    ticks = np.outer([-1, 1], np.outer([0.1, 1, 10, 100], [1, 2, 5])).ravel()
+    common.plain_ticks(axes.xaxis, [0, *(tick for tick in ticks if left < tick < right)])
     axes.legend(title=XI, loc="upper right")
     return figure
 
@@ -33,15 +41,10 @@ def figure_8(d: Data):
 def figure_9(d: Data):
     """Draw mean and spread of tau_cr over the whole range of correlation lengths."""
     figure, top, bottom = common.mosaic(5.6, "a;b", sharex=True)
-    tiny = d["vanishing"]["critical_stress"]
-    for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 1e-3)):
-        finer = [(float(row.correlation_ratio), function(row.values) * factor) for row in tiny]
-        rows = trend(d, function, factor)
-        for drawn, face, text in ((finer, "white", "finer grid, other draws"),
-                                  (rows, None, "median less lower quartile")):  # fmt: skip
-            common.numbers(axes, *zip(*drawn, strict=True), color="C0", mfc=face, label=text,
-                           marker="o", ls="-")  # fmt: skip
-    rows = trend(d, deviation, 1e-3)
+    for axes, function, factor in ((top, mean, 1 / MEAN), (bottom, lower_spread, 100 / MEAN)):
+        drawn = zip(*trend(d, function, factor), strict=True)
+        common.numbers(axes, *drawn, color="C0", fmt="-o", label="median less lower quartile")
+    rows = trend(d, deviation, 100 / MEAN)
     bottom.plot([r for r, _ in rows], [n.value for _, n in rows], ":", color="grey",
                 label="standard deviation")  # fmt: skip
     for axes in (top, bottom):
@@ -51,8 +54,7 @@ def figure_9(d: Data):
              transform=top.get_xaxis_transform())  # fmt: skip
     bottom.set(yscale="log")
     common.log_ticks(bottom.yaxis)
-    common.plain_ticks(bottom.xaxis, (1 / 64, 1 / 16, 0.25, 1, 4, 16),
-                       ["1/64", "1/16", "1/4", "1", "4", "16"])  # fmt: skip
+    common.plain_ticks(bottom.xaxis, (1 / 16, 0.25, 1, 4, 16), ["1/16", "1/4", "1", "4", "16"])
     bottom.legend(loc="upper left")
     return figure
 
@@ -81,8 +83,7 @@ def figure_10(d: Data):
 def figure_11(d: Data):
     """Draw the energy balance of a growing rupture, and the share of arrested ones."""
     figure, top, bottom = common.mosaic(6.0, "a;b", (1.2, 1.0))
-    residual = setting.residual(MEAN)
-    drops = {ratio: d.stress(ratio, "exact").mean() - residual for ratio in RATIOS}
+    drops = {ratio: d.stress(ratio, "exact").mean() - setting.RESIDUAL for ratio in RATIOS}
     unit = math.pi * 0.5 * H / (2 * setting.G_STAR) / largest_energy()
     length = np.linspace(0, 1.5 / (unit * max(drops.values()) ** 2), 100)
     for ratio, drop in drops.items():
@@ -103,11 +104,11 @@ def figure_11(d: Data):
         top.plot(place, y + 0 * place, marker, color="black", ms=5, mfc="none", label=text)
     top.set(xlim=(0, length[-1]), ylim=(0, 1.6))
     top.legend(loc="lower center", bbox_to_anchor=(0.5, 1.09), ncols=3)
-    for study, shift, colour, marker, text in (
-        ("exact", 0.0, "C0", "o", "without inertia"),
-        ("dynamic", 0.1, "firebrick", "D", "with inertia (drawn beside)"),
+    for function, shift, colour, marker, text in (
+        (arrested, 0.0, "C0", "o", "without inertia"),
+        (_with_inertia, 0.1, "firebrick", "D", "with inertia"),
     ):
-        rows = [arrested(d, ratio, study) * 100 for ratio in RATIOS]
+        rows = [function(d, ratio) * 100 for ratio in RATIOS]
         style = {"fmt": marker, "color": colour, "ms": 5, "label": text}
         common.numbers(bottom, np.log2(RATIOS) + shift, rows, **style)
     common.ratio_axis(bottom)
@@ -116,16 +117,19 @@ def figure_11(d: Data):
     return figure
 
 
+def _with_inertia(d: Data, ratio: float):
+    return arrested(d, ratio, "dynamic") if "dynamic" in d else arrested_again(d, ratio)
+
+
 ENDLESS = 45.0  # where a length over h_n that is infinite is drawn
 
 
 def figure_12(d: Data):
     """Draw arrested fronts under non-uniform loads beside Griffith's lengths."""
     figure, top, bottom = common.mosaic(5.2, "a;b", (0.8, 1.2))
-    x = PROBLEM.interface.x / L
-    for i, (case, load) in enumerate(DRIVING.items()):
-        profile = dataclasses.replace(PROBLEM, load=load).load_profile
-        top.plot(x, np.broadcast_to(profile, x.shape), color=f"C{i}", label=case)
+    for i, (case, profile) in enumerate(loads().items()):
+        x = np.arange(profile.size) / profile.size
+        top.plot(x, profile, color=f"C{i}", label=case)
     top.set(xlim=(0, 1), ylim=(0, None))
     top.legend()
     study = d["driving"]

@@ -8,7 +8,7 @@ import stiction as st
 from reproduction import setting
 from reproduction.figures import common
 from reproduction.figures.common import XI
-from reproduction.measures import dynamic_mean, is_misplaced, offsets, stress_density
+from reproduction.measures import is_misplaced, offsets, paired, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
@@ -53,10 +53,9 @@ def _system(axes) -> None:
     axes.axhspan(0, 0.9, color="aliceblue", lw=0)
     axes.axhspan(-0.9, 0, color="linen", lw=0)
     axes.axhline(0, color="C1", lw=3)
-    for y, sign in ((0.72, 1), (-0.72, -1)):
-        for start in (0.15, 0.45, 0.75):
-            axes.annotate("", (start + sign * 0.06, y), (start - sign * 0.06, y),
-                          arrowprops={"arrowstyle": "-|>", "color": "k", "lw": 0.9})  # fmt: skip
+    for y, arrow in ((0.72, r"$\longrightarrow$"), (-0.72, r"$\longleftarrow$")):
+        for x in (0.15, 0.45, 0.75):
+            axes.text(x, y, arrow, ha="center", va="center", fontsize=14)
     axes.text(0.5, 0.36, r"elastic half-space: $G,\ \nu,\ \rho$", ha="center", va="center")
     axes.text(0.5, -0.38, r"the same, periodic with $L$", ha="center", va="center")
     axes.text(0.02, 0.13, r"$\tau_\mathrm{f}(\delta, x)$", color="C1")
@@ -92,9 +91,10 @@ def figure_2(d: Data):
     value = spectrum.density(unit * k) / spectrum.density(np.zeros(1))
     axes.loglog(k, value, color="C0")
     floor = max(float(value[k <= 1.2 * cutoff].min()) / 10.0, 1e-12)
-    for place, text in ((1.0, r"$\lambda=2\pi/\xi_0$"), (cutoff, "cut-off")):
+    for place, text, y in ((1.0, r"cutoff $\lambda$", 0.04), (cutoff, "truncation", 0.65)):
         axes.axvline(place, color="grey", lw=0.8, ls=":")
-        axes.text(place * 0.94, 2.0 * floor, text, rotation=90, ha="right", va="bottom")
+        axes.text(place * 0.94, y, text, rotation=90, ha="right", va="bottom",
+                  transform=axes.get_xaxis_transform())  # fmt: skip
     axes.set(ylim=(floor, 3))
     return figure
 
@@ -130,24 +130,25 @@ def figure_3(d: Data):
         shown = min(1.0, 0.5 / way)  # the line stays within the panel
         away = np.array([0.12, 0.12 + shown * way])
         zoom.plot(PLACE - away, (0.0, 0.6 * late * shown), color="black", lw=1.2, ls="--")
-        text = rf"$c_\mathrm{{{name}}}$"
-        zoom.text(PLACE - away[1], 0.62 * late * shown, text, ha="center", va="bottom")
+        zoom.text(PLACE - away[1], 0.62 * late * shown, rf"$c_\mathrm{{{name}}}$", ha="center",
+                  va="bottom", bbox={"fc": "white", "ec": "none", "pad": 0.8})  # fmt: skip
     label = r"slip rate $\times\,G^*/(\langle\tau_\mathrm{p}\rangle c_\mathrm{s})$"
     figure.colorbar(picture, ax=zoom, label=label)
     stress = mean_stress / mean_stress.max()
     load.plot(stress, time, color="C0")
     wide.pcolormesh(X, time, slip_rate, norm=LogNorm(1e-8 * top, 1e-2 * top), **style)
-    load.set(xlim=(min(0.8, stress[time <= 1.0].min()), 1.03))
+    load.set_xlim(common.span(stress[time <= 1.0]))
+    load.locator_params(axis="x", nbins=3)
     wide.tick_params(labelleft=False)
     for axes, place in ((load, 1), (wide, PLACE)):
         axes.plot(place, 1, "o", color="black", ms=4, clip_on=False)
-        axes.set_ylim(time[0] - 0.01, 1.005)
+        axes.set_ylim(common.span(time[[0, -1]]))
     tau_p = _shifted(study, "strength") / MEAN
     strength.plot(X, tau_p, color="C0", lw=0.9)
-    above = tau_p.max() + 0.08
+    above = tau_p.max() + 0.1 * np.ptp(tau_p)
     strength.errorbar(PLACE, above, xerr=0.5 * H / L, color="firebrick", capsize=3, lw=1.4)
     strength.text(PLACE + 0.7 * H / L, above, r"$h_\mathrm{n}$", va="center", color="firebrick")
-    strength.set(xlim=(0, 1), ylim=(None, above + 0.08))
+    strength.set(xlim=(0, 1), ylim=common.span(tau_p, above))
     return figure
 
 
@@ -162,18 +163,20 @@ def figure_4(d: Data):
     top.legend(loc="upper right", ncols=2)
     bottom.plot([0, 1], [0, 1], color="grey", lw=0.8)
     for ratio in SIMULATED:
-        stress, style = d.stress(ratio, "ruptures") / MEAN, common.dots(ratio)
+        stress, _ = paired(d, ratio, "local", "critical_stress")
+        stress, style = stress / MEAN, common.dots(ratio)
         middle.plot(stress, 100 * offsets(d, ratio, "local"), **style, ms=4, label=f"{ratio:g}")
         place, predicted, off = is_misplaced(d, ratio)
         bottom.plot(predicted / L, place / L, **style, ms=4)
         bottom.plot(predicted[off] / L, place[off] / L, "o", mfc="none", mec="firebrick", ms=9)
         if "printed" in d:
-            pale = style | {"color": "lightgrey", "mfc": "none", "ms": 3, "zorder": 1}
-            middle.plot(stress, 100 * offsets(d, ratio, "printed"), **pale)
+            thin = {"mfc": "none", "mew": 0.7, "label": f"{ratio:g}, printed modulus"}
+            middle.plot(stress, 100 * offsets(d, ratio, "printed"), **style | thin, ms=4)
             place, predicted, off = is_misplaced(d, ratio, "printed")
-            bottom.plot(predicted[off] / L, place[off] / L, "x", color="firebrick", ms=6)
+            bottom.plot(predicted[off] / L, place[off] / L, "x", color=style["color"], ms=7)
     middle.axhline(0, color="grey", lw=0.8)
-    middle.legend(title=XI, ncols=3)
+    middle.locator_params(axis="x", nbins=6)
+    middle.legend(title=XI, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.1))
     return figure
 
 
@@ -196,8 +199,8 @@ def figure_5(d: Data):
         colour = look["color"]
         tau_p = setting.strength(ratio).sample(PROBLEM.interface)  # of the same draws for each
         strip.plot(X, tau_p[0] / MEAN, color=colour, lw=0.9)
-        strip.plot([], [], **look, label=f"{XI} = {ratio:g}")
-        strip.legend(loc="upper right", borderpad=0.1)
+        strip.text(0.99, 0.97, f"{XI} = {ratio:g}", color=colour, ha="right", va="top",
+                   transform=strip.transAxes)  # fmt: skip
         strip.set(xlim=(0, 1), ylim=(low, high + 0.8 * (high - low)))
         strip.locator_params(axis="y", nbins=3)
         strip.tick_params(labelbottom=strip is fields[-1])
@@ -211,14 +214,15 @@ def figure_5(d: Data):
         weakest = d.at("moments", "weakest_strength", ratio)
         least = estimates.density(weakest, bounds=setting.DENSITY_BOUNDS)
         minima.plot(least.value / least.value.max(), least.x / MEAN, **look)
-        onset = stress_density(d, ratio)
-        stress.plot(onset.x / MEAN, onset.value * MEAN, **look)
-        band = [(onset.value + sign * 2 * onset.error) * MEAN for sign in (-1, 1)]
-        stress.fill_between(onset.x / MEAN, *band, color=colour, alpha=0.25, lw=0)
-        for axes, curve in ((minima, least), (stress, onset)):
-            shown[axes].append(curve.x[curve.value > 1e-3 * curve.value.max()] / MEAN)
+        x, value, error = stress_density(d, ratio)
+        stress.plot(x / MEAN, value * MEAN, **look, label=f"{ratio:g}")
+        band = [(value + sign * 2 * error) * MEAN for sign in (-1, 1)]
+        stress.fill_between(x / MEAN, *band, color=colour, alpha=0.25, lw=0)
+        shown[minima].append(least.x[least.value > 1e-3 * least.value.max()] / MEAN)
+        shown[stress].append(x[value > 1e-3 * value.max()] / MEAN)
         share, edges = np.histogram(d.at("local", "critical_position", ratio) / L, 20, (0, 1))
         place.stairs(share / d.size.samples * 20, edges, baseline=None, color=colour, lw=0.9)
+    stress.legend(title=XI)
     for axes in (strengths, minima, densities):  # narrow
         axes.set_xticks([])
         axes.tick_params(labelleft=axes is strengths)
@@ -280,19 +284,20 @@ def figure_6(d: Data):
     _statistics(bottom, table, [low, low, low])
     bottom.axhline(low, color="grey", lw=0.8, ls=":")
     places = np.log2(SIMULATED)
-    raw = [d.stress(ratio, "ruptures").mean() / MEAN for ratio in SIMULATED]
-    errors = [2 * d.stress(ratio, "exact").std() / MEAN / np.sqrt(d.size.ruptures)
-              for ratio in SIMULATED]  # fmt: skip
-    look = {"fmt": "D", "color": "firebrick", "mfc": "none", "ms": 6, "lw": 0.8}
-    inset = bottom.inset_axes((0.42, 0.46, 0.56, 0.52))
-    for axes in (bottom, inset):
-        drawn = axes.errorbar(places, raw, errors, **look)
-    best = [dynamic_mean(d, ratio).value / MEAN for ratio in SIMULATED]
-    inset.plot(np.log2(RATIOS), [n[0].value for n in table], "-o", color="C0", ms=4)
-    inset.plot(places, best, "x", color="firebrick", ms=7)
+    look = {"color": "firebrick", "mfc": "none", "ms": 6, "lw": 0.8, "fmt": "D"}
+    raw = [mean(d.stress(ratio, "ruptures") / MEAN) for ratio in SIMULATED]
+    common.numbers(bottom, places, raw, **look, label=f"{d.size.ruptures} ruptures each")
+    inset = bottom.inset_axes((0.5, 0.5, 0.48, 0.48))
+    common.numbers(inset, np.log2(RATIOS), [mean(d.excess(r)) * 100 for r in RATIOS], color="C0",
+                   fmt="-o", label="equilibrium")  # fmt: skip
+    pairs = [mean(offsets(d, ratio, "local")) * 100 for ratio in SIMULATED]
+    common.numbers(inset, places, pairs, **look, label="ruptures")
+    inset.axhline(0, color="grey", lw=0.8)
     common.ratio_axis(inset)
-    inset.set(ylabel="mean", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
-    bottom.legend([drawn], [f"{d.size.ruptures} ruptures each"], loc=(0.02, 0.12))
+    inset.set(ylabel="theory above (%)", xlim=(_PLACES[1] - 0.4, _PLACES[-2] + 0.4))
+    inset.legend(handlelength=1.2)
+    handles, labels = bottom.get_legend_handles_labels()
+    bottom.legend(handles[-1:], labels[-1:], loc=(0.02, 0.12))
     return figure
 
 
