@@ -218,10 +218,9 @@ class Recorder:
         self._steps: list[dict[str, Floats]] = []
         variables = {name: along(interface, field) for name, field in FIELDS.items()}
         variables |= SCALARS | STEPS | MOMENT_RATE | STATIONS
-        variables |= force_variables(SCALARS)
         self.variables = {
             name: per_area(interface, variable) for name, variable in variables.items()
-        }
+        } | force_variables(SCALARS)  # forces, N, also on a plane
 
     def take_steps(self, state: RuptureState, count: int) -> tuple[int, int]:
         """Take up to `count` steps and record them. Return (steps taken, reason)."""
