@@ -243,6 +243,19 @@ def test_slip_loads_over_clamping_forces(tmp_path):
     refuses("coefficients already", lambda: st.read_peaks(mu, normal=1e3))
 
 
+def test_a_picture_of_peaks_has_all_tests_and_a_band(tmp_path):
+    path = tmp_path / "peaks.csv"
+    path.write_text("peak [kN];length [mm]\n0.21;31\n0.25;31\n0.2;31\n0.45;62\n0.4;62\n0.41;62")
+    (axes,) = st.plot.fit(st.read_peaks(path))
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert {"3 tests, 0.031 m", "log-normal, 0.062 m"} < {*labels}
+    steps = np.concatenate([line.get_xdata()[1:-1] for line in axes.lines[1::2]])
+    np.testing.assert_allclose(steps, [200, 210, 250, 400, 410, 450])
+    fitted = axes.lines[0]
+    middle = np.interp(0.5, fitted.get_ydata(), fitted.get_xdata())
+    assert middle == pytest.approx((200.0 * 210 * 250) ** (1 / 3), rel=1e-3)
+
+
 def test_readings_that_are_no_friction():
     """A spike is left out; saturation and a missing tare are named; noise moves no peak."""
     noise = np.random.default_rng(0).standard_normal((20, 2001))

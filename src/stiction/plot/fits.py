@@ -6,13 +6,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.special import ndtr
 
 from stiction.base.arrays import Array
 from stiction.base.model import checked
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
+from stiction.inference.curves import Curves
 from stiction.inference.fit import FieldFit
+from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.whittle import Observed, periodograms_of
 from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import (
@@ -28,6 +31,8 @@ from stiction.plot.style import (
 
 SHOWN = 100
 """Repetitions, or simulated records, behind a band that contains 90 % of them."""
+SHOWN_FITS = 1000
+"""Fits to simulated peaks behind a band."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 PER_OCTAVE = 4
@@ -35,39 +40,83 @@ PER_OCTAVE = 4
 
 
 @checked
-def fit(field_fit: FieldFit) -> NDArray[Any]:
-    """Draw a fitted random field beside the records.
+def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
+    """Draw a fitted random field beside the records, or the distribution of measured peaks.
 
     Parameters
     ----------
-    field_fit : FieldFit
-        From `stiction.fit_field`.
+    result : FieldFit, Peaks or Curves
+        From `stiction.fit_field`, `stiction.read_peaks` or
+        `stiction.read_curve`.
 
     Returns
     -------
-    (4,) array of matplotlib.axes.Axes
-        Panels for all records together: (a) values and the fitted
-        marginal, (b) quantiles of the data against quantiles of the
-        fit, (c) correlation, with the effect of the window, and (d)
+    (4,) or (1,) array of matplotlib.axes.Axes
+        Of a field, panels for all records together: (a) values and the
+        fitted marginal, (b) quantiles of the data against quantiles of
+        the fit, (c) correlation, with the effect of the window, and (d)
         spectrum. The bands come from records that were simulated from
         the fitted field. In (a) and (b) they contain 90 % of the fits
         to such records. In (c) and (d) they contain 90 % of the sets of
-        such records.
+        such records. Of peaks, the share of tests up to each peak, with
+        the log-normal distribution of the same mean and standard
+        deviation of the logarithm. The band contains 90 % of the fits to
+        as many peaks that were simulated from it.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> import stiction as st
+    >>> path = Path(tempfile.mkdtemp()) / "peaks.csv"
+    >>> _ = path.write_text("test, peak [MPa]\\n1, 0.71\\n2, 0.69\\n3, 0.74\\n")
+    >>> st.plot.fit(st.read_peaks(path))[0].get_xlabel()
+    'peak (MPa)'
     """
-    estimate, rng = field_fit._estimate, np.random.default_rng(0)
+    rng = np.random.default_rng(0)
+    if not isinstance(result, FieldFit):
+        with on_axes(None) as axes:
+            _peaks(axes, make_peaks(result), rng)
+        return np.array([axes])
+    estimate = result._estimate
     windows = estimate.setting.windows
-    observed = periodograms_of(field_fit._rows, windows)
+    observed = periodograms_of(result._rows, windows)
     simulated = [periodograms_of(estimate.simulate(rng), windows) for _ in range(SHOWN)]
     figure = new_figure(PAGE, 5.4)
     with paper_style():
         panels: NDArray[Any] = figure.subplots(2, 2).ravel()
-        _histogram(panels[0], field_fit)
-        _quantiles(panels[1], field_fit)
-        _correlation(panels[2], field_fit, observed, simulated)
-        _spectrum(panels[3], field_fit, observed, simulated)
+        _histogram(panels[0], result)
+        _quantiles(panels[1], result)
+        _correlation(panels[2], result, observed, simulated)
+        _spectrum(panels[3], result, observed, simulated)
         for letter, axes in zip("abcd", panels, strict=True):
             panel(axes, letter)
     return panels
+
+
+def _peaks(axes: Axes, peaks: Peaks, rng: np.random.Generator) -> None:
+    """Draw the share of tests up to each peak, and the log-normal fit with its band."""
+    factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
+    for number, (length, values) in enumerate(zip(peaks.lengths, peaks.values, strict=True)):
+        of = "" if length is None else f", {length:g} m"
+        logs, paint = np.log(values), color(number + 1)
+        mean, spread = logs.mean(), max(logs.std(ddof=1) if logs.size > 1 else 0.0, 1e-6)
+        drawn = rng.normal(mean, spread, (SHOWN_FITS, logs.size))
+        at = np.linspace(mean - 4.0 * spread, mean + 4.0 * spread, 200)
+        means, spreads = drawn.mean(axis=1), np.maximum(drawn.std(axis=1, ddof=1), 1e-6)
+        band = np.quantile(ndtr((at - means[:, None]) / spreads[:, None]), (0.05, 0.95), axis=0)
+        place = np.exp(at) * factor
+        axes.fill_between(
+            place, *band, color=paint, alpha=0.2, linewidth=0.0, label=f"90 % of fits{of}"
+        )
+        axes.plot(place, ndtr((at - mean) / spread), color=paint, label=f"log-normal{of}")
+        steps = np.r_[place[0], np.sort(values) * factor, place[-1]]
+        shares = np.minimum(np.arange(values.size + 2) / values.size, 1.0)
+        axes.step(steps, shares, where="post", color=INK, label=f"{values.size} tests{of}")
+    axes.set_ylim(0.0, 1.02)
+    name = "coefficient of friction" if peaks.unit == "1" else "peak"
+    axes.set(xlabel=with_unit(name, unit), ylabel="share of tests up to it")
+    axes.legend()
 
 
 def _histogram(axes: Axes, field_fit: FieldFit) -> None:

@@ -64,9 +64,9 @@ END, MAX_LINES_COMPARED, HEADING = 40, 150, 2
 """Lines at the start of a text, and in the rest of it, that show the separator, and the number of
 lines for which a heading counts."""
 _CELL = re.compile(
-    rf"$|{NUMBER.pattern}|{GROUPS.pattern}(?:[.,]\d*)?$|[\W_]+$|[^\W\d][^;,\t]*$"
+    rf"(?!.*,$)(?:$|{NUMBER.pattern}|{GROUPS.pattern}(?:[.,]\d*)?$|[\W_]+$|[^\W\d][^;,\t]*$"
     r"|\d+[^\W\d_]\w*$|\d+[-/]\d+$"
-    r"|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[ T]\s*\d[\d:.,]*)?$|\d{1,2}:\d{2}[\d:.,]*$"
+    r"|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[ T]\s*\d[\d:.,]*)?$|\d{1,2}:\d{2}[\d:.,]*$)"
 )
 """Cells of rows with data: nothing, numbers, marks, words, names such as 1a, dates and times."""
 MAX_COLUMNS = 2_000
@@ -199,7 +199,7 @@ def _separator(lines: Sequence[str], words: set[str]) -> str:
     for order, separator in enumerate(SEPARATORS):
         rows = [_split(line, separator, words) for line in shown]
         counts = [
-            len(cells) if any(map(NUMBER.match, cells)) and all(map(_CELL.match, cells)) else 0
+            len(cells) * (any(map(NUMBER.match, cells)) and all(map(_CELL.match, cells)))
             for cells in rows
         ]
         common = Counter(filter(None, counts)).most_common(1)
