@@ -209,8 +209,8 @@ class LoadSteps:
             M[np.arange(n), np.arange(n)] -= np.where(self.passed, 0.0, self.W)
         return M
 
-    def raise_to(self, load, limit=1e3, most=20000):
-        """Move to a load. Return whether slip jumped, or None if it exceeds `limit`, m."""
+    def raise_to(self, load, most=20000):
+        """Move to a load. Return whether slip jumped, or None if no equilibrium was reached."""
         n, lowest, jumped = self.n, self.x.copy(), False
         lowest[n:] = 0.0
         active = np.zeros(len(self.x), bool)
@@ -258,9 +258,9 @@ class LoadSteps:
             self.x = np.maximum(self.x + share * step, lowest)
             _, f = self._overstress(self.x, load)
             self._note_corners(f)
-            if self.x.max() > limit:
+            if self.x.max() > 1.0:  # m
                 return None
-        raise AssertionError("load steps do not converge")
+        return None
 
 
 def positive_pivots(M):

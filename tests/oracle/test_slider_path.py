@@ -71,12 +71,12 @@ def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
             stop = follow(contact, *stop[:3], load)
             if stop.status == Status.AT_TARGET:
                 break
-        brute.raise_to(load)
+        assert brute.raise_to(load) is not None
         largest = np.abs(brute.x).max()
         np.testing.assert_allclose(contact.moved, brute.x, rtol=0.0, atol=1e-9 * largest)
-    # Beyond the last onset no equilibrium holds the slider.
+    # Beyond the last onset no equilibrium is near.
     if relief == 0.0:
-        assert brute.raise_to(end * (1.0 + away), limit=1e3 * largest) is None
+        assert brute.raise_to(end * (1.0 + away), most=300) is None
     return stops
 
 
@@ -96,7 +96,7 @@ def test_every_onset_is_inside_the_bracket_of_load_steps(name):
     for seed in range(60):
         friction = random_friction(plain.K, seed, residual=[0.1, 0.2, 0.35][seed % 3])
         start = press(make_matrices(plain.K, plain.T_p), friction, N)
-        compare(plain.K, plain.T, friction, start, steps=6)
+        compare(plain.K, plain.T, friction, start, steps=40)
 
 
 def test_a_machine_unloads_as_in_load_steps():
