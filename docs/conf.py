@@ -98,7 +98,7 @@ def scrape_figure(block, block_vars, gallery_conf):
 HOW_TOS = re.findall(
     r"\[([^\]`]+)\]\((\w+)\.py\)", (ROOT / "examples" / "README.md").read_text("utf-8")
 )
-SCRIPTS = ROOT / "build" / "how-to"
+SCRIPTS = ROOT / "build" / "examples"
 
 
 def keep_pages_clean(conf, name):
@@ -109,8 +109,9 @@ def keep_pages_clean(conf, name):
 
 
 sphinx_gallery_conf = {
-    "examples_dirs": [str(SCRIPTS), "gallery"],
-    "gallery_dirs": ["how-to", "pictures"],
+    "examples_dirs": [str(SCRIPTS)],
+    "gallery_dirs": ["examples"],
+    "subsection_order": [str(SCRIPTS / "how-to"), "*"],
     "backreferences_dir": "api/backreferences",
     "doc_module": ("stiction",),
     "image_scrapers": ("matplotlib", scrape_figure),
@@ -126,27 +127,91 @@ sphinx_gallery_conf = {
 }
 
 
-def mark_titles():
-    """Copy the how-tos to `SCRIPTS`, unchanged ones untouched so that they are not run again."""
-    SCRIPTS.mkdir(parents=True, exist_ok=True)
+def write_if_new(path, text):
+    """Unchanged, a page is not built again."""
+    if not path.exists() or path.read_text("utf-8") != text:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def collect_scripts():
+    """Copy how-tos and pictures to `SCRIPTS`, the how-tos with a title."""
     texts = {
-        "GALLERY_HEADER.rst": "How-tos\n=======\n\nEach is a script of some twenty-five lines with a"
-        " question, a printed answer and a picture, all made when\nthese pages are built.\n"
+        path.relative_to(HERE / "gallery"): path.read_text("utf-8")
+        for path in (HERE / "gallery").rglob("*")
+        if path.suffix in (".py", ".rst")
     }
     for title, name in HOW_TOS:
         title = title.removeprefix("a ").capitalize()
         text = (ROOT / "examples" / f"{name}.py").read_text("utf-8").removeprefix('"""')
-        texts[f"{name}.py"] = f'"""\n{title}\n{"=" * len(title)}\n\n{text}'
-    for path in SCRIPTS.glob("*.py"):
-        if path.name not in texts:
+        texts[Path("how-to", f"{name}.py")] = f'"""\n{title}\n{"=" * len(title)}\n\n{text}'
+    for path in SCRIPTS.rglob("*.py"):
+        if path.relative_to(SCRIPTS) not in texts:
             path.unlink()
     for name, text in texts.items():
-        path = SCRIPTS / name
-        if not path.exists() or path.read_text("utf-8") != text:
-            path.write_text(text, encoding="utf-8")
+        write_if_new(SCRIPTS / name, text)
 
 
-mark_titles()
+collect_scripts()
+
+# Pages that have moved: the old address and the new page.
+MOVED = dict(line.split() for line in """
+installation start/installation
+tutorials/first-onset start/first-onset
+methods start/choose-a-method
+tutorials/measured-profile tutorials/profile
+what-do-twenty-five-tests-tell-me tutorials/peak-forces
+design-force tutorials/design-force
+theory guide/model
+correlation-lengths guide/random-strength
+inspection guide/inspection
+friction guide/friction-laws
+specimens guide/specimens
+planes guide/planes-and-ends
+measured-profiles guide/reading-data
+reliability guide/failure-probability
+studies guide/studies
+clusters guide/clusters
+plug-ins guide/extend-and-connect
+tutorials/own-code guide/own-code
+conventions reference/conventions
+faq reference/errors-and-warnings
+project reference/changelog
+equilibrium evidence/exact-equilibrium
+specimens-evidence evidence/numerics
+validation evidence/accuracy
+rupture-benchmarks evidence/rupture-benchmarks
+stick-slips evidence/laboratory-fault
+paper evidence/paper
+comparison evidence/other-programs
+architecture developers/architecture
+changelog reference/changelog
+tutorials/index index
+guides index
+evidence evidence/accuracy
+reference api/index
+how-to/index examples/index
+pictures/index examples/index
+""".strip().splitlines())
+REDIRECT = """<!DOCTYPE html><meta charset="utf-8"><title>Moved</title>
+<meta http-equiv="refresh" content="1; url={0}"><link rel="canonical" href="{0}">
+<script>location.replace("{0}" + location.hash)</script><p>This page has moved <a href="{0}">here</a>.
+"""
+
+
+def redirect(app, error):
+    """Write a page at each old address that leads to the new page."""
+    if error or app.builder.format != "html":
+        return
+    moved = dict(MOVED)
+    for page in app.env.found_docs:
+        if page.startswith("examples/") and page.count("/") == 2:
+            old = page.removeprefix("examples/")
+            moved[old if old.startswith("how-to") else f"pictures/{old}"] = page
+    for old, new in moved.items():
+        path = os.path.relpath(f"{new}.html", os.path.dirname(old) or ".")
+        write_if_new(Path(app.outdir, f"{old}.html"), REDIRECT.format(path))
+
 
 html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
@@ -154,6 +219,7 @@ html_title = f"stiction {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+html_sidebars = {"**": ["all-pages.html"]}
 html_theme_options = {
     "logo": {"text": f"stiction {version}"},
     "icon_links": [
@@ -161,9 +227,8 @@ html_theme_options = {
         for name in ("Repository",)
         if name in URLS
     ],
-    "navbar_align": "left",
-    "header_links_before_dropdown": 6,
-    "secondary_sidebar_items": {"**": ["page-toc"], "how-to/index": [], "pictures/index": []},
+    "navbar_center": [],
+    "secondary_sidebar_items": {"**": ["page-toc"], "examples/index": []},
     "footer_start": ["copyright"],
     "footer_end": [],
 }
@@ -190,12 +255,6 @@ def plain_text(app, what, name, obj, options, lines):
             lines[number] = "".join(parts)
 
 
-def write_if_new(path, text):
-    """Unchanged, a page is not built again."""
-    if not path.exists() or path.read_text("utf-8") != text:
-        path.write_text(text, encoding="utf-8")
-
-
 def write_commands(app):
     """The page of commands, from the commands."""
     group = typer.main.get_command(commands)
@@ -212,3 +271,4 @@ def setup(app):
     app.connect("source-read", links_to_the_list)
     app.connect("autodoc-process-docstring", plain_text, priority=900)
     app.connect("builder-inited", write_commands, priority=1)
+    app.connect("build-finished", redirect)

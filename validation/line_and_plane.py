@@ -1,8 +1,8 @@
 """How much does the interaction of slip patches lower the onset, on a line and on a plane?
 
-Prints the table of docs/planes.md, a cell as soon as it is computed: by how much the exact onset
-lies below the local criterion, and in brackets the part of slip farther away than 1.25 h_n, found
-by an onset with slip allowed near the critical patch only.
+Prints the table of docs/guide/planes-and-ends.md, a cell as soon as it is computed: by how much the
+exact onset lies below the local criterion, and in brackets the part of slip farther away than
+1.25 h_n, by an onset with slip allowed near the critical patch only.
 
 Run: ``python validation/line_and_plane.py [SAMPLES]``: at most so many at each point; all take
 about a quarter of an hour on one core.

@@ -1,6 +1,7 @@
 """Ruptures on lines: their speed, their onset beside exact equilibrium, and the error of a grid.
 
-Prints the tables of docs/validation.md. Run: ``python validation/ruptures.py {speed,onset,grid}``
+Prints the tables of docs/evidence/accuracy.md. Run:
+``python validation/ruptures.py {speed,onset,grid}``
 
 `speed`: uniform strength, a weak patch that breaks at once, against the driving S = (tau_p - tau_0)
 / (tau_0 - tau_r). For weak driving it tends to the Rayleigh speed from below; for strong driving it

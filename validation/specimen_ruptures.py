@@ -2,12 +2,13 @@
 
     python validation/specimen_ruptures.py [drives | friction | vary] [--samples 30] [--nodes 128]
 
-`drives`: for each drive, random strengths as in the example of docs/specimens.md. Every instability
-of the path with inertia is also let come to rest overdamped, from the same state. Printed are the
-events, how many of them are shorter with inertia, how many run through all of the interface though
-overdamped ones rest, static friction, front speeds, and where the first events end. `friction`: the
-same below dead load, where the strength is correlated over half of the nucleation length. `vary`:
-behind a machine, with half and twice the attenuation and further, and with heavier platens.
+`drives`: for each drive, random strengths as in the example of docs/guide/specimens.md. Every
+instability of the path with inertia is also let come to rest overdamped, from the same state.
+Printed are the events, how many of them are shorter with inertia, how many run through all of the
+interface though overdamped ones rest, static friction, front speeds, and the ends of first events.
+`friction`: the same below dead load, where the strength is correlated over half of the nucleation
+length. `vary`: in a machine of finite stiffness, with half and twice the attenuation and further,
+and with heavier platens.
 """
 
 import argparse

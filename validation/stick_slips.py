@@ -1,8 +1,9 @@
 """Validation: fifty-six stick-slips of a fault of four metres, beside the model of its rig.
 
 The record is `data/stick_slips/events.csv`, measured by Okubo, Yamashita and Fukuyama (see the
-README there). Prints every number of docs/stick-slips.md: first what disagrees whatever the
-parameters, then what the record fixes of them, what holds without a fit, and a prediction.
+README there). Prints every number of docs/evidence/laboratory-fault.md: first what
+disagrees whatever the parameters, then what the record fixes of them, what
+holds without a fit, and a prediction.
 
 Run: ``python validation/stick_slips.py [FIGURES] [--quick]``; two to four minutes on two cores.
 """
@@ -93,7 +94,7 @@ def machine_of(ratio):
     """Return the stiffness of the machine, N/m, from stress drop over slip (Pa/m).
 
     The drop of a rigid translation is h times the slip, h = k C/(k + C)/(2 L) with the stiffness
-    C of a block and k of the machine as a block sees it, both per depth (docs/specimens.md).
+    C of a block and k of the machine as a block sees it, both per depth (docs/guide/specimens.md).
     """
     block = rig(1e8).blocks.drive_stiffness
     total = 2.0 * LENGTH * ratio

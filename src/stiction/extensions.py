@@ -1,6 +1,6 @@
 """Names for your own packages that add a method, law, marginal or spectrum.
 
-`docs/plug-ins.md` shows an example of each. Import these names from
+`docs/guide/extend-and-connect.md` shows an example of each. Import these names from
 this module, because the modules that define them may move.
 """
 

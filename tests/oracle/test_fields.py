@@ -35,7 +35,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_same_field_elsewhere(name):
-    """What docs/correlation-lengths.md says of other libraries, to the last digits."""
+    """What docs/guide/random-strength.md says of other libraries, to the last digits."""
     here, other, third = CASES[name]
     expected = here.untruncated_correlation(R)
     np.testing.assert_allclose(other.correlation(R), expected, atol=1e-12)

@@ -275,7 +275,7 @@ def test_numbers_in_the_documentation_are_those_that_are_computed(pipeline):
         key = f"{float(row['xi_0/h_n']):g}" if row["xi_0/h_n"] else row["case"]
         computed[row["claim"], row["quantity"], key] = row
     mean, rms = {}, {}
-    table = [row for row in cells("docs/paper.md", "| `") if len(row) == 4]
+    table = [row for row in cells("docs/evidence/paper.md", "| `") if len(row) == 4]
     for name, quantity, at, value in table:
         number, error, unit = re.match(r"(\S+) ± (\S+) ?(.*)", value).groups()
         row = computed[name.strip("`"), quantity, at]
@@ -286,10 +286,14 @@ def test_numbers_in_the_documentation_are_those_that_are_computed(pipeline):
         rms |= {at: float(number)} if quantity.startswith("one modulus, against") else {}
     assert len(table) > 20
     for at in ("0.25", "0.5", "1", "2"):
-        row = next(row for row in cells("docs/validation.md", f"| {at} |") if len(row) == 9)
+        row = next(
+            row for row in cells("docs/evidence/accuracy.md", f"| {at} |") if len(row) == 9
+        )
         for cell, number in zip(row[1:3], (mean[at], rms[at]), strict=True):
             assert cell == f"{float(f'{number:.2g}'):.{len(cell.split('.')[1]) - 2}f} %"
-    methods = " ".join((ROOT / "docs/methods.md").read_text(encoding="utf-8").split())
+    methods = " ".join(
+        (ROOT / "docs/start/choose-a-method.md").read_text(encoding="utf-8").split()
+    )
     quoted = [f"{float(f'{number:.1g}'):g}" for number in mean.values()]
     assert f"{', '.join(quoted[:3])} and {quoted[3]} % too high on average" in methods
 
@@ -410,8 +414,9 @@ def setting_of(text, monkeypatch):
 
 
 def test_the_parameters_of_the_documentation_are_taken(monkeypatch):
-    (text,) = re.findall(r"```toml\n(.*?)```", (ROOT / "docs/paper.md").read_text(), re.DOTALL)
-    setting = setting_of(text, monkeypatch)
+    text = (ROOT / "docs/evidence/paper.md").read_text("utf-8")
+    (table,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    setting = setting_of(table, monkeypatch)
     assert setting.L == 1.0
     assert setting.residual(5e6) == 2e6
     assert (setting.LOW, setting.HIGH, setting.LOADING_RATE) == (4e6, 12e6, 6e7)

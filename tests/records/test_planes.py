@@ -94,7 +94,7 @@ def an_ensemble_with_two_random_properties():
 
 
 @calls(
-    "uguca, docs/validation.md; energy and symmetry, tests/properties/test_dynamics_properties.py",
+    "uguca, docs/evidence/accuracy.md; energy, tests/properties/test_dynamics_properties.py",
     close=1e-5,
 )
 def a_rupture_with_stations():

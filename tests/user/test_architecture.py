@@ -1,4 +1,4 @@
-"""Imports run downwards as docs/architecture.md draws them, and kernels depend on kernels only."""
+"""Imports run downwards (docs/developers/architecture.md); kernels depend on kernels only."""
 
 import dataclasses
 import os
@@ -38,7 +38,7 @@ def test_public_modules_show_their_functions():
 
 
 def worked_examples(language: str) -> list[str]:
-    page = (ROOT / "docs" / "plug-ins.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guide" / "extend-and-connect.md").read_text(encoding="utf-8")
     return re.findall(rf"```{language}\n(.*?)```", page, flags=re.DOTALL)
 
 

@@ -19,7 +19,7 @@ import stiction as st
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 README = (ROOT / "README.md").read_text("utf-8")
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if path.parts[-2] != "api")
 DATA = ROOT / "examples" / "data"
 
 
@@ -83,8 +83,8 @@ def of_decisions(found):
 
 
 SHOWN = {
-    "docs/studies.md": (of_studies, {r"\bsamples=[\d_]+": "samples=4"}),
-    "docs/tutorials/measured-profile.md": (of_profile, {
+    "docs/guide/studies.md": (of_studies, {r"\bsamples=[\d_]+": "samples=4"}),
+    "docs/tutorials/profile.md": (of_profile, {
         "bootstrap=200": "bootstrap=20",
         "joint, fit, ": "joint, fit.interfaces(4), ",
     }),
@@ -94,12 +94,12 @@ SHOWN = {
         "samples=100": "samples=40",
         r"moving = .*\n.*\nrun = .*\n.*\n.*": "",  # ruptures: minutes on a small machine
     }),
-    "docs/reliability.md": (of_reliability, {}),
-    "docs/what-do-twenty-five-tests-tell-me.md": (of_peaks, {}),
-    "docs/planes.md": (len, {}),
-    "docs/specimens.md": (len, {}),
-    "docs/stick-slips.md": (len, {}),
-    "docs/design-force.md": (of_decisions, {
+    "docs/guide/failure-probability.md": (of_reliability, {}),
+    "docs/tutorials/peak-forces.md": (of_peaks, {}),
+    "docs/guide/planes-and-ends.md": (len, {}),
+    "docs/guide/specimens.md": (len, {}),
+    "docs/evidence/laboratory-fault.md": (len, {}),
+    "docs/tutorials/design-force.md": (of_decisions, {
         "between=True": "between=True, bootstrap=20",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",
@@ -137,7 +137,7 @@ def run_blocks(text, scope, replaced=()):
                 assert float(number) == pytest.approx(float(given), abs=2.01 * unit), line
 
 
-QUICK = ("docs/studies.md",)
+QUICK = ("docs/guide/studies.md",)
 
 
 @pytest.mark.parametrize(
@@ -166,14 +166,14 @@ def test_the_readme_prints_what_it_shows(monkeypatch, tmp_path):
 
 
 def test_the_page_of_messages_quotes_messages():
-    """Each quotation of docs/faq.md stands in a text of the package; '...' stands for values."""
+    """Each quotation of the page occurs in a text of the package; '...' replaces values."""
     texts = set()
     for path in (ROOT / "src").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             parts = node.values if isinstance(node, ast.JoinedStr) else [node]
             texts.add("#".join(str(getattr(part, "value", "")) for part in parts))
     messages = "\n".join(texts)
-    page = (ROOT / "docs" / "faq.md").read_text("utf-8")
+    page = (ROOT / "docs" / "reference" / "errors-and-warnings.md").read_text("utf-8")
     quotes = re.findall(r"(?:^- |or |and )\*\*`([^`]+)`", page, re.MULTILINE)
     assert len(quotes) > 60
     for part in (part.strip() for quote in quotes for part in quote.split("...")):
@@ -212,7 +212,7 @@ def test_study_files_and_tables_of_them():
         study = st.Study.from_toml(path)
         assert st.Study.from_dict(study.to_dict()) == study, path
     # These name a reader's package, and hold parameters of the report on the paper.
-    pages = [page for page in PAGES if page.stem not in ("plug-ins", "paper")]
+    pages = [page for page in PAGES if page.stem not in ("extend-and-connect", "paper")]
     parsed = [tomllib.loads(block) for page in pages for block in blocks(page, "toml")]
     assert len(parsed) >= 5
     whole = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
@@ -225,7 +225,7 @@ def test_study_files_and_tables_of_them():
 def test_links_and_paths():
     pattern = r"`((?:examples|validation|benchmarks|tests|docs)/[\w./]+\.\w+)`"
     known = [path.as_posix() for path in (ROOT / "src").rglob("*.py")]
-    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    page = (ROOT / "docs" / "developers" / "architecture.md").read_text("utf-8")
     for name in re.findall(r"`([\w/]+\.py)`", page):
         assert any(path.endswith(f"/{name}") for path in [*known, f"{ROOT}/{name}"]), name
     for page in [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:

@@ -83,7 +83,7 @@ def test_simulated_campaigns_of_inference():
         assert ((ranks >= 0) & (ranks <= inference.DRAWS)).all()
 
 
-# -- docs/rupture-benchmarks.md, coarser: the community's fault, and its line ----------------------
+# -- docs/evidence/rupture-benchmarks.md, coarser: the community's fault, and its line -----------
 
 FAULT = load("community_benchmark")
 """200 m are 4 nodes to the nucleation length across the slip."""

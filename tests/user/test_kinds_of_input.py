@@ -1,6 +1,6 @@
 """What users hold, at every argument that takes numbers: read by its unit and labels, or refused.
 
-The table stands in docs/measured-profiles.md; here each pair of a kind and an argument is tried.
+The table stands in docs/guide/reading-data.md; here each pair of a kind and an argument is tried.
 """
 
 import astropy.units as u

@@ -1,7 +1,7 @@
 """Units of measured data, their factors to SI, and quantities from other packages.
 
 A unit is read from its text, and no unit is
-guessed. The page `docs/measured-profiles.md`
+guessed. The page `docs/guide/reading-data.md`
 has a table of the values that users may pass.
 """
 

@@ -30,7 +30,7 @@ def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
     """Warn if the grid does not resolve the nucleation length, with the expected error."""
     # A power law through the largest errors of rough fields, relative
     # to 126 nodes: 16 %, 3 % and 0.6 % at 8, 16 and 32 nodes
-    # (docs/validation.md).
+    # (docs/evidence/accuracy.md).
     nodes = min(nodes_in_nucleation_length(problem, rows.steepest_weakening_rate))
     percent = 3.0 * (16.0 / nodes) ** 2.4
     expected = f"up to {percent:.0f} %" if percent < 15.0 else "more than 15 %"

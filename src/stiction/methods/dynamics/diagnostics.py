@@ -15,7 +15,7 @@ that they take over (`whole_stress`), and results do not (`mean_stress`).
 
 An instability is slip that the load does not drive: after a maximum of
 <tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
-(`docs/theory.md`). The instability began at that maximum. A falling
+(`docs/guide/model.md`). The instability began at that maximum. A falling
 load also lowers <tau>, but without an instability. Therefore the
 relevant fall is
 

@@ -133,7 +133,7 @@ class Rupture(Listed):
     `rupture_speed` is the largest apparent speed and can exceed all wave
     speeds. Use `median_rupture_speed` as the speed of a rupture.
     Energies and `seismic_moment` are values at the end of the run. See
-    docs/ruptures.md for the definitions of instabilities, events and
+    docs/guide/ruptures.md for the definitions of instabilities, events and
     their ends, and for the error by fast loading. A node never slips
     backwards (Breitenfeld and Geubelle, 1998).
     """

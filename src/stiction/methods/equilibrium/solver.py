@@ -155,7 +155,7 @@ def warn_of_signs(problem: Problem) -> None:
         warn_accuracy(
             "the stiffness of these blocks has positive entries off its diagonal, up to"
             f" {problem.blocks.positive:.1g} of the diagonal. Then there is no proof that the"
-            " equilibria are the least and the bounds rigorous (docs/specimens.md)"
+            " equilibria are the least and the bounds rigorous (docs/guide/specimens.md)"
         )
 
 
