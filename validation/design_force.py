@@ -94,7 +94,7 @@ def campaign(truth, seed, method):
     ):
         designs.append([tables.quantile(grid, probability) for probability in PROMISED])
         draws = grid.described(grid.draws(4000, np.random.default_rng(0)))
-        for name, right in (("strength.mean", 1e6), ("between.strength", SCATTER)):
+        for name, right in (("mean", 1e6), ("between", SCATTER)):
             low, high = np.quantile(draws[name], [0.05, 0.95])
             held.append(low < right < high)
     designs.append(student(peaks))

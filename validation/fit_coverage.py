@@ -66,7 +66,7 @@ def truth_of(case: Case, noise: float) -> dict[str, float]:
     values = {
         "mean": case.field.mean,
         "standard_deviation": deviation,
-        "spectrum.correlation_length": spectrum.correlation_length,
+        "correlation_length": spectrum.correlation_length,
         "noise": noise * deviation,
     }
     names = ("alpha", "beta", "mean", "cv")

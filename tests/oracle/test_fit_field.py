@@ -260,6 +260,6 @@ def test_a_spectrum_without_truncation_is_one_and_the_same_in_simulations_and_fi
     assert st.PowerLawSpectrum(1e-2).cutoff() == pytest.approx(500.0 * np.pi, rel=1e-15)
     spectrum = st.PowerLawSpectrum(1e-2, exponent=2.0)
     fit = st.fit_field(records_of(spectrum, 2, 40), PIECE, **SIMPLE | {"noise": True})
-    length = fit.parameters["spectrum.correlation_length"]
+    length = fit.parameters["correlation_length"]
     assert length == pytest.approx(1e-2, rel=0.1)
     assert fit.field.spectrum == st.PowerLawSpectrum(length, exponent=2.0)

@@ -41,7 +41,7 @@ def of_studies(found):
 
 
 def of_profile(found):
-    truth = {"mean": 1e6, "noise": 0.03e6, "spectrum.exponent": 2.0}
+    truth = {"mean": 1e6, "noise": 0.03e6, "exponent": 2.0}
     for name, value in truth.items():
         assert found["fit"].parameters[name] == pytest.approx(value, rel=0.2)
     assert 0.0 < found["answer"].probability < 0.5

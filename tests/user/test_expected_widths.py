@@ -20,7 +20,7 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
     designs = {"many": 56}
     found = st.design_of_tests(PROBLEM, posterior, designs=designs, repetitions=12, **GIVEN)
     assert found.design.values.tolist() == ["now", "many"]
-    for name in ("strength.mean", "between.strength"):
+    for name in ("mean", "between"):
         now, many = found.width.sel(parameter=name).values
         assert now == pytest.approx(np.ptp(posterior.interval[name]), rel=0.1)
         # Eight times as many tests: a third of the width, less where eight leave heavy tails.

@@ -16,7 +16,7 @@ FIELD = st.RandomField(
 )
 COUNT, SPACING = 400, 2e-4
 X = SPACING * np.arange(COUNT)
-LENGTH = "spectrum.correlation_length"
+LENGTH = "correlation_length"
 
 
 def labelled(values, x=X):

@@ -57,14 +57,14 @@ def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
     given = LOCAL | {"between": "lognormal", "load_cell_error": error}
     found = st.infer(PROBLEM, EVEN, groups, **given)
     mean, spread, scatter, of_scatter = by_hand(PEAKS, error)
-    own = found.draws["strength.mean"], found.draws["between.strength"]
+    own = found.draws["mean"], found.draws["between"]
     assert own[0].mean() == pytest.approx(mean, abs=0.07 * spread)
     assert own[0].std() == pytest.approx(spread, rel=0.1)  # heavy tails
     assert own[1].mean() == pytest.approx(scatter, abs=0.07 * of_scatter)
     assert own[1].std() == pytest.approx(of_scatter, rel=0.1)
     assert found.families == {"lognormal": pytest.approx(1.0)}
     assert found.agreement is None
-    assert "strength.mean" not in found.information  # its prior is flat
+    assert "mean" not in found.information  # its prior is flat
     if len(lengths) > 1:
         forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
         given["load_cell_error"] = 0.0
@@ -80,7 +80,7 @@ def test_five_strengths_give_what_proportion_gives(monkeypatch):
     monkeypatch.setattr("stiction.inference.specimens.scales_with_strength", lambda *_: False)
     long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
     assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
-    for name in ("strength.mean", "between.strength"):
+    for name in ("mean", "between"):
         assert long.mean[name] == pytest.approx(short.mean[name], rel=5e-3)
     np.testing.assert_allclose(np.mean(long.predicted), np.mean(short.predicted), rtol=5e-3)
 
@@ -108,8 +108,8 @@ def test_profiles_and_peaks_are_joined():
     peaks = onsets.critical_stress.values * (PEAKS / 1.05e6)
     both = st.infer(PROBLEM, fit, peaks, **LOCAL)
     alone = st.infer(PROBLEM, ROUGH, peaks, **LOCAL)
-    assert np.ptp(both.interval["strength.mean"]) < np.ptp(alone.interval["strength.mean"])
-    assert np.ptp(both.interval["strength.mean"]) < np.ptp(fit.interval["mean"])
+    assert np.ptp(both.interval["mean"]) < np.ptp(alone.interval["mean"])
+    assert np.ptp(both.interval["mean"]) < np.ptp(fit.interval["mean"])
     assert min(both.agreement.p_values.values()) > 0.05
     assert not both.notes
     assert sum(both.families.values()) == pytest.approx(1.0)
@@ -136,10 +136,10 @@ def test_profiles_and_peaks_are_joined():
     assert f"{specimens} specimens cannot exclude" in text
     assert f"up to {share:.0%} of all" in text
     # The prior of the scatter decides where it is narrow, and that of the mean.
-    prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
+    prior = {"between": (0.2, 0.21), "mean": scipy.stats.norm(1.2e6, 1e3)}
     told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)
-    assert 0.2 < told.mean["between.strength"] < 0.21
-    assert told.mean["strength.mean"] == pytest.approx(1.2e6, rel=3e-3)
+    assert 0.2 < told.mean["between"] < 0.21
+    assert told.mean["mean"] == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
     refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL))
 
@@ -150,10 +150,6 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     # The median of a half-Cauchy prior below 0.9.
     median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))
     assert fit.parameters["between"] == pytest.approx(median, rel=0.1)
-    prior = {"between.strength": (0.2, 0.21), "strength.mean": scipy.stats.norm(1.2e6, 1e3)}
-    told = st.fit_field(RECORDS[:1], PROBLEM.interface, between=True, prior=prior, **QUICK)
-    assert 0.2 < told.parameters["between"] < 0.21
-    np.testing.assert_allclose(told.interval["mean"], 1.2e6, rtol=3e-3)
     with pytest.warns(st.AccuracyWarning, match="profiles come from one specimen"):
         both = st.infer(PROBLEM, fit, PEAKS, **LOCAL)
     assert len(both.notes) == 1  # nine tests say more about the scatter than three

@@ -52,7 +52,7 @@ from stiction.ensemble.batches import in_threads
 from stiction.inference.estimate import NAMES, BestFit, estimate
 from stiction.inference.marginal_fit import LEAST_SHAPE, WIDEST, Family, beta_of
 from stiction.inference.whittle import RANGES, offset
-from stiction.random.dotted_keys import with_values
+from stiction.random.dotted_keys import full_key, with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
 
@@ -136,7 +136,7 @@ def at_ends(around: Refits, confidence: float) -> list[BestFit]:
     fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
     moved = []
-    scale, tail = Scale("spectrum.correlation_length"), 0.5 * (1.0 - confidence)
+    scale, tail = Scale("correlation_length"), 0.5 * (1.0 - confidence)
     for share in (tail, 1.0 - tail):
         vector = family.vector_of(fitted.model)
         end = np.quantile(scale.less(fitted, around), share, method="weibull")
@@ -274,7 +274,7 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
     below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least
     above = most, math.inf
     limits = {
-        "spectrum.exponent": RANGES["exponent"],
+        "exponent": RANGES["exponent"],
         "anisotropy": RANGES["anisotropy"],
         "marginal.low": below,
         "marginal.high": above,
@@ -287,13 +287,19 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
     return limits
 
 
+def in_field(values: Mapping[str, float]) -> dict[str, float]:
+    """Return parameters by their keys inside a field."""
+    begin = "random.strength."
+    return {full_key(name).removeprefix(begin): value for name, value in values.items()}
+
+
 def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField]:
     """Return fields as likely as the estimate, one for each repetition (step 7)."""
     fitted = repeated.truth
     field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)
     free: dict[str, list[float]] = {}
     for name in fitted.parameters:
-        if name == "mean" or name.startswith("marginal.") or name in NAMES.values():
+        if name == "mean" or name.startswith("marginal.") or name in NAMES:
             scale = scale_of(name, [repeated])
             places = scale.less(fitted, repeated).tolist()
             means = free.get("mean", places)  # bounds are given by their distance from the mean
@@ -306,10 +312,10 @@ def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField
         within = {
             n: float(np.clip(values[n], *limits[n])) for n in values.keys() & limits.keys()
         }
-        member = with_values(field, values | within)
+        member = with_values(field, in_field(values | within))
         if isinstance(member.marginal, Beta):  # the limits keep mean and scatter
             bounds = {n: values[n] for n in values.keys() & SIDES.keys()}
-            before = with_values(field, values | within | bounds)
+            before = with_values(field, in_field(values | within | bounds))
             ends = member.marginal.low, member.marginal.high
             marginal = beta_of(before.mean, before.standard_deviation, *ends)
             member = replace(member, marginal=marginal)

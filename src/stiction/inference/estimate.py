@@ -60,9 +60,8 @@ NEGLIGIBLE_CHANGE = 1e-4
 """Change of the noise variance, as a share of the variance, that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
 """Lags in correlation lengths. The correlation of every spectrum falls to 1/e within them."""
-NAMES = {name: f"spectrum.{name}" for name in ("correlation_length", "exponent")}
-NAMES["anisotropy"] = "anisotropy"
-"""Estimated parameters of a spectrum, by their names in study files."""
+NAMES = ("correlation_length", "exponent", "anisotropy")
+"""Estimated parameters of a spectrum, by their keys."""
 LEAST_LEFT = 0.2
 """Least share of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
@@ -114,7 +113,7 @@ class BestFit:
         of_marginal = self.setting.marginal.parameters(self.marginal)
         values |= {f"marginal.{name}": value for name, value in of_marginal.items()}
         free = self.setting.spectrum.of(self.model)
-        values |= {NAMES[name]: value for name, value in free.items() if name in NAMES}
+        values |= {name: value for name, value in free.items() if name in NAMES}
         if "noise_share" in free:
             values["noise"] = self.model.noise
         return values

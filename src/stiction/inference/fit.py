@@ -42,7 +42,7 @@ from pydantic import BeforeValidator, Field
 from scipy.stats import t as student
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
+from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Progress, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
@@ -64,7 +64,6 @@ from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
     FactorGrid,
-    FactorPrior,
     Prediction,
     Profiles,
     WithFactors,
@@ -78,7 +77,6 @@ from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import with_values
 from stiction.random.fields import RandomField, RandomInterface
-from stiction.random.spectra import Share
 
 USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
@@ -98,6 +96,8 @@ FEW_SPECIMENS = 5
 """Fewest specimens whose scatter decides about rare failures."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence modulo 1 that fills [0, 1) evenly."""
+CONFIDENCE = 0.9
+"""Level of the intervals, as everywhere in the package."""
 INTERVAL_DRAWS = 4000
 """Draws of the posterior for intervals."""
 
@@ -132,12 +132,12 @@ class FieldFit(WithFactors, Result):
         Estimates in SI. ``efolding_length`` (m) is the lag at which the
         correlation of z falls to 1/e. ``mean`` and
         ``standard_deviation`` describe the field. ``marginal.*``,
-        ``spectrum.*`` and ``anisotropy`` have the same names as in
-        study files. ``noise`` is the standard deviation of the
+        ``correlation_length``, ``exponent`` and ``anisotropy`` are keys of
+        a prior and a sweep. ``noise`` is the standard deviation of the
         measurement noise, and ``between`` is the coefficient of
         variation between specimens.
     interval : dict of str to (float, float)
-        Bootstrap interval for each parameter. The interval for the
+        90 % bootstrap interval for each parameter. The interval for the
         noise may begin at zero. Intervals for bounds of the marginal
         end outside the values. An interval that ends at an end of the
         searched range has no known end: 10 ranges of the values for
@@ -145,8 +145,6 @@ class FieldFit(WithFactors, Result):
         0.65 to 16 for the exponent, 0.05 to 20 for the anisotropy. With
         `between`, the intervals for ``mean`` and ``between`` come from
         the posterior given the levels of the records.
-    confidence : float
-        Confidence level of the intervals.
     repetitions : tuple of RandomField
         Fits to records simulated from `field`, which a repeated
         measurement might have given.
@@ -171,7 +169,6 @@ class FieldFit(WithFactors, Result):
     field: RandomField
     parameters: Mapping[str, float]
     interval: Mapping[str, tuple[float, float]]
-    confidence: float
     repetitions: tuple[RandomField, ...]
     families: Mapping[str, Goodness]
     independent: float
@@ -183,7 +180,6 @@ class FieldFit(WithFactors, Result):
     _rows: Sequence[Array]
     _levels: Array
     _families: tuple[str, ...]  # of the factor between specimens; empty without a factor
-    _prior: FactorPrior
     _between: Mapping[str, Any] = dataclass_field(default_factory=dict)
 
     @property
@@ -323,7 +319,7 @@ class FieldFit(WithFactors, Result):
             within = 1.0 / np.sum(1.0 / np.maximum(within, 1e-300), axis=1, keepdims=True)
         members = tuple(of_mean(RandomInterface(strength=one), mean) for one in fields)
         families = self._families or families_of(True)
-        return Profiles(members, mean, levels, within, families, self._prior)
+        return Profiles(members, mean, levels, within, families)
 
     def _summary(self) -> Summary:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
@@ -347,7 +343,7 @@ class FieldFit(WithFactors, Result):
             lines.append(f"scores of families: {scores}{told}")
         lines.append(f"p-values: {p_values} ({len(self.repetitions)} repetitions)")
         lines += [f"! {doubt}" for doubt in self.doubts]
-        return Summary(title, rows, f"{100 * self.confidence:g} % interval", lines)
+        return Summary(title, rows, f"{100 * CONFIDENCE:g} % interval", lines)
 
 
 @checked
@@ -361,10 +357,8 @@ def fit_field(
     noise: Flag | NotNegative = True,
     anisotropy: Flag | Positive = False,
     between: Factors = False,
-    prior: Any = None,
     quantity: str = "strength",
     bootstrap: Annotated[Count, Field(ge=MIN_REPETITIONS)] = 200,
-    confidence: Share = 0.9,
     seed: Number = 0,
     progress: Progress = True,
 ) -> FieldFit:
@@ -373,65 +367,35 @@ def fit_field(
     Parameters
     ----------
     profiles : DataArray, array, or list of them
-        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced
-        points, such as `stiction.read_profile` returns. Missing values
-        (NaN, missing points, filled values) are left out. Plain arrays
-        in SI have a value at each node of `interface`, with shape
-        (nodes,) or (samples, nodes), or on a plane (nx, ny) or
-        (samples, nx, ny). Several profiles are samples of one field.
-        They may differ in length.
+        Lines over 'x' or maps over 'x' and 'y' (m) with equally spaced points, from
+        `read_profile`. Missing values (NaN) are left out. Arrays in SI have a value at each
+        node of `interface`, as (nodes,), (samples, nodes), (nx, ny) or (samples, nx, ny).
+        Several profiles are samples of one field, and may differ in length.
     interface : Interface, optional
-        Needed for arrays without coordinates. A warning is issued if it
-        is too short, or its nodes too coarse, for the fitted field.
+        Needed for arrays without coordinates. A warning says if it is too short or too coarse.
     marginal : str, dict or sequence of them
-        Family: 'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any
-        continuous distribution of `scipy.stats`. If several families
-        are given, the best is chosen, and `families` in the result
-        compares them. A table fixes parameters: ``{"type": "beta",
-        "low": 0, "high": 2e6}``. By default both bounds of 'beta' are
-        estimated, and other families have the lower bound 0.
+        'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous distribution of
+        `scipy.stats`. The best of several is chosen (`families`). A table fixes parameters:
+        ``{"type": "beta", "low": 0, "high": 2e6}``. Only 'beta' has free bounds by default.
     spectrum : str or dict
-        'power_law', 'squared_exponential' or 'exponential'. A
-        table fixes parameters, such as ``{"type": "power_law",
-        "exponent": 4.0}``. If the table has ``"power_kept"``, the spectrum of the record is
-        truncated there. Otherwise only the spectrum of the
-        resulting field is truncated, by default values.
+        'power_law', 'squared_exponential' or 'exponential', or a table that fixes parameters:
+        ``{"type": "power_law", "exponent": 4.0}``. With ``"power_kept"`` the
+        spectrum of the record is also truncated there.
     detrend : int
-        Degree of the removed polynomial trend, 0 to 3. The mean is
-        kept. Removing mean and trend reduces the scatter of the values.
-        The average reduction is added to the estimate, except for
-        families of `scipy.stats` with a fixed loc or scale.
+        Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that the
+        trend takes on average is added to the estimate.
     noise : bool or float
-        Whether to estimate white, normal measurement noise together
-        with the field. If the standard deviation (SI) of the noise is
-        known, pass it.
+        Whether to estimate white, normal measurement noise, or its known standard deviation.
     anisotropy : bool or float
-        For maps, the correlation length along y divided by the length
-        along x. False means 1, and True estimates the ratio.
+        For maps, the correlation length along y over that along x. True estimates it.
     between : bool, str or sequence of str
-        Whether records come from different specimens, each of
-        which has a factor. The mean of the factor is 1, and its
-        coefficient of variation ``between`` is estimated. The
-        family of the factor is 'lognormal', 'normal' (above
-        zero) or 'weibull'. Several families, or all families if
-        True, are averaged. With fewer than five specimens, a
-        warning states that they determine the scatter poorly.
-    prior : mapping, optional
-        Priors for the mean, ``"strength.mean"``, and for the
-        coefficient of variation, ``"between.strength"``, as
-        in `infer`. By default the prior for the mean is flat
-        in its logarithm, and the prior for the coefficient
-        of variation is half-Cauchy with scale 0.1.
+        Whether records come from different specimens, each of which has a factor with mean 1
+        and the coefficient of variation ``between``. Names choose families of the factor
+        ('lognormal', 'normal', 'weibull'). True averages all of them.
     quantity : str
-        Measured quantity, which sets the unit: 'strength',
-        'normal_pressure', 'friction_coefficient', ... A fitted field of
-        friction coefficients has ``quantity="friction_coefficient"``.
+        Measured quantity: 'strength', 'normal_pressure', 'friction_coefficient', ...
     bootstrap : int
-        Number of repetitions, at least 20, for each of three fields:
-        the fitted field, and two fields whose correlation lengths are
-        the ends of a first interval.
-    confidence : float
-        Confidence level of the intervals.
+        Number of repetitions, at least 20, for each of three correlation lengths.
     seed : int
         Seed for the repetitions.
     progress : bool or callable
@@ -446,36 +410,19 @@ def fit_field(
     Raises
     ------
     InputError
-        If units are unknown, points repeat or are not equally spaced,
-        neighbouring points are not correlated, records are constant or
-        short, or values lie outside the bounds of the marginal.
+        If units are unknown, points are not equally spaced, neighbouring points are not
+        correlated, records are constant or short, or values lie outside the bounds.
 
     Warns
     -----
     AccuracyWarning
-        If there are outliers, dropouts or repeated profiles, or if a
-        family is left out because it cannot be fitted to records
-        simulated from it. Also for each of the `doubts`: records hold
-        fewer than ten correlation lengths, a p-value is below 1 % (for
-        ``level``, this suggests different specimens without `between`),
-        the noise hides the cut-off of the spectrum, a parameter lies at
-        the end of the searched range, or there are fewer than five
-        specimens for the scatter between specimens.
+        For outliers, dropouts and repeated profiles, families that are left out, and each of
+        the `doubts`.
 
     Notes
     -----
-    The marginal maximises the likelihood of values with noise. The spectrum maximises a
-    Whittle likelihood. Its expectation is exact for the window, and includes taper, gaps,
-    detrending, aliasing, and a given truncation of the spectrum (Sykulski et al., 2019;
-    Guillaumin et al., 2022). Correlations of values follow from correlations of the
-    Gaussian field z by Hermite expansion (Grigoriu, 1995).
-
-    Families are compared with Akaike's criterion. N values with
-    correlations rho_ij count as N^2/sum rho_ij^3 independent values.
-
-    Intervals come from a studentised bootstrap (Davison and Hinkley,
-    1997, section 5.2). Their upper and lower ends come from fields with
-    longer and shorter correlation lengths (Carpenter, 1999).
+    A composite likelihood gives the marginal, a Whittle likelihood the spectrum, and a
+    studentised bootstrap the intervals (`stiction.inference.fit` names the sources).
 
     Examples
     --------
@@ -484,7 +431,7 @@ def fit_field(
     >>> interface = st.Interface(length=0.1, nodes=1000)
     >>> fit = st.fit_field(truth.sample(interface, seed=2), interface, marginal="lognormal",
     ...                    spectrum="exponential", noise=0.0, bootstrap=40)
-    >>> low, high = fit.interval["spectrum.correlation_length"]
+    >>> low, high = fit.interval["correlation_length"]
     >>> bool(low < 1e-3 < high)
     True
     """
@@ -505,8 +452,6 @@ def fit_field(
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = windowed(records, detrend)
     levels = np.array([row.mean() for row in rows])
-    with prefixed("fit_field"):
-        factor_prior = FactorPrior.of(prior)
     refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:
@@ -520,7 +465,7 @@ def fit_field(
         # 3.
         try:
             repeated, further = bootstrapped(
-                estimates[0], bootstrap, confidence, seed, progress,
+                estimates[0], bootstrap, CONFIDENCE, seed, progress,
                 list(zip(estimates[1:], counts, strict=False)),
             )  # fmt: skip
             break
@@ -535,9 +480,8 @@ def fit_field(
     field = estimates[0].field(quantity)
     object.__setattr__(field, "specimens_of_fit", len(levels) if between else 0)
     fit = FieldFit(
-        **_judged(repeated, rows, levels, confidence, bootstrap, between, factor_prior),
+        **_judged(repeated, rows, levels, bootstrap, between),
         field=field,
-        confidence=confidence,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
         families=families,
         independent=independent,
@@ -547,7 +491,6 @@ def fit_field(
         _rows=estimates[0].as_of_one(rows),
         _levels=levels,
         _families=between,
-        _prior=factor_prior,
     )
     for doubt in fit.doubts:
         warn_accuracy(doubt)
@@ -561,15 +504,13 @@ def _judged(
     repeated: Sequence[Refits],
     rows: Sequence[Array],
     levels: Array,
-    confidence: float,
     count: int,
     families: tuple[str, ...],
-    prior: FactorPrior,
 ) -> dict[str, Any]:
     """Return parameters, intervals, p-values and doubts. Each field has `count` repetitions."""
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
-    ends = intervals(repeated, confidence, np.concatenate(fitted.as_of_one(rows)))
+    ends = intervals(repeated, CONFIDENCE, np.concatenate(fitted.as_of_one(rows)))
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, fitted, fits) for name, of in tests.items()}
     if levels.size > 1 and not fitted.setting.between:
@@ -583,9 +524,9 @@ def _judged(
         # The levels hold it.
         interfaces = (RandomInterface(strength=fitted.field("strength")),)
         mean, within = parameters["mean"], fitted.within[None]
-        grid, _ = grid_of_profiles(Profiles(interfaces, mean, levels, within, families, prior))
+        grid, _ = grid_of_profiles(Profiles(interfaces, mean, levels, within, families))
         draws = grid.described(grid.draws(INTERVAL_DRAWS, np.random.default_rng(0)))
-        tails = 0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence
+        tails = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
         for name in {"mean", "marginal.mean"} & parameters.keys():
             ends[name] = tuple(np.quantile(draws[MEAN_KEY], tails).tolist())
         parameters["between"] = float(np.median(draws[SCATTER_KEY]))

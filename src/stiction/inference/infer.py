@@ -129,60 +129,40 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from the peak stresses of repeated tests.
 
-    There are two uses. With a fit, or with interfaces and no `prior` of
-    other parameters, the mean strength and its scatter between
-    specimens are inferred. With a `prior` of other parameters, these
-    parameters are inferred.
+    With a fit, or without a `prior` of other parameters, the mean strength and its scatter
+    between specimens are inferred. Otherwise the parameters in `prior` are.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, or a list of interfaces
-        For mean and scatter: a fit, whose records are combined with the
-        peaks, or equally likely interfaces, of which only the fields
-        within a specimen are used. For other parameters: one interface,
-        in which the parameters in `prior` are replaced.
+        For mean and scatter: a fit, whose records are combined with the peaks, or equally likely
+        fields within a specimen. For other parameters: one interface.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress or force at which each specimen slid, in `unit`. For
-        specimens of several lengths, map each length (m) to its peaks, ``{0.1:
-        [...], 0.2: [...]}``. The node spacing is the spacing of the problem. The
-        result of `read_peaks` is also accepted.
+        Mean shear stress or force at which each specimen slid, in `unit`, or the result of
+        `read_peaks`. For several lengths (m) of specimens: ``{0.1: [...], 0.2: [...]}``.
     prior : mapping, optional
-        For mean and scatter: ``"strength.mean"``, by default flat in
-        its logarithm, and ``"between.strength"``, the coefficient of
-        variation between specimens, by default half-Cauchy with scale
-        0.1. For other parameters, independent priors: a frozen
-        continuous `scipy.stats` distribution, a range ``(low, high)``,
-        or ``{"low": ..., "high": ..., "spacing": "log"}``. The keys are
-        the same as in a sweep, such as ``"correlation_length"`` or
-        ``"marginal.low"`` for the strength, and
-        ``"residual_strength.marginal.high"`` or
-        ``"problem.friction.weakening_rate"``.
+        For mean and scatter: ``"mean"``, by default flat in its logarithm, and ``"between"``,
+        the coefficient of variation between specimens, by default half-Cauchy with scale 0.1.
+        Other parameters by the keys of a sweep, such as ``"correlation_length"``,
+        ``"marginal.low"`` or ``"problem.friction.weakening_rate"``. A prior is a frozen
+        `scipy.stats` distribution, a range, or ``{"low": ..., "high": ..., "spacing": "log"}``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`.
-        They have equal prior weights. By default the families of the
-        fit, or else all families.
+        Families of the factor between specimens, as in `fit_field`. By default those of the fit,
+        or all.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. If it is expensive, the local
-        criterion first finds the relevant part of the prior. This part
-        grows until it contains the posterior.
+        Method that computes the onset.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`. If `Peaks`
-        are given, the unit is Pa or N, or 1 for friction coefficients.
+        Standard deviation of the error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
-        Unit of peaks and load-cell error. A unit of force needs the
-        ``thickness`` of a specimen, the ``width`` of a line, or a
-        plane. The unit "1" stands for friction coefficients, which need
-        ``Load(normal_pressure=...)``.
+        Unit of peaks and load-cell error. A force needs a known area, and "1" (friction
+        coefficients) a normal pressure.
     samples : int, optional
-        Number of simulated specimens at each point, by default 2000
-        with the local criterion and 500 with equilibrium. For mean and
-        scatter, number of simulated specimens for each field, by
-        default 200 with the local criterion and 100 with other methods.
+        Simulated specimens at each point (2000 by the local criterion, else 500), or for each
+        field within a specimen (200, else 100).
     seed : int
-        Not negative. All points share the samples, so that the
-        likelihood is smooth.
+        Not negative.
     workers, progress
         As in `monte_carlo`.
 
@@ -195,39 +175,21 @@ def infer(
     Raises
     ------
     InputError
-        If any argument is invalid, or if no parameters in the prior can
-        produce the peaks. In the latter case the message names the
-        bound that must move.
+        If any argument is invalid, or no parameters in the prior can produce the peaks.
 
     Warns
     -----
     AccuracyWarning
-        If the prior determines the scatter between specimens, or the
-        profiles come from one specimen. If the posterior piles up at an
-        end of the prior, the method is inaccurate there, or few samples
-        are simulated for the number of peaks. If profiles and peaks
-        contradict each other: the message then gives the p-value from
-        `stiction.statistics.agreement`.
+        For each of the `notes`: the prior determines the result, the method or the number of
+        samples is inaccurate, or profiles and peaks contradict each other.
     UserWarning
-        Before a simulation that takes more than a minute. The message
-        gives the time and faster alternatives.
+        Before a simulation that takes more than a minute.
 
     Notes
     -----
-    The likelihood is a kernel density of simulated onsets, including the error of the
-    load cell (`stiction.inference.likelihood`). Parameters that only shift and stretch
-    the strength need no simulation (`stiction.inference.scaling`). At most four other
-    parameters are simulated on a grid, with the same draws at all points, and
-    interpolated. The posterior is summed on a grid. For more parameters, give
-    `log_likelihood` and `prior_transform` of the result to emcee or dynesty. After an
-    interruption with Ctrl-C, an identical call in the same session continues with the
-    finished onsets.
-
-    Mean and scatter between specimens are integrated on a grid, with sixty fields
-    within a specimen from the repetitions of the fit
-    (`stiction.inference.specimens`). The families of the factor between specimens
-    are averaged. `families` of the result has their probabilities, and
-    `agreement` compares the peaks with the profiles alone.
+    The posterior is summed on a grid, with a kernel density of simulated onsets as likelihood
+    (`stiction.inference.infer` has the steps). At most four parameters are simulated, besides
+    those that only shift and stretch the strength. After Ctrl-C an identical call continues.
 
     Examples
     --------
@@ -250,7 +212,7 @@ def infer(
     >>> both = st.infer(
     ...     problem, fit, peaks, unit="MPa", method=st.LocalCriterion(), samples=100
     ... )
-    >>> low, high = both.interval["strength.mean"]
+    >>> low, high = both.interval["mean"]
     >>> 0.9e6 < low < high < 1.1e6
     True
     """

@@ -47,7 +47,7 @@ from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, unknown_name
+from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.ensemble.batches import in_threads, usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import scales_with_strength
@@ -66,11 +66,11 @@ from stiction.inference.likelihood import (
 from stiction.inference.marginal_fit import multiplied
 from stiction.inference.peaks import Peaks
 from stiction.problem.problem import Problem
-from stiction.random.dotted_keys import distributions_of
+from stiction.random.dotted_keys import distribution_of
 from stiction.random.fields import RandomInterface
 from stiction.random.marginals import FACTOR_FAMILIES
 
-MEAN_KEY, SCATTER_KEY = "strength.mean", "between.strength"
+MEAN_KEY, SCATTER_KEY = "mean", "between"
 """Keys of the two parameters in a prior and among the draws."""
 PRIOR_SCALE = 0.1
 """Scale of the half-Cauchy prior of s."""
@@ -129,9 +129,11 @@ class FactorPrior(NamedTuple):
     @classmethod
     def of(cls, given: Any) -> Self:
         """Return the prior, given a mapping from `MEAN_KEY` and `SCATTER_KEY` to distributions."""
-        priors, keys = distributions_of(given or {}), (MEAN_KEY, SCATTER_KEY)
-        if unknown := [key for key in priors if key not in keys]:
+        given, keys = given or {}, (MEAN_KEY, SCATTER_KEY)
+        if unknown := [str(key) for key in given if key not in keys]:
             raise InputError([unknown_name("prior", key, keys) for key in unknown])
+        with prefixed("prior"):
+            priors = {key: distribution_of(key, value) for key, value in given.items()}
         prior = cls(priors.get(SCATTER_KEY, cls().scatter), priors.get(MEAN_KEY))
         low, high = prior.scatter.cdf([0.0, MOST_CV])
         if not low < high:
@@ -287,8 +289,8 @@ class FactorGrid:
         return {
             MEAN_KEY: self.profiles.reference * scale,
             SCATTER_KEY: drawn[:, 2],
-            "strength.standard_deviation": deviations[field] * scale,
-            "strength.efolding_length": lengths[field],
+            "standard_deviation": deviations[field] * scale,
+            "efolding_length": lengths[field],
         }
 
 

@@ -15,6 +15,8 @@ from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
 INTERFACE_KEYS = (*PROFILES, "correlation", "between")
 FIELD_KEYS = ("marginal", "spectrum", "anisotropy", "conditions")
 """Keys of a random interface, and of a field."""
+SHORT_KEYS = (*INTERFACE_KEYS, *FIELD_KEYS, "correlation_length", "exponent")
+"""Beginnings of keys that may omit ``random`` or ``random.strength``."""
 MARGINAL_KEYS = ("mean", "cv", "low", "high", "scale", "alpha", "beta")
 """Parameters of a marginal, whose keys begin with its name."""
 
@@ -80,6 +82,16 @@ def full_key(key: str) -> str:
     if first in MARGINAL_KEYS:
         raise InputError(f"unknown {key!r}; did you mean 'marginal.{key}'?")
     return f"random.strength.spectrum.{key}"
+
+
+def short_key(key: str) -> str:
+    """Return the one key under which a parameter is printed. `full_key` is its inverse."""
+    short = full_key(key).removeprefix("random.")
+    for begin in ("strength.spectrum.", "strength."):
+        rest = short.removeprefix(begin)
+        if rest != short and full_key(rest) == full_key(key):
+            return rest
+    return short
 
 
 def distributions_of(given: Mapping[str, Any]) -> dict[str, Any]:

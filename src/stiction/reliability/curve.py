@@ -81,7 +81,7 @@ def failure_curve(
     random: AnyRandom,
     *,
     method: MethodObject,
-    smallest: Probability = 1e-9,
+    smallest: Probability = 1e-6,
     target_cv: TargetCv = CURVE_CV,
     seed: Number = 0,
     max_evaluations: Budget | None = None,

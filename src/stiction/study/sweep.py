@@ -15,6 +15,7 @@ from stiction.base.errors import InputError, prefixed, unknown_name
 from stiction.base.model import describe, to_plain
 from stiction.base.variables import UNITS, Variable, unit_of_key
 from stiction.ensemble.dataset import Coordinates, GridAxes
+from stiction.random.dotted_keys import SHORT_KEYS, full_key
 
 SWEPT = "problem", "random", "method", "seed"
 """Keys of a study that a sweep, or the keys below them, may change."""
@@ -81,7 +82,13 @@ def read_axes(given: Any) -> list[Axis]:
     axes: list[Axis] = []
     for number, table in enumerate(given):
         with prefixed(f"[{number}]"):
-            axes.append(_axis(table))
+            # Keys of the strength may omit their beginning, as in a prior.
+            axes.append(
+                {
+                    full_key(key) if key.split(".")[0] in SHORT_KEYS else key: values
+                    for key, values in _axis(table).items()
+                }
+            )
     keys = [key for axis in axes for key in axis]
     problems: dict[str, None] = {}
     for key in keys:

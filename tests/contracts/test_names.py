@@ -1,0 +1,58 @@
+"""One key for each parameter: printed by fits and posteriors, accepted by priors and sweeps."""
+
+import pytest
+from joint import FIELD, PROBLEM
+from setups import LOCAL
+
+import stiction as st
+from stiction.random.dotted_keys import full_key, short_key
+
+KEYS = {  # the printed key, and all keys that are accepted
+    "correlation_length": (
+        "spectrum.correlation_length", "strength.spectrum.correlation_length",
+        "random.strength.spectrum.correlation_length",
+    ),
+    "exponent": ("spectrum.exponent", "random.strength.spectrum.exponent"),
+    "marginal.cv": ("strength.marginal.cv", "random.strength.marginal.cv"),
+    "anisotropy": ("strength.anisotropy",),
+    "residual_strength.spectrum.exponent": ("random.residual_strength.spectrum.exponent",),
+    "problem.friction.residual_ratio": (),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_every_way_to_name_a_parameter_is_printed_as_one_key(key):
+    for name in (key, *KEYS[key]):
+        assert short_key(name) == key
+        assert full_key(name) == full_key(key)
+
+
+@pytest.mark.parametrize("key", ["correlation_length", "marginal.cv"])
+def test_a_key_is_accepted_by_every_call(key):
+    ends = {"correlation_length": (3e-3, 5e-3), "marginal.cv": (0.1, 0.2)}[key]
+    peaks = {"peaks": [0.95e6, 1e6, 1.05e6], "progress": False, "samples": 100}
+    for name in (key, *KEYS[key]):
+        posterior = st.infer(PROBLEM, FIELD, prior={name: ends}, method=LOCAL, **peaks)
+        assert posterior.names == (key,)
+        study = st.Study(
+            problem=PROBLEM, random=FIELD, method=LOCAL, samples=1, sweep=[{name: list(ends)}]
+        )
+        members = [point.random.members[0].strength for point in study.experiments]
+        part, _, attribute = full_key(key).removeprefix("random.strength.").rpartition(".")
+        assert [getattr(getattr(one, part), attribute) for one in members] == list(ends)
+
+
+def test_a_fit_and_a_posterior_print_the_same_keys():
+    records = [FIELD.sample(PROBLEM.interface, seed=seed)[0] for seed in range(3)]
+    fit = st.fit_field(
+        records, PROBLEM.interface, marginal="gamma", noise=False, bootstrap=20, between=True,
+        quantity="friction_coefficient", progress=False,
+    )  # fmt: skip
+    posterior = st.infer(
+        PROBLEM, fit, [0.95e6, 1e6, 1.05e6], method=LOCAL, samples=100, progress=False
+    )
+    assert {*posterior.names} <= {*fit.parameters}
+    assert "correlation_length" in fit.parameters
+    for name in posterior.names:
+        low, high = posterior.interval[name]
+        assert low <= posterior.mean[name] <= high
