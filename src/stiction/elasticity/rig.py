@@ -37,7 +37,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from stiction.base.arrays import Array, one_blas_thread
-from stiction.elasticity.columns import Far, Interval, Material, block, eliminated
+from stiction.elasticity.columns import Far, Interval, block, eliminated
+from stiction.elasticity.columns import Material as Material
 
 
 class Body(NamedTuple):

@@ -57,9 +57,8 @@ def specimen(
     (2,) or (3,) array of matplotlib.axes.Axes
         The specimen, and below it the profiles along the interface. For
         blocks, the profiles are the shear and the pressure of the drive.
-        A slider is drawn to scale. If its strength (friction
-        coefficients) is given, its shear, pressure and slip at the
-        first instability are drawn, otherwise the stresses of the pressing.
+        A slider is drawn to scale, with its shear, pressure and slip at
+        the first instability. It needs a strength (friction coefficients).
 
     Examples
     --------
@@ -75,9 +74,12 @@ def specimen(
     """
     check("problem", problem, Problem)
     if isinstance(problem.specimen, Slider):
+        if strength is None:
+            raise InputError(
+                "strength: give it, because the pressure of a slider depends on it"
+            )
         number = int(sample)
-        given = None if strength is None else problem.sample(strength)
-        return draw_slider(problem, given and given.part(slice(number, number + 1)))
+        return draw_slider(problem, problem.sample(strength).part(slice(number, number + 1)))
     blocks, interface = problem.blocks, problem.interface
     rows = None if strength is None else strength_of(problem, strength)
     if result is not None:

@@ -325,16 +325,12 @@ class Slider:
 
     def rig(self, length: float, nodes: int, solid: Solid) -> Rig:
         """Return the stiffness and the loads of the rig, per unit depth."""
-        from stiction.elasticity.columns import Material  # scipy
-        from stiction.elasticity.rig import Body, contact_rig
+        from stiction.elasticity.blocks import Pushes  # scipy takes half a second
+        from stiction.elasticity.rig import Body, Material, contact_rig
 
-        base, push = self.base, None
-        if isinstance(self.drive, Pusher):
-            half = 0.5 * self.drive.width
-            push = (
-                max(self.drive.height - half, 0.0),
-                min(self.drive.height + half, self.height),
-            )
+        base, drive, push = self.base, self.drive, None
+        if isinstance(drive, Pusher):
+            push = Pushes((), drive.height, drive.width).edges(self.height)
         slider, below = (
             Body(height, Material(of.shear_modulus, of.kolosov))
             for height, of in ((self.height, solid), (base.height, base.solid or solid))
@@ -349,12 +345,12 @@ class Slider:
 
         a = sum (kappa + 1)/(4 G), and beta is Dundurs' second constant.
         """
-        base = self.base.solid or solid
-        a = (solid.kolosov + 1.0) / (4.0 * solid.shear_modulus)
-        a += (base.kolosov + 1.0) / (4.0 * base.shear_modulus)
-        b = (solid.kolosov - 1.0) / (4.0 * solid.shear_modulus)
-        b -= (base.kolosov - 1.0) / (4.0 * base.shear_modulus)
-        return 2.0 * a / (a**2 - b**2)
+        bodies = solid, self.base.solid or solid
+        (a, b), (a_base, b_base) = (
+            np.add(of.kolosov, [1.0, -1.0]) / (4.0 * of.shear_modulus) for of in bodies
+        )
+        a, b = a + a_base, b - b_base
+        return float(2.0 * a / (a**2 - b**2))
 
     def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
         """Return why a slider does not fit an interface (m) and a material, or an empty list."""
