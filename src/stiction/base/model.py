@@ -13,6 +13,7 @@ import operator
 import os
 import types
 import typing
+from abc import ABCMeta
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -390,7 +391,7 @@ INTERNAL_MEMBERS = (
 """Members that a method has for other parts of the package."""
 
 
-class _Listing(type):
+class _Listing(ABCMeta):
     """Type of `Listed`."""
 
     def __dir__(cls) -> list[str]:

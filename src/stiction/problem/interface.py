@@ -88,7 +88,7 @@ _pair = BeforeValidator(_two_places)
 
 
 @model(kw_only=True)
-class Ellipse:
+class Ellipse(Listed):
     """Ellipse on a plane, with axes along x and y. The interface can break inside the ellipse.
 
     Parameters

@@ -6,11 +6,11 @@ import numpy as np
 from pydantic import model_validator
 
 from stiction.base.errors import InputError
-from stiction.base.model import OptionalProfile, Positive, Profile, model
+from stiction.base.model import Listed, OptionalProfile, Positive, Profile, model
 
 
 @model
-class Load:
+class Load(Listed):
     """Shear stress tau_i(x) + tau_0 p(x) on an interface without slip. The load factor tau_0 rises.
 
     Parameters

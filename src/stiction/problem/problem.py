@@ -6,14 +6,14 @@ import dataclasses
 import math
 from collections.abc import Collection
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import model_validator
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Mode, describe, is_unplaced, model
+from stiction.base.model import Listed, Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import Friction, contradictions
@@ -47,7 +47,7 @@ NO_AREA = (
 
 
 @model
-class Problem:
+class Problem(Listed):
     """The deterministic part of a model: solid, interface, friction law and load.
 
     Parameters
@@ -92,6 +92,11 @@ class Problem:
     load: Load = Load()
     mode: Mode = "II"
     specimen: Specimen | None = None
+    _internal: ClassVar[tuple[str, ...]] = (
+        "blocks", "effective_modulus", "given_pressure", "half_spaces", "has_machine",
+        "load_profile", "nucleation_lengths", "released_stress", "relief",
+        "relief_of_nodes", "rig", "whole_area",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_core import ArgsKwargs
 
 from stiction.base.errors import InputError
-from stiction.base.model import Mode, Positive, Real, check, is_finite, model
+from stiction.base.model import Listed, Mode, Positive, Real, check, is_finite, model
 from stiction.base.units import Doubt, doubt_units
 
 POSSIBLE_SPEED = (0.3, 2e4)
@@ -21,7 +21,7 @@ wave speed, m/s. Lead has 700 m/s, and moduli in MPa make 3 m/s of rock."""
 
 
 @model
-class Solid:
+class Solid(Listed):
     """The material of two identical linear-elastic half-spaces.
 
     Parameters

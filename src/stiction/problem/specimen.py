@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf
-from stiction.base.model import Mode, NotNegative, Positive, Real, as_number, model
+from stiction.base.model import Listed, Mode, NotNegative, Positive, Real, as_number, model
 from stiction.problem.solid import Solid
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ defined. It counts how much the slip of a cell loads another cell forwards."""
 
 
 @model(kw_only=True)
-class Platen:
+class Platen(Listed):
     """A rigid platen that is glued to the top face and moves along the interface only.
 
     Parameters
@@ -64,7 +64,7 @@ class Platen:
 
 
 @model(kw_only=True)
-class Pusher:
+class Pusher(Listed):
     """A uniform traction on a side of a slider, or on one or both sides of each of two blocks.
 
     The top faces of pushed blocks lie on rollers.
@@ -97,7 +97,7 @@ class Pusher:
 
 
 @model(kw_only=True)
-class TopShear:
+class TopShear(Listed):
     """A uniform shear traction on the top face of a slider.
 
     Parameters
@@ -142,7 +142,7 @@ def _beyond_side(drive: Any, height: float) -> list[str]:
 
 
 @model(kw_only=True)
-class Blocks:
+class Blocks(Listed):
     """Two equal blocks on top of each other, with free ends, driven in opposite directions.
 
     Parameters
@@ -214,7 +214,7 @@ class Blocks:
 
 
 @model(kw_only=True)
-class Base:
+class Base(Listed):
     """The body on which a slider lies. It is at least as long as the slider.
 
     Parameters
@@ -244,7 +244,7 @@ class Base:
 
 
 @model(kw_only=True)
-class Slider:
+class Slider(Listed):
     """A slider on a base, pressed from above and pushed until it slides.
 
     The push changes the pressure on the interface, and the interface may

@@ -35,6 +35,7 @@ from stiction.base.errors import InputError, unknown_name, warn_accuracy
 from stiction.base.model import (
     Converted,
     Flag,
+    Listed,
     Number,
     Positive,
     Real,
@@ -63,7 +64,7 @@ MAX_CORRELATION_ERROR = 0.01
 
 
 @model
-class RandomField:
+class RandomField(Listed):
     """Stationary, periodic, non-Gaussian random field F^-1(Phi(z(x))).
 
     Parameters
@@ -113,6 +114,7 @@ class RandomField:
     anisotropy: Positive | None = None
     quantity: Literal["friction_coefficient"] | None = None
     conditions: Conditions | None = None
+    _internal: ClassVar[tuple[str, ...]] = ("modes", "specimens_of_fit", "warn_if_inaccurate")
     specimens_of_fit: ClassVar[int | None] = None
     """Set for `FieldFit.field`: `specimens` of its fit, so that a call can ask for the fit."""
 
@@ -304,7 +306,7 @@ Correlation: TypeAlias = Converted[
 
 
 @model(kw_only=True)
-class RandomInterface:
+class RandomInterface(Listed):
     """Random properties of an interface: the strength, and any others that vary.
 
     Parameters
@@ -363,6 +365,10 @@ class RandomInterface:
     normal_pressure: RandomField | None = None
     correlation: Correlation = None  # type: ignore[assignment]  # converted
     between: AnyMarginals = None  # type: ignore[assignment]
+    _internal: ClassVar[tuple[str, ...]] = (
+        "dimension", "draws", "from_draws", "linked", "matrix", "names", "properties",
+        "varying", "warn_if_inaccurate",
+    )  # fmt: skip
 
     @field_validator(*NAMES, mode="before")
     @classmethod

@@ -6,7 +6,7 @@ distribution of `scipy.stats` by its name.
 """
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ from scipy.special import gammaln
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_user
 from stiction.base.kinds import Kinds, OneOf, from_table, register
-from stiction.base.model import Converted, Positive, Real, check, model
+from stiction.base.model import Converted, Listed, Positive, Real, check, model
 
 Bound: TypeAlias = Annotated[Real, Field(gt=-1e18, lt=1e18)]
 
 
-class Marginal(ABC):
+class Marginal(Listed):
     """Base class of marginals.
 
     A class may also define ``of_normal(z)``, which returns
@@ -38,6 +38,7 @@ class Marginal(ABC):
     """
 
     family: ClassVar[str] = "marginals"
+    _internal: ClassVar[tuple[str, ...]] = ("check_moments", "family", "of_normal")
     type: str
     _scipy_family: ClassVar[Any] = None
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
@@ -40,7 +40,7 @@ from scipy.special import betainc, betaincinv, gammainc, gammainccinv, gammaln, 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, from_table, register
-from stiction.base.model import Positive, Real, describe, model
+from stiction.base.model import Listed, Positive, Real, describe, model
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
@@ -49,10 +49,14 @@ Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
 INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # requested and accepted errors of integrals
 
 
-class SpectralDensity(ABC):
+class SpectralDensity(Listed):
     """Base class for spectra on infinite lines (`dimensions` = 1) and planes (2)."""
 
     family: ClassVar[str] = "spectra"
+    _internal: ClassVar[tuple[str, ...]] = (
+        "cutoff", "default_power", "family", "power_within", "quantile", "scale",
+        "untruncated_correlation",
+    )  # fmt: skip
 
     @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 import tomli_w
@@ -28,6 +28,7 @@ from stiction.base.model import (
     Count,
     FilePath,
     Flag,
+    Listed,
     Names,
     Number,
     Positive,
@@ -186,7 +187,7 @@ class Question:
 
 
 @model(kw_only=True)
-class _Parts:
+class _Parts(Listed):
     """The parts of a study at a point of a sweep. Each part is valid by itself."""
 
     problem: Problem
@@ -261,6 +262,7 @@ class Study(_Parts):
     reliability: Question | None = None
     peaks: PeaksOfStudy | None = None
     title: Text = ""
+    _internal: ClassVar[tuple[str, ...]] = ("attributes", "axes", "experiments", "points")
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import checked, model
+from stiction.base.model import INTERNAL_MEMBERS, Listed, checked, model
 from stiction.base.variables import Variable
 from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
@@ -59,7 +59,7 @@ OF_SPECIMENS = {
 
 
 @model(kw_only=True)
-class LocalCriterion:
+class LocalCriterion(Listed):
     """Onset at the minimum of the nucleation stress, with each patch in isolation.
 
     If no node reaches its residual strength (or zero) before the onset,
@@ -116,6 +116,7 @@ class LocalCriterion:
     """
 
     type: Literal["local_criterion"] = "local_criterion"
+    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
     label = "local criterion"
     exact_method: ClassVar[str] = "equilibrium"
     scaling: ClassVar[str] = "affine"

@@ -31,6 +31,7 @@ from stiction.base.model import (
     Count,
     FilePath,
     HeldPath,
+    Listed,
     Names,
     Real,
     Text,
@@ -128,7 +129,7 @@ Folder: TypeAlias = Converted[HeldPath | None, FilePath | None]
 
 
 @model
-class Save:
+class Save(Listed):
     """Results that `simulate_rupture` keeps, and the folder in which it stores them.
 
     Parameters

@@ -7,7 +7,7 @@ allow it in study files.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -19,6 +19,7 @@ from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, register
 from stiction.base.model import (
     Count,
+    Listed,
     OptionalProfile,
     Profile,
     Real,
@@ -48,7 +49,7 @@ _VALID = {
 
 
 @model
-class FrictionLaw(ABC):
+class FrictionLaw(Listed):
     """Strength tau_f(d) = tau_r + (tau_p - tau_r) f(d/d_c), in which f falls from 1 to 0.
 
     A law consists of the function f in its `parameters`. Its integral
@@ -63,6 +64,10 @@ class FrictionLaw(ABC):
     """
 
     family: ClassVar[str] = "laws"
+    _internal: ClassVar[tuple[str, ...]] = (
+        "critical_slip_of", "dissipated", "family", "linear", "plateau", "reach",
+        "residual", "scale", "uniform_weakening_rate", "weakening_rate_of",
+    )  # fmt: skip
     weakening_rate: OptionalProfile = None  # type: ignore[assignment]  # converted
     critical_slip: OptionalProfile = None  # type: ignore[assignment]
     residual_strength: Profile = 0.0  # type: ignore[assignment]
