@@ -246,7 +246,7 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     slip that an event adds. Length or area, mean slip and the area stress drop refer
     to the patch around the largest slip.
 
-    The event of a `Rupture` ends when shear waves have crossed half of the
+    The event of a `Rupture` ends when shear waves have crossed the
     part that can break since the last fast slip, so that later creep,
     which the load drives, is left out. `event_settled` is 0 if the run
     ended before. An instability in which no node reaches dynamic slip

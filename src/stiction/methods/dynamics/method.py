@@ -48,7 +48,7 @@ SLIP_STEP = 0.02  # largest slip of a weakening node in an implicit step, in uni
 LOAD_STEP = 1e-3  # largest rise of the load in an implicit step, in units of the stress scale
 _EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
-_SETTLING_CROSSINGS = 0.5  # times shear waves cross the part that can break after fast slip
+_SETTLING_CROSSINGS = 1.0  # times shear waves cross the part that can break after fast slip
 
 _UNKNOWN_AT_ONSET = (
     "kinetic_stress", "stress_drop", "seismic_moment", "radiated_energy", "fracture_energy",
