@@ -206,12 +206,21 @@ class Curves(Result):
         return self.tests[number]
 
     def __str__(self) -> str:
-        different = {reading._replace(source="", values=0): reading for reading in self.read}
-        return "\n".join(map(str, (*self.tests, *different.values())))
+        return "\n".join(map(str, (*self.tests, *self._readings())))
+
+    def _readings(self) -> list[str]:
+        """Return what was read, once for files with the same columns."""
+        alike: dict[Any, list[Reading]] = {}
+        for reading in self.read:
+            alike.setdefault(reading._replace(source="", values=0), []).append(reading)
+        return [
+            f"{files[0]}" + f" (and {len(files) - 1} files alike)" * (len(files) > 1)
+            for files in alike.values()
+        ]
 
     def _summary(self) -> Summary:
         rows = [Row(curve.name, curve.peak, (), curve.unit) for curve in self]
-        return Summary(f"Peaks of {len(self)} tests", rows, notes=[*map(str, self.read[:3])])
+        return Summary(f"Peaks of {len(self)} tests", rows, notes=self._readings())
 
 
 @checked
