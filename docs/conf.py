@@ -164,7 +164,7 @@ what-do-twenty-five-tests-tell-me tutorials/peak-forces
 design-force tutorials/design-force
 theory guide/model
 correlation-lengths guide/random-strength
-inspection guide/inspection
+inspection guide/random-strength
 friction guide/friction-laws
 specimens guide/specimens
 planes guide/planes-and-ends
