@@ -208,7 +208,7 @@ def trend(run: Runner) -> xr.Dataset:
     return result[["critical_stress"]].assign_coords(ratio=list(TREND))
 
 
-@kept(samples=lambda size: size.vanishing // 2)
+@kept(samples=lambda size: size.vanishing // 5)
 def window(run: Runner, samples: int) -> xr.Dataset:
     """Onsets as the nucleation length vanishes, with L/xi_0 held fixed."""
     fine = setting.grid(PROBLEM, span=16.5 * WINDOWS[-1] / setting.LAST)
@@ -328,7 +328,7 @@ def mechanism(run: Runner) -> xr.Dataset:
     return xr.Dataset(variables, {"x": PROBLEM.interface.x, "distance": apart})
 
 
-@kept(samples=lambda size: size.samples, most=lambda size: 10)
+@kept(samples=lambda size: size.samples, most=lambda size: 7)
 def arrest(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Arrested samples again, with inertia."""
     events, interface = sweep(run, "exact")["arrested_events"], PROBLEM.interface
@@ -420,8 +420,8 @@ def held(run: Runner, count: int) -> xr.Dataset:
     return run.grid(rest, sample=range(count))
 
 
-@kept(samples=lambda size: 10 * size.driven, ruptures=lambda size: size.ruptures)
-def stress_drop(run: Runner, samples: int, ruptures: int) -> xr.Dataset:
+@kept(samples=lambda size: 10 * size.driven, most=lambda size: size.driven)
+def stress_drop(run: Runner, samples: int, most: int) -> xr.Dataset:
     """Arrest if the residual strength is random, too, and with it the stress drop."""
     field, low = strength(setting.SECOND), setting.RESIDUAL
     marginal = st.Beta(alpha=2.0, beta=2.0, low=low, high=low + 0.9 * (setting.LOW - low))
@@ -432,15 +432,15 @@ def stress_drop(run: Runner, samples: int, ruptures: int) -> xr.Dataset:
     problem = dataclasses.replace(PROBLEM, friction=friction)
     profiles = {"strength": tau_p, "residual_strength": np.minimum(tau_r, 0.95 * tau_p)}
 
-    def part(method, first, last):
-        rows = {name: row[first:last] for name, row in profiles.items()}
-        onset = st.onset(problem, rows, method=method, progress=False)
+    def events(rows, method):
+        chosen = {name: profile[rows] for name, profile in profiles.items()}
+        onset = st.onset(problem, chosen, method=method, progress=False)
         return xr.Dataset({"arrested_events": ("sample", onset["arrested_events"].values)})
 
-    each = [(RUPTURE, number, number + 1) for number in range(min(ruptures, samples))]
-    static, *moving = run.map(part, [(EXACT, 0, samples), *each])
-    dynamic = xr.concat(moving, "sample")["arrested_events"].rename(sample="rupture")
-    return static.assign(with_inertia=dynamic)
+    (static,) = run.map(events, [(slice(None), EXACT)])
+    arrested = np.flatnonzero(static["arrested_events"].values > 0)[:most]
+    moving = [events([number], RUPTURE)["arrested_events"].item() for number in arrested]
+    return static.assign(with_inertia=("rupture", moving))
 
 
 ARRESTS = ("wide_strength", "random_load", "random_residual")
