@@ -71,6 +71,10 @@ SENTINELS = np.array(
      3.40282e38, -3.40282e38]
 )  # fmt: skip
 """Numbers that instruments and formats write for a missing value."""
+SAID_BY_ROLE = {
+    "strength": "friction", "friction_coefficient": "friction", "normal_pressure": "pressing force"
+}  # fmt: skip
+"""Roles of columns that may hold a quantity, whatever they are called."""
 LISTED_COLUMNS = 20
 """Names of columns in a message."""
 Missing = Annotated[
@@ -106,17 +110,20 @@ def unit_of(array: Any) -> str:
 
 def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
     """Return the values of a DataArray in SI, converted from its unit or the unit of the caller."""
-    stated = unit_of(array)
     with prefixed(what, " "):
         values = as_numbers(magnitude_in_one_of(array.data, [si])[0])
-        factor = factor_to(si, given or stated or si)
-        known = given and parse(stated)
-        if known and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
-            raise InputError(
-                f"is given in {given}, but the source states {stated}. Leave the unit out, or"
-                " correct the source"
-            )
-    return values * factor
+        return values * _factor(si, unit_of(array), given)
+
+
+def _factor(si: str, stated: str, given: str | None) -> float:
+    """Return the factor to SI from the unit of the caller or of the source, which must agree."""
+    factor = factor_to(si, given or stated or si)
+    if given and parse(stated) and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
+        raise InputError(
+            f"is given in {given}, but the source states {stated}. Leave the unit out, or correct"
+            " the source"
+        )
+    return factor
 
 
 def column_in_si(
@@ -132,15 +139,8 @@ def column_in_si(
         )
     for si in units:
         if is_in(name, si):
-            factor = factor_to(si, name)
-            if given and parse(column.unit) and not np.isclose(
-                factor, factor_to(si, column.unit), rtol=1e-12
-            ):  # fmt: skip
-                raise InputError(
-                    f"{quantity} is given in {given}, but the source states {column.unit}. Leave"
-                    " the unit out, or correct the source"
-                )
-            return column.values * factor, si
+            with prefixed(quantity, " "):
+                return column.values * _factor(si, column.unit or name, given), si
     raise InputError(
         f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
     )
@@ -466,9 +466,9 @@ def _chosen(
 def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any:
     """Return whether a heading says that its column is a quantity: by its name, else its role."""
     named = any(_plain(column.name) in words for column in columns)
-    if named or quantity not in ("strength", "friction_coefficient"):
+    if named or quantity not in SAID_BY_ROLE:
         return lambda column: _plain(column.name) in words
-    return lambda column: role_of(column) == "friction"
+    return lambda column: role_of(column) == SAID_BY_ROLE[quantity]
 
 
 def _place_of(
