@@ -254,9 +254,11 @@ class SliderSolver:
             )
         sliding, states = loads * self.length > push.last.load, []
         for load in loads[~sliding]:
-            while path.move(load * self.length) in (Status.UNSTABLE, Status.ARRESTED):
-                pass
-            state = path.state()
+            while (status := path.move(load * self.length)) != Status.AT_TARGET:
+                if status > Status.ARRESTED:  # it slides at this load: `state` is about to jump
+                    break
+                state = path.state()
+            state = path.state() if status == Status.AT_TARGET else state
             states.append(self.travels(state) | self.profiles(state))
         values = self.event_table(push)
         wide = {"slip", "stress", *ON_PATH}

@@ -1,0 +1,86 @@
+"""Laws of statics along the path of a slider, and the same rig described in two ways."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from setups import EXACT
+from sliders import SLIDER, coefficients, rig_problem
+
+import stiction as st
+
+PUSH = st.Pusher(height=0.006, width=0.004)
+RIGS = {
+    "soft": {"drive": PUSH},
+    "tilted, high": {"drive": st.Pusher(height=0.06, width=0.01), "tilt": -0.5},
+    "machine": {"drive": dataclasses.replace(PUSH, stiffness=5e6)},
+    "rigid machine": {"drive": dataclasses.replace(PUSH, stiffness=float("inf"))},
+    "shear of the top": {"drive": st.TopShear()},
+}
+
+
+def solved(problem, mu, **options):
+    return st.onset(problem, mu, method=st.Equilibrium(**options), progress=False)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("name", RIGS)
+def test_forces_balance_along_the_path(name):
+    problem = rig_problem(**RIGS[name])
+    mu, slider = coefficients(problem), problem.specimen
+    found = solved(problem, mu)
+    loads = float(found.critical_load[0]) * np.linspace(0.0, 1.0, 40)
+    path = st.equilibrium_path(problem, mu, loads)
+    assert not path.sliding.any()
+    mean = 4e3 / (0.14 * 0.006)
+    np.testing.assert_allclose(path.stress.mean("x"), path.mean_stress, atol=1e-9 * mean)
+    np.testing.assert_allclose(path.pressure.mean("x"), mean, rtol=1e-11)
+    # Pressure and shear obey the law, up to round-off.
+    limit = path.pressure * mu
+    assert (path.stress <= limit + 1e-9 * mean).all()
+    assert (path.slip.diff("load") >= -1e-15).all()
+    assert float(path.mean_stress.max()) <= float(found.critical_stress[0]) * (1.0 + 1e-12)
+    assert int(path.arrested_events[-1]) == (path.event_load < loads[-1]).sum()
+    # The friction coefficient is the largest force over the normal force.
+    assert found.friction_coefficient[0] == pytest.approx(float(found.critical_force[0]) / 4e3)
+    machine = slider.drive.stiffness
+    if machine == np.inf:  # the machine prescribes the travel
+        np.testing.assert_allclose(path.travel, path.crosshead_travel, rtol=1e-12)
+    if machine > 0.0:
+        along = path.crosshead_travel[1:] / loads[1:]
+        np.testing.assert_allclose(along, along[0], rtol=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_a_push_from_the_right_is_the_mirror_image():
+    left = rig_problem(drive=PUSH, tilt=0.3)
+    right = rig_problem(drive=dataclasses.replace(PUSH, side="right"), tilt=0.3)
+    base = dataclasses.replace(SLIDER.base, behind=SLIDER.base.behind)
+    assert base == right.specimen.base  # behind and ahead count along the push
+    mu = coefficients(left)
+    mirrored = mu.copy(data=mu.values[::-1])
+    first, second = solved(left, mu, slip=True), solved(right, mirrored, slip=True)
+    for name in ("critical_load", "first_instability", "arrested_events", "open_fraction"):
+        np.testing.assert_allclose(first[name], second[name], rtol=1e-10)
+    np.testing.assert_allclose(first.slip[0], second.slip[0, ::-1], atol=1e-15)
+    together = float(first.critical_position[0] + second.critical_position[0])
+    assert together == pytest.approx(0.14)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_the_sensitivity_is_the_derivative():
+    problem = rig_problem(drive=PUSH)
+    mu = coefficients(problem)
+    found, step = solved(problem, mu, sensitivity=True), 1e-6
+    raised = solved(problem, mu + step)
+    pressure = 4e3 / (0.14 * 0.006)
+    expected = float(raised.first_instability[0] - found.first_instability[0]) / (
+        step * pressure
+    )
+    assert float(found.sensitivity.sum()) == pytest.approx(expected, rel=1e-4)
+
+
+def test_only_linear_weakening_is_followed():
+    law = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.3, 0.0], critical_slip=1e-5)
+    problem = rig_problem(problem={"friction": law})
+    assert "LinearWeakening" in EXACT.supports(problem)[0]
