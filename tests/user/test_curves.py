@@ -183,7 +183,7 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     stronger = beta_strength(4e-3, low=0.9e6, high=1.9e6)
     wrong = st.statistics.agreement(predicted(stronger), curves, replicates=400)
     assert wrong.p_values["first_load"] < 0.01
-    assert "precursors: p =" in str(wrong)
+    assert "p-value, first_load" in str(wrong)
     few = st.monte_carlo(
         BLOCKS, FIELD, method=st.Equilibrium(events=1), samples=20, seed=5, progress=False
     )
