@@ -39,6 +39,8 @@ def test_what_a_curve_says(noise):
     assert is_machine(curve, noise)
     assert curve.noise == pytest.approx(noise, rel=0.1, abs=1e-9)
     assert "2 precursors from 40" in str(curve)
+    assert len(curve.drops) == 2
+    assert curve == st.read_curve((TRAVEL * 1e3 * u.mm, force * u.N))[0]
     assert "plateau 73 N" in str(curve)
     stress = st.read_curve((TRAVEL, force * 1e3), unit="Pa", travel_unit="m")
     assert stress[0].drops.size == pytest.approx(curve.drops.size * 1e3)

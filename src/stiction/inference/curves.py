@@ -99,12 +99,16 @@ BOTH_SIGNS = 0.2
 Split = Literal["cycles", "strokes", "tables"]
 
 
-class Drops(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Drops(Result):
     """Drops of the force: travel and force at the beginning, and size of each drop."""
 
     travel: Array
     force: Array
     size: Array
+
+    def __len__(self) -> int:
+        return self.size.size
 
 
 @dataclass(frozen=True, eq=False, repr=False)
