@@ -57,7 +57,7 @@ def main():
     local, exact = st.LocalCriterion(), st.Equilibrium()
     problem = st.paper.problem(nodes=512)
     field = st.paper.strength(problem, correlation_ratio=0.5)
-    state = st.external.limit_state(problem, field, local, workers=1)
+    state = st.external.limit_state(problem, field, local)
     start = time.perf_counter()
     parts = [state(state.draws(12345, first, 1000)) for first in range(0, MILLION, 1000)]
     onset = np.sort(np.concatenate(parts))
@@ -75,7 +75,7 @@ def main():
         for name in ("subset", "two_level")[: 1 if method is local else 2]:
             repetition(problem, field, stress, precise.probability, method, name, 0.3)
     long = longer(problem, 4)
-    states = [st.external.limit_state(one, field, local, workers=1) for one in (problem, long)]
+    states = [st.external.limit_state(one, field, local) for one in (problem, long)]
     counts = [
         np.concatenate([s(s.draws(7, i, 1000)) for i in range(0, 40_000, 1000)]) for s in states
     ]

@@ -208,7 +208,7 @@ def a_specimen_in_newtons():
 @calls("onset of the profiles of the same draws")
 def limit_state_and_simulator():
     bare = without(SMALL, "load.normal_pressure")
-    state = st.external.limit_state(bare, PRESSED, EXACT, event="first_instability")
+    state = st.external.limit_state(bare, PRESSED, EXACT)
     draws = state.draws(seed=3, first=255, samples=3)
     field, names = (
         dataclasses.replace(BOUNDED, mean_mode=True),

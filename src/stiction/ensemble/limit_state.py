@@ -6,7 +6,7 @@ import time
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from scipy.special import ndtri
 
 from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.errors import InputError, collect_warnings, merged
-from stiction.base.model import Count, checked
+from stiction.base.model import checked
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.batches import (
     Table,
@@ -33,7 +33,6 @@ from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
-StressName = Literal["critical_stress", "first_instability"]
 """Stress of a method that counts as failure."""
 
 MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
@@ -56,14 +55,13 @@ class LimitState:
     """
 
     experiment: Experiment
-    event: StressName = "critical_stress"
     per_pressure: bool = False
     workers: int = 1  # threads, on which results do not depend
     meter: Meter = SILENT  # counts the samples
     executor: Executor | None = None  # instead of threads, as in `monte_carlo`
 
     def __repr__(self) -> str:
-        text = f"{self.event} by {self.experiment.method.label}"
+        text = f"critical_stress by {self.experiment.method.label}"
         return f"LimitState({text}, of {self.dimension} draws)"
 
     @property
@@ -138,7 +136,7 @@ class LimitState:
 
     def _stress(self, draws: Array) -> Array:
         profiles, values = self.experiment.solve(draws)
-        stress: Array = values[self.event]
+        stress: Array = values["critical_stress"]
         if self._random_pressure:
             pressures = self.experiment.problem.interface.mean(profiles["normal_pressure"])
             stress = stress * self.experiment.pressure / pressures
@@ -150,11 +148,6 @@ class LimitState:
         """Whether there are several equally likely interfaces."""
         several: bool = self.experiment.random.several
         return several
-
-    @property
-    def may_survive(self) -> bool:
-        """Whether slip before the event lowers the stress, so that the event need not happen."""
-        return self.experiment.problem.has_machine and self.event == "first_instability"
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -202,7 +195,7 @@ class LimitState:
             ratios = mean / ends[1], mean / ends[0] if ends[0] > 0.0 else math.inf
             low, high = low * ratios[low < 0.0], high * ratios[1]
         bounded = optional_member(self.experiment.method, "bounded_by_strength")
-        below, above = bounded(problem, self.event)
+        below, above = bounded(problem, "critical_stress")
         return low if below else -math.inf, high if above else math.inf
 
 
@@ -268,9 +261,6 @@ def limit_state(
     problem: Problem,
     random: AnyRandom,
     method: MethodObject,
-    *,
-    event: StressName = "critical_stress",
-    workers: Count | None = None,
 ) -> LimitState:
     """Make a function that maps standard normal draws to the stress at onset.
 
@@ -279,9 +269,9 @@ def limit_state(
 
     Parameters
     ----------
-    problem, random, workers
+    problem, random
         As in `monte_carlo`.
-    method, event
+    method
         As in `failure_probability`.
 
     Returns
@@ -311,4 +301,4 @@ def limit_state(
     """
     experiment = Experiment(problem, random, method)
     check_fields([experiment])
-    return LimitState(experiment, event, workers=workers or usable_cores())
+    return LimitState(experiment, workers=usable_cores())

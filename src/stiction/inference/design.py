@@ -112,7 +112,6 @@ def design_of_tests(
     repetitions: Annotated[Count, Field(ge=10)] = 60,
     samples: Annotated[Count, Field(ge=100)] | None = None,
     seed: Number = 0,
-    workers: Count | None = None,
     progress: Progress = True,
 ) -> xr.Dataset:
     """Estimate how much each design of tests will tell, as information or as narrower intervals.
@@ -125,7 +124,7 @@ def design_of_tests(
 
     Parameters
     ----------
-    problem, random, prior, method, samples, seed, workers, progress
+    problem, random, prior, method, samples, seed, progress
         As in `infer`.
     designs : mapping
         Designs by name. A design is a number of tests, a mapping of lengths (m)
@@ -185,7 +184,7 @@ def design_of_tests(
     """
     error = load_cell_error * factor_of(unit)
     with Meter("design of tests", show=progress) as meter:
-        simulation = Simulation(method, samples, seed, workers, meter)
+        simulation = Simulation(method, samples, seed, None, meter)
         if prior is None:
             further = _further(USUAL_DESIGNS if designs is None else designs)
             tables = _present(problem, random, simulation, unit, error)

@@ -29,7 +29,7 @@ from stiction.base.model import Count, Number, Progress, checked
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
+from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
 from stiction.problem.results import study_attributes, to_dataset
@@ -85,7 +85,6 @@ def failure_curve(
     target_cv: TargetCv = CURVE_CV,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: StressName = "critical_stress",
     workers: Count | None = None,
     executor: Executor | None = None,
     progress: Progress = True,
@@ -100,8 +99,7 @@ def failure_curve(
         Coefficient of variation to reach at the smallest probability.
         It is lower at other points. Repetitions are added until it is
         reached.
-    problem, random, method, seed, max_evaluations, event,
-    workers, progress
+    problem, random, method, seed, max_evaluations, workers, progress
         As in `design_stress`.
     executor
         As in `monte_carlo`. The samples of each step are divided between its workers.
@@ -144,7 +142,7 @@ def failure_curve(
 
     def solve(experiment: Experiment, meter: Meter, spent: int) -> TailPoint:
         state, budget = prepare(
-            experiment, event, workers, meter, max_evaluations, executor=executor, spent=spent
+            experiment, workers, meter, max_evaluations, executor=executor, spent=spent
         )
         state = weakest_first(state)
         goal = Goal(sampling_target(state, target_cv), probability=smallest)
@@ -216,7 +214,6 @@ def curve_of(
         "evaluations": tail.spent,
         "repetitions": len(tail.repetitions),
         "lower_bound": lowest,
-        "event": state.event,
         "method": state.experiment.method.type,
         "survived": tail.survived,
     }

@@ -43,7 +43,7 @@ from stiction.base.errors import InputError, collect_warnings
 from stiction.base.model import Count, Flag, Number, Progress, Real, checked, is_finite
 from stiction.base.progress import Meter
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
+from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import value_at, with_values
@@ -88,7 +88,6 @@ def design_stress(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: StressName = "critical_stress",
     confidence: Share = 0.75,
     sensitivities: Flag | dict[str, tuple[Real, Real]] | None = None,
     workers: Count | None = None,
@@ -118,7 +117,7 @@ def design_stress(
         dotted keys in the problem to ranges, such as
         ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 %
         on either side.
-    problem, random, seed, max_evaluations, event, workers, progress
+    problem, random, seed, max_evaluations, workers, progress
         As in `failure_probability`.
 
     Returns
@@ -149,7 +148,7 @@ def design_stress(
     """
 
     def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
-        state, budget = prepare(experiment, event, workers, meter, max_evaluations, spent=spent)
+        state, budget = prepare(experiment, workers, meter, max_evaluations, spent=spent)
         answer = _quantile(state, probability, target_cv, budget, confidence)
         wanted = (
             experiment.random.source is not None
@@ -269,7 +268,7 @@ def sensitivities_of(
 
     def predicted(changes: Mapping[str, float]) -> Any:
         known = None
-        if isinstance(source, Predictive) and state.event == "critical_stress":
+        if isinstance(source, Predictive):
             known = source.prediction(problem, experiment.method, changes, state.workers)
         return _Counted.of(state, changes) if known is None else known
 

@@ -184,7 +184,7 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts | Non
     factors there is no count.
     """
     long_list = len(state.experiment.random.members) > LONG_LIST
-    if state.may_survive or not (long_list or _expands(state)):
+    if not (long_list or _expands(state)):
         return None, False
     counts = solve_specimens(state, 0, min(FIRST_SAMPLES, budget))
     while True:

@@ -34,7 +34,7 @@ from stiction.base.progress import Meter
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, StressName, weakest_first
+from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem, stress_of
 from stiction.problem.results import along, study_attributes
@@ -92,7 +92,6 @@ def failure_probability(
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
-    event: StressName = "critical_stress",
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Answer:
@@ -134,10 +133,6 @@ def failure_probability(
         Largest number of samples to solve. The default takes about a
         quarter of an hour on one core, but is at most 2,000,000
         samples. For ruptures it is 1,000.
-    event : {"critical_stress", "first_instability"}
-        Whether failure is sliding of the whole interface, or the first
-        instability of a patch, which may be arrested. By the local
-        criterion both are the same.
 
     Returns
     -------
@@ -183,7 +178,7 @@ def failure_probability(
 
     def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
         state, budget = prepare(
-            experiment, event, workers, meter, max_evaluations,
+            experiment, workers, meter, max_evaluations,
             algorithm=algorithm, per_pressure=stress is None, spent=spent,
         )  # fmt: skip
         wanted = stress

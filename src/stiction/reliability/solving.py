@@ -25,13 +25,13 @@ from stiction.base.model import Count, Real
 from stiction.base.progress import Meter, Show
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
-from stiction.ensemble.limit_state import LimitState, StressName
+from stiction.ensemble.limit_state import LimitState
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.random.equally_likely import MAX_MEMBERS, specimens_of_fit
 from stiction.reliability.answer import Answer
-from stiction.reliability.tail import TailPoint, guide_of
+from stiction.reliability.tail import TailPoint
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
@@ -58,7 +58,6 @@ F = TypeVar("F", "Answer", TailPoint)
 
 def prepare(
     experiment: Experiment,
-    event: StressName,
     workers: int | None,
     meter: Meter,
     max_evaluations: int | None,
@@ -70,13 +69,13 @@ def prepare(
 ) -> tuple[LimitState, int]:
     """Return the limit state and the allowed evaluations, or refuse a method that is too slow."""
     threads = workers or usable_cores()
-    state = LimitState(experiment, event, per_pressure, threads, meter, executor)
+    state = LimitState(experiment, per_pressure, threads, meter, executor)
     problems = []
     if per_pressure and not experiment.pressure > 0.0:
         problems.append("friction_coefficient: needs load.normal_pressure or pressing_force")
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
-    elif algorithm == "two_level" and isinstance(reason := guide_of(state), str):
+    elif algorithm == "two_level" and isinstance(reason := state.guide, str):
         problems.append(f"algorithm: 'two_level' is not possible: {reason}")
     if problems:
         raise InputError(problems)

@@ -353,13 +353,6 @@ def repeat_until_precise(
     return repetitions
 
 
-def guide_of(state: LimitState) -> LimitState | str:
-    """Return the limit state that may guide two levels, or the reason why they are not possible."""
-    if state.may_survive:
-        return "behind a machine, the first instability need not happen"
-    return state.guide
-
-
 def share_picked(guide: Array, exact: Array) -> float:
     """Return how much of the weakest fiftieth of samples is in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
@@ -384,7 +377,7 @@ def sample_tail(
     """
     # 1.
     auto, seed = algorithm == "auto", state.experiment.seed
-    possible = "unused" if algorithm == "subset" else guide_of(state)
+    possible = "unused" if algorithm == "subset" else state.guide
     guide = None if isinstance(possible, str) else possible
     if auto and guide and pilot is None:
         draws = state.draws(seed, 0, min(GUIDE_PILOT_SAMPLES, budget // 5))
