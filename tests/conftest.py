@@ -42,7 +42,7 @@ hypothesis.settings.load_profile("same")
 def pytest_addoption(parser):
     parser.addoption("--fuzz-count", type=int, default=150, help="trials of each test in fuzz/")
     parser.addoption("--fuzz-seed", type=int, default=5)
-    parser.addoption("--record", action="store_true", help="write records/ anew: -n 0")
+    parser.addoption("--record", action="store_true", help="write records anew: -n 0")
 
 
 @pytest.fixture
