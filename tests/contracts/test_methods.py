@@ -89,22 +89,21 @@ UNFIT = {("local_criterion", "slider"), ("rupture", "slider"), ("weakest", "slid
 OPTIONS: dict[str, dict[str, Any]] = {  # type: another value of each option
     "local_criterion": {},
     "weakest": {"node": "second"},
-    "equilibrium": {"sensitivity": True, "slip": True, "events": 2, "gap": 1e-4},
+    "equilibrium": {"sensitivity": True, "slip": True, "events": 2, "tolerance": 1e-4},
     "rupture": {
-        "load": {"load": ([0.0, 1.0], [0.0, 2e9]), "loading_rate": None},
+        "load_history": {"load_history": ([0.0, 1.0], [0.0, 2e9]), "loading_rate": None},
         "loading_rate": 3e9, "end_time": 3e-4, "kernel_tolerance": 1e-4, "courant": 0.5,
-        "slip_step": 0.1, "load_step": 1e-2, "implicit": False, "arrival": 0.2,
+        "implicit": False, "arrival": 0.2,
         "start": "rest", "stop": "onset", "max_steps": 3, "events": 2,
     },
 }  # fmt: skip
 WRONG: dict[str, dict[str, Any]] = {  # type: a wrong value of each option
     "local_criterion": {},
     "weakest": {"node": "third"},
-    "equilibrium": {"sensitivity": 1.0, "slip": "yes", "events": -1, "gap": 0.1},
+    "equilibrium": {"sensitivity": 1.0, "slip": "yes", "events": -1, "tolerance": 0.1},
     "rupture": {
-        "loading_rate": 0.0, "load": ([1.0, 2.0], [0.0, 1.0]), "end_time": -1.0,
-        "kernel_tolerance": 0.0, "courant": 1.1, "slip_step": 0.0, "load_step": 2.0,
-        "implicit": 0, "arrival": 0.0, "start": "slip", "stop": "never", "max_steps": 0,
+        "loading_rate": 0.0, "load_history": ([1.0, 2.0], [0.0, 1.0]), "end_time": -1.0,
+        "kernel_tolerance": 0.0, "courant": 1.1, "implicit": 0, "arrival": 0.0, "start": "slip", "stop": "never", "max_steps": 0,
         "events": 1.5,
     },
 }  # fmt: skip
