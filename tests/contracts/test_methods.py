@@ -103,7 +103,8 @@ WRONG: dict[str, dict[str, Any]] = {  # type: a wrong value of each option
     "equilibrium": {"sensitivity": 1.0, "slip": "yes", "events": -1, "tolerance": 0.1},
     "rupture": {
         "loading_rate": 0.0, "load_history": ([1.0, 2.0], [0.0, 1.0]), "end_time": -1.0,
-        "kernel_tolerance": 0.0, "courant": 1.1, "implicit": 0, "arrival": 0.0, "start": "slip", "stop": "never", "max_steps": 0,
+        "kernel_tolerance": 0.0, "courant": 1.1, "implicit": 0, "arrival": 0.0,
+        "start": "slip", "stop": "never", "max_steps": 0,
         "events": 1.5,
     },
 }  # fmt: skip
