@@ -33,7 +33,7 @@ _KINDS = "samples ruptures readings few driven vanishing what_if arrests dynamic
 Size = collections.namedtuple("Size", _KINDS)
 """How much of each kind is computed. The last three belong to `--full` alone."""
 QUICK = Size(500, 4, 200, 6, 4, 300, 40, 2, 4)
-USUAL = Size(10_000, 20, 400, 10, 6, 2000, 400, 60, 1000)
+USUAL = Size(10_000, 20, 300, 10, 6, 1500, 400, 60, 1000)
 FULL = USUAL._replace(readings=1000, few=60, driven=16, vanishing=10_000)
 
 
