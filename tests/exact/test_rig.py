@@ -90,6 +90,19 @@ def test_the_mirrored_rig():
     assert left.C == right.C
 
 
+def test_a_stop_takes_the_push_of_a_base_on_rollers():
+    """The length of the base ahead of the slider is a bar that the whole push compresses."""
+    name, E_plane = (
+        "soft base on rollers",
+        8.0 * 0.3e9 / 2.7,
+    )  # E = 8 G/(kappa + 1), plane stress
+    compliances = [
+        1.0 / rig_of(name, behind=a, ahead=b).C for a, b in ((0, 0.2), (0, 0.4), (0.2, 0.2))
+    ]
+    assert compliances[1] - compliances[0] == pytest.approx(0.2 / (E_plane * 0.05), rel=0.01)
+    assert compliances[2] == pytest.approx(compliances[0], rel=0.02)
+
+
 def test_equal_blocks_on_rollers_and_between_platens():
     """`blocks` has closed forms. q converges with the square of the spacing."""
     length, height, push = 0.14, 0.075, (0.0325, 0.0425)
