@@ -17,8 +17,10 @@ import tempfile
 import time
 import warnings
 from functools import partial
+from pathlib import Path
 
 import numpy as np
+import xarray as xr
 from scipy.linalg import LinAlgError, cho_factor, cho_solve, circulant
 from scipy.optimize import linprog
 from scipy.special import ndtr
@@ -219,6 +221,50 @@ def specimens():
             events = onsets.get("arrested_events", np.zeros(1)).mean()
             note = f"{ours / plain:.1f} times as long as half-spaces; {events:.1f} events"
             row(f"  {method.type}", ours, (), note)
+
+
+@case
+def sliders():
+    """Onsets of a slider on a base beside load steps with projected Newton (60 steps)."""
+    sys.path.append(str(Path(__file__).parents[1] / "tests"))
+    from rigs import LoadSteps
+
+    for nodes in (140, 256):
+        problem = st.Problem(
+            solid=st.Solid(
+                youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"
+            ),
+            interface=st.Interface(length=0.14, nodes=nodes),
+            friction=st.LinearWeakening(weakening_rate=0.1e12, residual_ratio=0.64),
+            load=st.Load(normal_pressure=1e6),
+            specimen=st.Slider(
+                height=0.075,
+                base=st.Base(height=0.03, behind=0.06, ahead=0.1),
+                drive=st.Pusher(height=0.006, width=0.004),
+            ),
+        )
+        strength = st.RandomField(
+            st.Beta(alpha=3.0, beta=3.0, low=0.58, high=0.82),
+            st.PowerLawSpectrum(correlation_length=0.004),
+            quantity="friction_coefficient",
+        ).sample(problem.interface, samples=16, seed=0)
+        start = time.process_time()
+        rig = problem.rig
+        row(f"{nodes} nodes, rig", time.process_time() - start, (), "first time")
+        labelled = xr.DataArray(strength, dims=("sample", "x"), attrs={"units": "1"})
+        labelled = labelled.assign_coords(x=problem.interface.x)
+        ours, found = solver_time(problem, st.Equilibrium(), labelled, 3)
+        pressed, spacing = 0.14e6 * rig.T_p, problem.interface.spacing
+        friction = strength[0], 0.64 * strength[0], np.full(nodes, 0.1e12 * spacing)
+        largest = 0.14 * float(found["critical_load"][0])
+
+        def steps(rig=rig, friction=friction, pressed=pressed, largest=largest):
+            nothing = np.zeros(len(rig.T) // 2 + 1)
+            brute = LoadSteps(rig.K, rig.T, *friction, pressed, nothing[1:], nothing)
+            for load in largest * np.linspace(0.0, 1.0, 61)[1:-1]:
+                brute.raise_to(load)
+
+        row(f"{nodes} nodes", ours, [("load steps", timed(steps, 1))])
 
 
 @case

@@ -105,6 +105,10 @@ class Equilibrium(Listed):
     instability, or if a node of a specimen stops before the first
     instability.
 
+    On a slider, slip and opening change the pressure. `open_fraction`
+    is the part of the interface that is open before it slides. No bound
+    is claimed, and `certificate_gap` is NaN.
+
     On planes, positions have two components, along 'direction'.
     `critical_patch_extent` (m, along 'direction') and
     `critical_patch_area` (m²) replace the length. `certified` is true

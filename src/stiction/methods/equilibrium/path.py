@@ -164,6 +164,11 @@ def equilibrium_path(
         stresses are also given as forces: `force`, `event_force` and
         `event_force_drop` (N).
 
+        On a slider, `pressure` (Pa) and `opening` (m) at the nodes
+        are added. Slip and travel count from the beginning of the push.
+        Two variables that need a fixed pressure are missing:
+        `event_energy_stress_drop` and `event_fracture_energy`.
+
         On planes, positions have two components, along
         'direction'. `event_extent` (m) and `event_area`
         (m²) replace the length, the moment is in N m, and
