@@ -162,7 +162,7 @@ def test_the_readme_prints_what_it_shows(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert [bool(output) for _, output in SHOWN_OUTPUT.findall(README)] == 3 * [True]
     run_blocks(README, {})
-    assert (tmp_path / "onset.png").stat().st_size > 10_000
+    assert (tmp_path / "joint.png").stat().st_size > 10_000
 
 
 def test_the_page_of_messages_quotes_messages():
