@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refuses
+from refusals import refuses, warning_texts
 from setups import EXACT, LOCAL, beta_strength
 from sliders import SLIDER, SOLID, coefficients, rig_problem
 
@@ -184,3 +184,9 @@ def test_a_figure_at_the_first_instability(side):
     assert np.all(shear <= peak + 1e-9)
     np.testing.assert_allclose(peak, coefficients(problem) * pressure)
     assert moved[0 if side == "left" else -1] == moved.max() > 0.0
+
+
+def test_a_coarse_grid_is_warned_of_without_free_ends():
+    """The end of a slider is a corner, for which the critical length of free ends does not hold."""
+    (text,) = warning_texts(lambda: st.onset(PROBLEM, MU, method=EXACT))
+    assert "spans 7.9 nodes, and 32 are recommended" in text

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from stiction.base.errors import InputError, UnitWarning, warn_accuracy, warn_user
+from stiction.problem.specimen import Blocks
 
 MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""
@@ -19,7 +20,7 @@ HARDLY_RESOLVED = 0.04
 MIN_LENGTHS_IN_LINE = 4.0
 """Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
-"""Nucleation length at a free end over the length in the middle."""
+"""Nucleation length at a free end of two equal blocks over the length in the middle."""
 
 
 def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[float, ...]:
@@ -83,7 +84,7 @@ def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str
         spanned = f"{resolution[0]:.1f} nodes"
         if problem.interface.is_plane:
             spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
-        if problem.specimen is not None:
+        if isinstance(problem.specimen, Blocks):
             spanned += f", {AT_END[problem.mode] * resolution[0]:.1f} at a free end"
         wanted = 16 if enough <= 12.0 else 32
         warn_accuracy(
