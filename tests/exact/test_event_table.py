@@ -174,3 +174,10 @@ def test_fast_loading_of_arrested_events_is_warned_of():
         st.onset(problem, strength, method=st.Rupture(loading_rate=2e10))
     slow = st.onset(problem, strength, method=st.Rupture(loading_rate=1e7))
     assert slow.arrested_events == 1
+
+
+def test_a_path_without_events_has_a_table_of_its_loads():
+    problem = make_problem(64, 0.0185)
+    path = st.equilibrium_path(problem, np.full(64, 1e6), [2e5, 4e5])
+    assert len(st.external.event_table(path)) == 0
+    assert path.to_dataframe()["mean_stress"].unique().size == 2

@@ -153,12 +153,17 @@ def tabulate(
     variables: Mapping[str, Variable],
     most: int | None = None,
 ) -> dict[str, Array]:
-    """Return the variables of measured events as arrays, padded with NaN to `most` events."""
+    """Return the variables of measured events as arrays, padded with NaN to `most` events.
+
+    Without `most` there is at least one row: a dimension of length zero
+    would leave no row in the table of a path.
+    """
     table, count = {}, len(measured)
+    size = max(count, 1) if most is None else most
     for name, variable in variables.items():
         # After 'event', the only other dimension is 'direction'.
         components = (2,) * (len(variable.dims) - 1)
-        table[name] = np.full((count if most is None else most, *components), np.nan)
+        table[name] = np.full((size, *components), np.nan)
         table[name][:count] = np.reshape(
             [values[name] for values in measured], (count, *components)
         )
