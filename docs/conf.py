@@ -161,7 +161,7 @@ tutorials/first-onset start/first-onset
 methods start/choose-a-method
 tutorials/measured-profile tutorials/profile
 what-do-twenty-five-tests-tell-me tutorials/peak-forces
-design-force tutorials/design-force
+design-force tutorials/joint
 theory guide/model
 correlation-lengths guide/random-strength
 inspection guide/random-strength
@@ -173,7 +173,7 @@ reliability guide/failure-probability
 studies guide/studies
 clusters guide/clusters
 plug-ins guide/extend-and-connect
-tutorials/own-code guide/own-code
+tutorials/own-code guide/extend-and-connect
 conventions reference/conventions
 faq reference/errors-and-warnings
 project reference/changelog

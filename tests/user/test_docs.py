@@ -99,7 +99,7 @@ SHOWN = {
     "docs/guide/planes-and-ends.md": (len, {}),
     "docs/guide/specimens.md": (len, {}),
     "docs/evidence/laboratory-fault.md": (len, {}),
-    "docs/tutorials/design-force.md": (of_decisions, {
+    "docs/tutorials/joint.md": (of_decisions, {
         "between=True": "between=True, bootstrap=20",
         "probability=1e-3, method": "probability=0.03, method",
         "nodes=256": "nodes=128",
