@@ -8,6 +8,7 @@ from setups import EXACT
 from sliders import SLIDER, coefficients, rig_problem
 
 import stiction as st
+from stiction.methods.equilibrium.contact import stages
 
 PUSH = st.Pusher(height=0.006, width=0.004)
 RIGS = {
@@ -84,3 +85,25 @@ def test_only_linear_weakening_is_followed():
     law = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.3, 0.0], critical_slip=1e-5)
     problem = rig_problem(problem={"friction": law})
     assert "LinearWeakening" in EXACT.supports(problem)[0]
+
+
+def test_a_slider_that_topples_before_it_slides():
+    # The pressure reaches the leading end at h F/N = L/2.
+    problem = rig_problem(height=0.14, drive=st.Pusher(height=0.13, width=0.01))
+    mu = coefficients(problem, 0.88, amplitude=0.01)
+    with pytest.warns(st.AccuracyWarning, match="topples"):
+        found = solved(problem, mu)
+    assert float(found.friction_coefficient[0]) == pytest.approx(0.07 / 0.13, rel=1e-9)
+
+
+@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
+def test_the_pressing_may_begin_at_any_small_share(monkeypatch):
+    problem = rig_problem(drive=PUSH)
+    mu = coefficients(problem, 0.28, amplitude=0.02)
+    loads = {}
+    for share in (1e-2, 1e-3, 1e-4):
+        monkeypatch.setattr(stages, "FIRST_PRESSING", share)
+        found = solved(problem, mu)
+        loads[share] = float(found.first_instability[0]), float(found.critical_load[0])
+    np.testing.assert_allclose(loads[1e-2], loads[1e-3], rtol=5e-8)
+    np.testing.assert_allclose(loads[1e-4], loads[1e-3], rtol=5e-8)
