@@ -49,6 +49,10 @@ REFUSED = {
         "behind ... -0.01",
         lambda: st.Base(height=0.03, behind=-0.01),
     ),
+    "sizes in mm": (
+        "specimen.height: 75 m ... specimen.base.behind: 60 m ... Check its unit (m)",
+        sampled(height=75.0, base=st.Base(height=0.03, behind=60.0)),
+    ),
     "a coarse mesh for the pusher": (
         "specimen.drive.width ... interface.nodes = 20 or more",
         sampled(nodes=16, drive=st.Pusher(height=0.02, width=0.007)),

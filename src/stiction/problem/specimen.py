@@ -36,6 +36,8 @@ Stiffness = Annotated[
 Quality = Annotated[
     float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.01)
 ]
+MAX_SIZE_RATIO = 20.0
+"""Sizes of a slider and its base over its length above which their unit is probably wrong."""
 MIN_PRESSURE = 1e-6
 """Smallest local pressure over its mean with which a critical slip gives a weakening rate."""
 MAX_POSITIVE = 1e-2
@@ -368,6 +370,15 @@ class Slider(Listed):
             f" interface.nodes = {math.ceil(length / size)} or more"
             for name, size in sizes.items()
             if size < (1.0 - 1e-9) * spacing
+        ]
+        base = {
+            f"base.{name}": getattr(self.base, name) for name in ("height", "behind", "ahead")
+        }
+        problems += [
+            f"specimen.{name}: {size:g} m is more than {MAX_SIZE_RATIO:g} times the length of the"
+            f" slider, {length:g} m. Check its unit (m)"
+            for name, size in {"height": self.height, **base}.items()
+            if size > MAX_SIZE_RATIO * length
         ]
         return problems
 
