@@ -30,7 +30,7 @@ from stiction.problem.interface import Ellipse as Ellipse
 from stiction.problem.interface import Interface as Interface
 from stiction.problem.load import Load as Load
 from stiction.problem.problem import Problem as Problem
-from stiction.problem.profiles.reading import read_profile as read_profile
+from stiction.problem.profiles import read_profile as read_profile
 from stiction.problem.solid import Solid as Solid
 from stiction.problem.specimen import Base as Base
 from stiction.problem.specimen import Blocks as Blocks

@@ -1,8 +1,22 @@
-"""Theory of the local criterion and of cracks: results that do not need an ensemble."""
+"""Theory of the local criterion and of cracks: results that do not need an ensemble.
 
+The exact mean and variance of the nucleation stress are computed here.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError
+from stiction.base.model import checked
+from stiction.base.representation import Result, Row, Summary
 from stiction.methods.criterion.griffith import griffith_length
-from stiction.methods.criterion.local import nucleation_stress
-from stiction.statistics.moments import nucleation_statistics
+from stiction.methods.criterion.local import check_law, nucleation_stress
+from stiction.methods.criterion.windows import windows_of
+from stiction.problem.problem import Problem, refuse_specimen
+from stiction.random.fields import RandomField
 
 __all__ = [
     "griffith_length",
@@ -13,3 +27,129 @@ __all__ = [
 
 def __dir__() -> list[str]:  # what completion lists
     return __all__
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NucleationStatistics(Result):
+    """Mean and variance of the nucleation stress tau_n at a point. tau_n is a load tau_0.
+
+    Attributes
+    ----------
+    mean, variance : float
+        E[tau_n], Pa, and Var[tau_n], Pa^2.
+    strength_mean, strength_variance : float
+        E[tau_p], Pa, and Var[tau_p], Pa^2.
+    """
+
+    mean: float
+    variance: float
+    strength_mean: float
+    strength_variance: float
+
+    def _summary(self) -> Summary:
+        rows = [
+            Row("mean", self.mean, (), "Pa"),
+            Row("standard deviation", math.sqrt(self.variance), (), "Pa"),
+            Row("mean of the strength", self.strength_mean, (), "Pa"),
+            Row("its standard deviation", math.sqrt(self.strength_variance), (), "Pa"),
+        ]
+        return Summary("Nucleation stress at a point, exact moments", rows)
+
+    @property
+    def variance_ratio(self) -> float:
+        """Var[tau_n]/Var[tau_p]."""
+        return self.variance / self.strength_variance
+
+
+@checked
+def nucleation_statistics(problem: Problem, strength: RandomField) -> NucleationStatistics:
+    """Compute the exact mean and variance of the nucleation stress.
+
+    Parameters
+    ----------
+    problem : Problem
+        A problem with uniform weakening rate, load and initial stress.
+    strength : RandomField
+        Peak strength, Pa, or friction coefficients under a uniform
+        normal pressure.
+
+    Raises
+    ------
+    InputError
+        If the weakening rate, the load, the initial stress or the
+        pressure of coefficients varies along the interface, or if a
+        critical patch is larger than the interface.
+
+    Notes
+    -----
+    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
+    integral of the correlation of tau_p and the weights. On a periodic interface, the
+    integral is a sum over wave vectors of the spectrum of tau_p times the squared transform
+    of the weight. The correlation of tau_p follows from a Hermite expansion (Grigoriu,
+    1995).
+
+    On a plane tau_n is the average over the middle ellipse of
+    `LocalCriterion`. The method takes the minimum over several
+    ellipses, which has no closed-form moments.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> strength = st.paper.strength(problem, correlation_ratio=2.0)
+    >>> found = st.theory.nucleation_statistics(problem, strength)
+    >>> bool(0.0 < found.variance_ratio < 1.0)  # averaging lowers the variance
+    True
+    """
+    scale, load, initial = stationary(problem, strength)
+    weakening_rate = problem.friction.uniform_weakening_rate
+    assert weakening_rate is not None  # checked by `stationary`
+    (window,) = windows_of(problem, weakening_rate, stretches=(1.0,))
+    power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
+    mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
+    return NucleationStatistics(
+        mean=(mean - initial) * window.total / load,
+        variance=float(np.sum(power)) * variance / load**2,
+        strength_mean=mean,
+        strength_variance=variance,
+    )
+
+
+def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
+    """Return the share of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
+    interface = problem.interface
+    # The spectrum is the transform of the correlation. A mode stands
+    # for its conjugate, too.
+    power = interface.transform(strength.correlation(interface)).real / interface.size
+    power[..., 1 : interface.shape[-1] // 2] *= 2.0
+    return np.maximum(power, 0.0)
+
+
+def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
+    """Return the unit of the strength (Pa), the load profile and initial stress if all are uniform.
+
+    The unit of friction coefficients is the normal pressure. Raises an
+    `InputError` if any of them varies along the interface.
+    """
+    check_law(problem)
+    refuse_specimen(problem, "this", "sample the nucleation stress with st.monte_carlo")
+    load, initial = problem.load_profile, problem.load.initial_stress
+    pressure = 1.0 if strength.quantity is None else problem.given_pressure
+    varying = {
+        "load.profile: varies": np.ptp(load) > 0.0,
+        "load.initial_stress: varies": np.ptp(initial) > 0.0,
+        "load.normal_pressure: varies, and strength is in coefficients": (
+            pressure is not None and np.ptp(pressure) > 0.0
+        ),
+        "strength: is conditioned on measured values": strength.conditions is not None,
+        "friction.weakening_rate: varies or follows from the strength": (
+            problem.friction.uniform_weakening_rate is None
+        ),
+    }
+    why = "so the nucleation stress is not stationary. Sample it with st.monte_carlo instead"
+    problems = [f"{what}, {why}" for what, varies in varying.items() if varies]
+    if pressure is None:
+        problems.append("load.normal_pressure: is missing, and strength is in coefficients")
+    if problems:
+        raise InputError(problems)
+    return float(np.max(pressure)), float(np.max(load)), float(np.max(initial))

@@ -17,8 +17,7 @@ from stiction.methods.criterion.eigenfunction import (
 )
 from stiction.methods.criterion.griffith import energy_release_rate
 from stiction.methods.criterion.windows import windows_of
-from stiction.statistics.moments import nucleation_statistics
-from stiction.theory import griffith_length
+from stiction.theory import griffith_length, nucleation_statistics
 
 
 def first_onset(problem, tau_p):

@@ -23,7 +23,7 @@ import stiction as st
 from stiction.methods.criterion.eigenfunction import weight
 from stiction.methods.criterion.griffith import energy_release_rate
 from stiction.methods.criterion.windows import STRETCHES
-from stiction.problem.profiles.placing import at_nodes
+from stiction.problem.profiles import at_nodes
 from stiction.theory import griffith_length
 
 BOTH = pytest.mark.parametrize(

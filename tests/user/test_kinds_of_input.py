@@ -15,7 +15,7 @@ from setups import LOCAL, make_problem
 import stiction as st
 from stiction.inference.peaks import make_peaks
 from stiction.inference.records import records_of
-from stiction.problem.profiles.placing import at_nodes
+from stiction.problem.profiles import at_nodes
 
 NODES = 128
 LINE = st.Interface(length=0.1, nodes=NODES)

@@ -30,7 +30,7 @@ from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import as_numbers
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.placing import points_of
+from stiction.problem.profiles import points_of
 from stiction.problem.reading.labels import check_positive, is_labelled, labelled, simplified
 
 MIN_RECORD_POINTS = 64

@@ -28,7 +28,7 @@ from stiction.plot.axes import (
 from stiction.plot.style import INK, PAGE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.profiles.placing import at_nodes
+from stiction.problem.profiles import at_nodes
 from stiction.problem.reading.labels import is_coefficient
 from stiction.random.fields import RandomField
 

@@ -19,7 +19,7 @@ from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.friction import Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load
-from stiction.problem.profiles.placing import at_nodes, turned
+from stiction.problem.profiles import at_nodes, turned
 from stiction.problem.resolution import check_resolution, warn_if_short
 from stiction.problem.sample import (
     COEFFICIENTS,

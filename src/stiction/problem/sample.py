@@ -4,8 +4,8 @@
 arrays that the package made, which need steps 4 and 5 only.
 
 1. Name the profiles (`named_profiles`).
-2. Convert labelled values to SI (`profiles/labels.py`).
-3. Put the values on the nodes (`profiles/placing.py`), as rows
+2. Convert labelled values to SI (`reading/labels.py`).
+3. Put the values on the nodes (`profiles.py`), as rows
    (samples, *shape).
 4. Check the values, and that each is given once (`check_values`,
    `given_twice`).
@@ -28,7 +28,7 @@ from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles.placing import at_nodes, turned
+from stiction.problem.profiles import at_nodes, turned
 from stiction.problem.reading.labels import is_coefficient
 from stiction.problem.resolution import check_resolution
 from stiction.problem.specimen import Slider

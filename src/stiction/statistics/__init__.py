@@ -1,9 +1,8 @@
 """Statistics of samples: densities, quantiles, agreement with tests.
 
 `estimates` computes means, standard deviations, quantiles and densities with errors.
-`moments` computes the exact moments of the
-nucleation stress, which are public in `stiction.theory`. `agreement` is imported
-from `stiction.inference`. Each function is imported on first use.
+`agreement` is imported from `stiction.inference` on first use. The exact moments of the
+nucleation stress are in `stiction.theory`.
 """
 
 from difflib import get_close_matches

@@ -15,7 +15,7 @@ from stiction.base.errors import InputError, prefixed
 from stiction.base.files import content_of
 from stiction.base.model import FilePath, check, describe, explain, keys_of
 from stiction.inference.peaks import read_peaks
-from stiction.problem.profiles.reading import ProfileFile, profile_in_file
+from stiction.problem.profiles import ProfileFile, profile_in_file
 
 T = TypeVar("T")
 TABLES = "problem", "random", "method"
