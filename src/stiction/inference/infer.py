@@ -234,6 +234,10 @@ def infer(
         )
     with _simulating(method, samples, seed, workers, progress) as simulation:
         if prior and {*prior} - {MEAN_KEY, SCATTER_KEY}:
+            if between is not None:
+                raise InputError(
+                    "between: has no effect on the parameters of this prior. Leave it out"
+                )
             unknown = make_prior(problem, random, prior)
             posterior = _of_parameters(unknown, simulation, measured, error)
         else:

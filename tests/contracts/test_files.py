@@ -1,0 +1,122 @@
+"""Laws of the files that we write: each is read back, and everything that it says is true."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from contracts.bodies import BODIES, field_of, profiles_of, world
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+QUIET = {"progress": False}
+SHAKEN = [name for name in BODIES if name != "slider"]
+
+
+@cache
+def rupture(name: str) -> Any:
+    """A rupture with a station, and the place of the station."""
+    w = world(name, "rupture")
+    place = 0.02 if not w.interface.is_plane else (0.012, 0.008)
+    fields = ["slip", "slip_rate", "shear_stress"]
+    save = st.Save(fields, stations={"a": place} if not w.problem.specimen else {})
+    run = st.simulate_rupture(w.problem, w.profiles(0), method=w.method, save=save, **QUIET)
+    return run, place
+
+
+@pytest.mark.parametrize("name", [name for name in SHAKEN if "blocks" not in name])
+def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
+    run, place = rupture(name)
+    options = {"origin": place, "normal_stress": -2e6, "benchmark": "a contract"}
+    for file in st.external.write_scec(run, tmp_path, **options):
+        lines = file.read_text().splitlines()
+        about = dict(
+            line[2:].split("=", 1) for line in lines if line[:2] == "# " and "=" in line
+        )
+        numbers = np.array([row.split() for row in lines if row[0] not in "#tj"], dtype=float)
+        if "num_time_steps" in about:
+            assert int(about["num_time_steps"]) == len(numbers)
+            assert numbers.shape[1] == sum("Column" in line for line in lines)
+            assert (np.diff(numbers[:, 0]) > 0.0).all()
+            kept = run.step_time.values - run.step_time.values[-1] + numbers[-1, 0]
+            np.testing.assert_allclose(numbers[1:, 0], kept[1 - len(numbers) :], atol=1e-6)
+            # Slip, slip rate and stress of the station at the last step, in m, m/s and MPa.
+            for key, factor in (("slip", 1.0), ("slip_rate", 1.0), ("shear_stress", 1e-6)):
+                last = factor * float(np.ravel(run[f"station_{key}"].values)[-1])
+                near = np.abs(numbers[-1] - last) <= 1e-5 * abs(last) + 1e-12
+                assert near.any(), key
+        else:
+            assert len(numbers) == BODIES[name].interface.size
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_run_folder_and_its_exports_hold_the_study(name, tmp_path):
+    """A run in two parts, its status, arrays and tables."""
+    study = world(name).study
+    whole = study.run(pilot=False, **QUIET)
+    for part in ("1/2", "2/2"):
+        study.run(out=tmp_path / "run", part=part, pilot=False, workers=1, **QUIET)
+    run = st.open_run(tmp_path / "run")
+    assert run.status().complete
+    assert run.dataset().drop_attrs().identical(whole.drop_attrs())
+    run.export(tmp_path / "all.nc")
+    assert xr.load_dataset(tmp_path / "all.nc").drop_attrs().equals(whole.drop_attrs())
+    run.export(tmp_path / "all.csv")
+    table = pd.read_csv(tmp_path / "all.csv", comment="#")
+    assert len(table) == whole.sizes["sample"]
+    for key, values in whole.items():
+        if values.dims == ("sample",):
+            column = next(c for c in table if re.match(rf"{key}\b", c))
+            np.testing.assert_allclose(table[column], values, rtol=1e-12, err_msg=key)
+            assert values.units in column or values.units == "1", column
+    again = st.Study.from_dict(study.to_dict())
+    assert again == study
+
+
+@pytest.mark.parametrize("name", ["line", "blocks"])
+def test_a_film_has_the_frames_of_its_run(name, tmp_path):
+    from PIL import Image
+
+    run, _ = rupture(name)
+    path = st.plot.film(run, tmp_path / "film.gif", frames=7, **QUIET)
+    with Image.open(path) as film:
+        assert film.n_frames == min(7, run.sizes["time"])
+        first = np.asarray(film.convert("L"), dtype=float)
+        film.seek(film.n_frames - 1)
+        assert np.abs(np.asarray(film.convert("L"), dtype=float) - first).max() > 50.0
+
+
+@pytest.mark.parametrize("name", ["line", "blocks with an extent"])
+def test_a_page_of_a_design_holds_its_numbers(name, tmp_path):
+    w = world(name, "local_criterion")
+    design = st.design_stress(
+        w.problem, w.random, probability=0.1, method=w.method, target_cv=0.4, **QUIET
+    )
+    page = design.write_page(tmp_path / "page.html", sources={"load.profile": "drawing 12"})
+    text = re.sub(r"<[^>]+>", " ", Path(page).read_text())
+    digits = re.findall(r"\d+(?:\.\d+)?", text)
+    shown = {f"{float(number):.3g}" for number in digits}
+    for value in (design.force, design.probability, design.friction_coefficient):
+        scaled = {f"{value * 10.0**power:.3g}" for power in (-3, 0, 3)}
+        assert scaled & shown, value
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_table_of_events_holds_every_event(name):
+    problem = BODIES[name]
+    rows = profiles_of(problem, field_of(problem).sample(problem.interface, samples=3, seed=5))
+    result = st.onset(problem, rows, method=st.Equilibrium(events=3), **QUIET)
+    table = st.external.event_table(result)
+    assert len(table) == int(np.isfinite(result.event_load).sum())
+    for key, values in result.items():
+        if values.dims == ("sample", "event"):
+            known = values.values[np.isfinite(result.event_load.values)]
+            column = table[f"{key} ({values.units})"]
+            np.testing.assert_allclose(column, known, rtol=1e-12, err_msg=key)

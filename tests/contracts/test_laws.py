@@ -1,0 +1,137 @@
+"""Laws of friction laws, marginals and spectra: derivative, integral, inverse and limits agree."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+import stiction as st
+from stiction.problem.friction.laws import LAWS
+from stiction.random.marginals import MARGINALS
+from stiction.random.spectra import SPECTRA
+
+FRICTION = {
+    "linear": st.LinearWeakening(weakening_rate=1e11),
+    "exponential": st.ExponentialWeakening(weakening_rate=1e11),
+    "piecewise": st.PiecewiseWeakening(
+        slip=[0.2, 0.7, 1.0], strength=[0.9, 0.85, 0.0], weakening_rate=1e11
+    ),
+    "piecewise that steps down": st.PiecewiseWeakening(
+        slip=[0.1, 1.0], strength=[0.3, 0.0], critical_slip=2e-6
+    ),
+}
+OF_MOMENTS = {"mean": 1.1e6, "cv": 0.23}
+STRENGTHS = {
+    "beta": st.Beta(alpha=1.5, beta=3.0, low=0.6e6, high=1.7e6),
+    "lognormal": st.Lognormal(**OF_MOMENTS, low=2e5),
+    "weibull": st.Weibull(**OF_MOMENTS, low=3e5),
+    "gamma": st.Gamma(**OF_MOMENTS, low=1e5),
+    "truncated_normal": st.TruncatedNormal(**OF_MOMENTS, low=7e5, high=1.9e6),
+}
+DENSITIES = {
+    "power_law": st.PowerLawSpectrum(3e-3, exponent=1.4, power_kept=0.97),
+    "squared_exponential": st.SquaredExponentialSpectrum(3e-3),
+    "exponential": st.ExponentialSpectrum(3e-3, power_kept=0.95),
+}
+
+
+def test_every_kind_has_an_example():
+    for kinds, examples in ((LAWS, FRICTION), (MARGINALS, STRENGTHS), (SPECTRA, DENSITIES)):
+        own = {name for name in kinds if kinds[name].__module__.startswith("stiction.")}
+        assert own == {example.type for example in examples.values()}
+
+
+@pytest.mark.parametrize("name", FRICTION)
+def test_a_friction_law_agrees_with_itself(name):
+    law, drop = FRICTION[name], np.full(3, 0.8e6)
+    u = np.linspace(0.0, 1.2 * law.reach, 400)
+    f = law.fraction(u)
+    assert f[0] == 1.0
+    assert (np.diff(f) <= 0.0).all()
+    assert law.fraction(law.reach) <= 0.01 * (1.0 + 1e-9)
+    middle = 0.5 * (u[1:] + u[:-1])
+    # Trapezia of pieces: a corner costs less than half a step.
+    np.testing.assert_allclose(np.diff(law.area(u)), law.fraction(middle) * np.diff(u),
+                               atol=np.diff(u)[0] ** 2 * 2.0)  # fmt: skip
+    whole = quad(law.fraction, 0.0, 40.0, points=[0.1, 0.2, 0.7, 1.0], limit=200)[0]
+    assert law.integral == pytest.approx(whole, rel=1e-9)
+    for share in (0.95, 0.6, 0.2, 0.05):
+        assert law.fraction(law.slip_at(share)) == pytest.approx(share, rel=1e-9)
+    start = 1e-6
+    assert (1.0 - law.fraction(start)) / start == pytest.approx(law.initial_slope, rel=1e-5)
+    steepest = (-np.diff(f) / np.diff(u)).max() / law.initial_slope
+    assert max(1.0, steepest) == pytest.approx(law.steepening, rel=1e-2)
+    for scale, value in (("critical_slip", 2e-6), ("fracture_energy", 0.7)):
+        rate = law.weakening_rate_of(drop, scale, value)
+        critical = law.critical_slip_of(drop, rate)
+        spent = law.dissipated(np.full(3, 60.0 * critical[0]), drop, rate)
+        assert {"critical_slip": critical, "fracture_energy": spent}[scale] == pytest.approx(
+            np.full(3, value), rel=1e-9
+        )
+        slip = np.linspace(0.0, 1.5, 40)[:, None] * critical
+        energy = law.dissipated(slip, drop, rate)
+        np.testing.assert_allclose(
+            energy, drop * critical * law.area(slip / critical), rtol=1e-9
+        )
+
+
+@pytest.mark.parametrize("name", STRENGTHS)
+def test_a_marginal_agrees_with_itself(name):
+    marginal, q = STRENGTHS[name], np.array([1e-9, 1e-3, 0.2, 0.5, 0.9, 1.0 - 1e-6])
+    distribution = marginal.distribution
+    x = distribution.ppf(q)
+    np.testing.assert_allclose(distribution.cdf(x), q, rtol=1e-7)
+    step = 1e-4 * np.ptp(x)
+    inside = x[1:-1]
+    slope = (distribution.cdf(inside + step) - distribution.cdf(inside - step)) / (2.0 * step)
+    np.testing.assert_allclose(slope, distribution.pdf(inside), rtol=2e-2)
+    for key, value in {"mean": distribution.mean(),
+                       "cv": distribution.std() / distribution.mean()}.items():  # fmt: skip
+        if hasattr(marginal, key):
+            assert value == pytest.approx(getattr(marginal, key), rel=1e-6), key
+    field = st.RandomField(marginal, DENSITIES["power_law"])
+    mean, square = (quad(lambda p, n=n: distribution.ppf(p) ** n, 0.0, 1.0, limit=400)[0]
+                    for n in (1, 2))  # fmt: skip
+    assert field.mean == pytest.approx(mean, rel=1e-4)
+    assert field.standard_deviation == pytest.approx(np.sqrt(square - mean**2), rel=2e-3)
+    low, high = getattr(marginal, "low", 0.0) or 0.0, getattr(marginal, "high", None) or np.inf
+    rows = field.sample(st.Interface(0.05, 256), samples=50, seed=1)
+    assert low <= rows.min() < rows.max() <= high
+
+
+@pytest.mark.parametrize("dimensions", [1, 2])
+@pytest.mark.parametrize("name", DENSITIES)
+def test_a_spectrum_agrees_with_itself(name, dimensions):
+    spectrum = DENSITIES[name]
+
+    def power(end):
+        def g(k):
+            return float(spectrum.density(np.array([k]), dimensions)[0]) * k ** (dimensions - 1)
+
+        edges = np.concatenate(([0.0], np.geomspace(1.0, end, 40)))
+        return sum(quad(g, *pair)[0] for pair in pairwise(edges))
+
+    whole = power(1e9)
+    for share in (0.3, 0.8, spectrum.power_kept or spectrum.default_power):
+        k = spectrum.quantile(share, dimensions)
+        assert spectrum.power_within(k, dimensions) == pytest.approx(share, rel=1e-9)
+        assert power(k) / whole == pytest.approx(share, rel=1e-3)
+    end = spectrum.power_within(spectrum.cutoff(dimensions), dimensions)
+    assert end == pytest.approx(spectrum.power_kept or spectrum.default_power, rel=1e-9)
+    if dimensions == 1:
+        length = spectrum.efolding_length
+        assert spectrum.correlation(np.array([0.0, length])) == pytest.approx(
+            [1.0, np.exp(-1.0)], rel=1e-9
+        )
+        assert spectrum.with_efolding_length(2e-3).efolding_length == pytest.approx(2e-3)
+        lag = np.array([0.0, 0.001, 0.004])
+        wide = type(spectrum)(**{
+            key: value for key, value in vars(spectrum).items()
+            if key in ("correlation_length", "exponent")
+        } | {"power_kept": 0.999999})  # fmt: skip
+        np.testing.assert_allclose(
+            wide.correlation(lag), spectrum.untruncated_correlation(lag), atol=5e-3
+        )

@@ -1,0 +1,155 @@
+"""Laws of the parameters of public calls: a parameter without another value here fails."""
+
+from __future__ import annotations
+
+import inspect
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from contracts.bodies import BODIES, FIELD, attempt
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+LINE, OTHER = BODIES["line"], BODIES["line with ends"]
+LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
+WEAKER = st.RandomField(st.Lognormal(mean=0.9e6, cv=0.2), st.PowerLawSpectrum(4e-3))
+ROWS = FIELD.sample(LINE.interface, samples=2, seed=2)
+RECORDS = FIELD.sample(st.Interface(0.06, 256), samples=2, seed=3)
+NOISY = RECORDS + 1e4 * np.random.default_rng(1).standard_normal(RECORDS.shape)
+PEAKS = [5.9e5, 6.2e5, 6.6e5, 7.1e5]
+PRIOR, SECOND = {"marginal.low": (5.6e5, 7.2e5)}, {"marginal.low": (5e5, 7.2e5)}
+DRAWN = {"problem": LINE, "random": FIELD, "method": LOCAL}
+BASE: dict[str, dict[str, Any]] = {  # public call: arguments of a cheap example
+    "onset": {"problem": LINE, "profiles": ROWS, "method": LOCAL},
+    "equilibrium_path": {"problem": LINE, "profiles": ROWS[0], "loads": [3e5, 6e5]},
+    "simulate_rupture": {
+        "problem": LINE, "profiles": ROWS[0], "method": st.Rupture(loading_rate=1e9),
+        "save": st.Save(["slip"]),
+    },
+    "monte_carlo": DRAWN | {"samples": 40, "pilot": False},
+    "failure_probability": DRAWN | {"stress": 6.6e5, "target_cv": 0.4},
+    "design_stress": DRAWN | {"probability": 0.1, "target_cv": 0.4},
+    "failure_curve": DRAWN | {"smallest": 0.1, "target_cv": 0.4},
+    "fit_field": {
+        "profiles": NOISY, "interface": st.Interface(0.06, 256), "marginal": "lognormal",
+        "spectrum": "exponential", "noise": False, "bootstrap": 20,
+    },
+    "infer": DRAWN | {"peaks": PEAKS, "prior": PRIOR, "samples": 200},
+    "design_of_tests": DRAWN | {
+        "prior": PRIOR, "designs": {"few": 3}, "repetitions": 10, "samples": 100,
+        "load_cell_error": 9.0,
+    },
+}  # fmt: skip
+OTHERS: dict[str, Any] = {  # parameter: another value, for all calls or by call
+    "problem": OTHER, "random": WEAKER, "method": EXACT, "samples": 150, "seed": 5, "first": 2,
+    "keep": ["strength"], "pilot": True, "profiles": 0.98 * ROWS, "loads": [3e5, 5.5e5],
+    "stress": 6.4e5, "friction_coefficient": 0.31, "force": 270.0, "target_cv": 0.05,
+    "probability": 0.2, "max_evaluations": 100, "algorithm": "subset", "smallest": 0.02,
+    "sensitivities": True, "save": st.Save(["slip"], every=2), "event": 0,
+    "interface": st.Interface(0.05, 256), "marginal": "gamma", "spectrum": "power_law",
+    "detrend": 1, "noise": 2e4, "anisotropy": 2.0, "between": True, "bootstrap": 30,
+    "quantity": "residual_strength", "peaks": [6e5, 6.3e5, 6.6e5, 7.1e5], "prior": SECOND,
+    "load_cell_error": 3e4, "unit": "kPa", "designs": {"more": 6}, "repetitions": 12,
+}  # fmt: skip
+BY_CALL: dict[tuple[str, str], Any] = {
+    ("equilibrium_path", "method"): st.Rupture(),
+    ("simulate_rupture", "method"): st.Rupture(loading_rate=3e9),
+    ("simulate_rupture", "profiles"): 0.98 * ROWS[0],
+    ("fit_field", "profiles"): 1.02 * NOISY,
+    ("equilibrium_path", "profiles"): 0.98 * ROWS[0],
+    ("monte_carlo", "samples"): 41,
+    ("infer", "between"): {"strength": st.Lognormal(mean=1.0, cv=0.1)},
+    ("design_of_tests", "designs"): {"few": 6},
+}
+REPLACES = {"friction_coefficient": "stress", "force": "stress"}
+"""Parameters that are given in place of another one."""
+SILENT = {("design_of_tests", "probability"), ("design_stress", "confidence")}
+"""Used for a fit or a posterior, and for counted specimens only, as their docstrings say."""
+READERS = {"read_profile", "read_peaks", "read_curve", "open_run"}
+"""Calls that read files, see tests/user and tests/fuzz."""
+WITHOUT_EFFECT = {"workers", "executor", "progress"}
+"""Parameters that change no number."""
+PARAMETERS = [
+    (call, name) for call in BASE for name in inspect.signature(getattr(st, call)).parameters
+]
+
+
+def ask(call: str, **changes: Any) -> Any:
+    given = BASE[call] | changes
+    if "progress" in inspect.signature(getattr(st, call)).parameters:
+        given = {"progress": False} | given
+    return getattr(st, call)(**{k: v for k, v in given.items() if v is not None})
+
+
+@cache
+def example(call: str) -> Any:
+    return ask(call)
+
+
+def numbers(result: Any) -> str:
+    """All numbers of a result, as text."""
+    if isinstance(result, xr.Dataset):
+        pilot = {key: value for key, value in result.attrs.items() if key.startswith("pilot")}
+        return repr((result.drop_attrs().to_dict(), pilot))
+    return repr(result.to_dict())
+
+
+def test_every_public_call_has_an_example_and_every_parameter_another_value():
+    calls = {name for name in st.__all__ if inspect.isfunction(getattr(st, name))}
+    assert calls == BASE.keys() | READERS
+    names = {name for _, name in PARAMETERS}
+    silent = {name for _, name in SILENT} - OTHERS.keys()
+    assert names - WITHOUT_EFFECT - silent == OTHERS.keys() & names
+    assert names >= WITHOUT_EFFECT | OTHERS.keys() - {"event"}
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [pair for pair in PARAMETERS if pair[1] not in WITHOUT_EFFECT and pair not in SILENT],
+)
+def test_each_parameter_counts_or_is_refused_by_its_name(call, name):
+    changes = {name: BY_CALL.get((call, name), OTHERS[name])}
+    if name in REPLACES:
+        changes[REPLACES[name]] = None
+    result, refusal = attempt(lambda: ask(call, **changes))
+    if refusal:
+        assert name in refusal
+    else:
+        assert numbers(result) != numbers(example(call)), f"{name} has no effect"
+
+
+@pytest.mark.parametrize(
+    "call", [call for call, name in PARAMETERS if name in ("workers", "executor")]
+)
+def test_workers_change_no_number(call):
+    names = inspect.signature(getattr(st, call)).parameters
+    assert numbers(ask(call, workers=2)) == numbers(ask(call, workers=1))
+    if "executor" in names:
+        with ThreadPoolExecutor(2) as executor:
+            assert numbers(ask(call, executor=executor)) == numbers(ask(call))
+
+
+@pytest.mark.parametrize("call", [call for call, name in PARAMETERS if name == "progress"])
+def test_progress_rises_to_its_total_and_changes_no_number(call):
+    seen: list[tuple[int, int]] = []
+    result = ask(call, progress=lambda done, total: seen.append((done, total)))
+    assert numbers(result) == numbers(example(call))
+    assert seen
+    for done, total in seen:
+        assert 0 <= done <= (total or done)  # a total of 0 is not known
+    assert seen[-1][0] == (seen[-1][1] or seen[-1][0])
+
+
+def test_first_continues_an_ensemble():
+    whole, rest = ask("monte_carlo", samples=6), ask("monte_carlo", first=4, samples=2)
+    assert whole.isel(sample=slice(4, 6)).drop_attrs().identical(rest.drop_attrs())
+
+
+@pytest.mark.parametrize("call", ["failure_probability", "design_stress"])
+def test_no_call_takes_more_evaluations_than_it_may(call):
+    assert ask(call, max_evaluations=150, target_cv=0.05).evaluations <= 150
