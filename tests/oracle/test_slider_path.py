@@ -114,7 +114,7 @@ def test_a_machine_unloads_as_in_load_steps():
         assert peaks[-1] < stops[-1].load
 
 
-@pytest.mark.parametrize("seed", [285, 10624])
+@pytest.mark.parametrize("seed", [285, 2101])
 def test_an_edge_closes_where_the_rest_is_unstable(seed):
     # A rigid plate, a push at 30 mm and 1 MPa. The inverse has a negative entry at the edge.
     plain, rng, n = rig("plate", 32, 16), np.random.default_rng(seed), 32
@@ -127,7 +127,10 @@ def test_an_edge_closes_where_the_rest_is_unstable(seed):
     friction = Friction(np.maximum(peak, 0.25), np.full(n, 0.2), weakening)
     start = press(make_matrices(plain.K, plain.T_p), friction, N)
     contact = begin_push(make_matrices(plain.K, plain.T), start)
-    to_the_end(contact)
+    stops = to_the_end(contact)
+    # Otherwise a jump would come to rest in a state that jumps at the same load.
+    onsets = [stop.load for stop in stops if stop.status == Status.UNSTABLE]
+    assert np.diff(onsets).min() > 1e-9 * N
     assert contact.counts[N_BORDERED_AGAIN] > 0
     compare(plain.K, plain.T, friction, start)
 
