@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import stiction as st
-from stiction.base.variables import FORCES, OF_WHOLE_INTERFACE
 from stiction.methods.dynamics.method import make_run
 from stiction.problem.resolution import nodes_in_nucleation_length
 
@@ -84,21 +83,6 @@ def results(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", BODIES)
-def test_a_force_is_its_stress_on_the_area_that_carries_it(name):
-    problem = BODIES[name][0]
-    interface = problem.interface
-    depth = problem.specimen.thickness if problem.specimen else interface.width
-    nodes = {True: interface.size, False: int(interface.breakable.sum())}
-    for call, result in results(name).items():
-        stresses = {stress for stress in FORCES if stress in result}
-        assert stresses, call
-        for stress in stresses:
-            area = nodes[stress in OF_WHOLE_INTERFACE] * interface.spacing * depth
-            force = result[FORCES[stress][0]]
-            np.testing.assert_allclose(force, result[stress] * area, rtol=1e-9, err_msg=call)
-
-
-@pytest.mark.parametrize("name", BODIES)
 def test_means_and_forces_are_those_of_the_stress_at_the_nodes(name):
     """At rest, before the first frame of an event and at each load of a path."""
     problem = BODIES[name][0]
@@ -117,30 +101,6 @@ def test_means_and_forces_are_those_of_the_stress_at_the_nodes(name):
             whole = nodes.sum(axis=1) * interface.spacing * problem.specimen.thickness
             travel = result.travel + whole / problem.specimen.drive.stiffness
             np.testing.assert_allclose(result.crosshead_travel, travel, rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", BODIES)
-def test_an_event_has_the_same_variables_and_values_by_every_call(name):
-    found = results(name)
-    problem = BODIES[name][0]
-    calls = [
-        call for call in found if problem.specimen is not None or call != "equilibrium_path"
-    ]
-    tables = {
-        call: {
-            key: values.values for key, values in found[call].items() if "event" in values.dims
-        }
-        for call in calls
-    }
-    first = tables.pop("onset")
-    count = int(np.isfinite(first["event_load"]).sum())
-    assert count > 0
-    for call, table in tables.items():
-        assert set(table) == set(first), call
-        for key, values in table.items():
-            np.testing.assert_allclose(
-                values[:count], first[key][:count], rtol=1e-6, err_msg=f"{call} {key}"
-            )
 
 
 @pytest.mark.parametrize("name", [name for name in BODIES if "blocks" in name])
@@ -211,19 +171,6 @@ def test_an_extent_and_its_mirror_image_have_mirrored_nodes(extent, mirrored):
         st.Interface(lengths, shape, extent=ends).breakable for ends in (extent, mirrored)
     )
     np.testing.assert_array_equal(other, np.roll(one[::-1], 1, axis=0))
-
-
-@pytest.mark.parametrize("name", BODIES)
-def test_a_bound_by_strength_holds_wherever_a_method_promises_it(name):
-    problem, method = BODIES[name]
-    for way in (method, st.Equilibrium()):
-        below, above = way.bounded_by_strength(problem, "critical_stress")
-        assert not (problem.interface.is_held and (below or above))
-        sample = problem.sample(rough(problem.interface.size)[None])
-        load = ((sample.strength - sample.initial_stress) / sample.load_profile).min()
-        stress = st.onset(problem, sample, method=way, progress=False).critical_stress.item()
-        assert not below or stress >= sample.mean_stress(np.array([load])).item() * (1 - 1e-9)
-        assert not above or stress <= sample.mean(sample.strength).item() * (1 + 1e-9)
 
 
 def fault(mode: str = "III") -> tuple[st.Problem, Any]:

@@ -122,20 +122,6 @@ def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):
     assert spectrum.max() > 0.5 * released
 
 
-def test_tables_have_a_row_for_each_event(run, tmp_path):
-    frame = st.external.event_table(run)
-    assert frame["event_moment (N)"].tolist() == run.event_moment.values.tolist()
-    problem, strength, method = fault(events=3)
-    rows = np.stack([strength, strength[::-1]])
-    result = st.onset(problem, rows, method=method)
-    frame = st.external.event_table(result)
-    assert len(frame) == np.isfinite(result.event_load).sum()
-    assert set(frame["sample (1)"]) == {0, 1}
-    np.testing.assert_allclose(frame["event_moment (N)"][0], run.event_moment[0], rtol=1e-2)
-    with pytest.raises(st.InputError, match="events="):
-        st.external.event_table(st.onset(problem, rows, method=fault()[2]))
-
-
 def test_films_scale_to_what_breaks_and_files_name_their_problem(run, tmp_path):
     stress = _line_film(run)[0].axes[0]
     broken = np.isfinite(run.peak_strength)

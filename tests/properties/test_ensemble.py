@@ -83,13 +83,6 @@ def test_workers_and_executors_do_not_change_a_bit(arguments, reference, workers
     assert result.attrs == reference.attrs
 
 
-def test_an_executor_does_not_change_a_bit_of_a_curve(arguments):
-    given = arguments | {"smallest": 0.02, "target_cv": 0.5}
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        curve = st.failure_curve(**given, executor=pool)
-    assert curve.identical(st.failure_curve(**given))
-
-
 @settings(max_examples=10, deadline=None)
 @given(first=some.integers(0, 900), samples=some.integers(1, 400))
 def test_any_batch_is_a_part_of_the_whole(first, samples):
