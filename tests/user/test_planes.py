@@ -19,7 +19,7 @@ TWO = np.stack([PLANE_STRENGTH, 1.04 * np.roll(PLANE_STRENGTH, (5, 7), (0, 1))])
 
 def test_bounds_that_do_not_close_are_warned_of_with_their_distance(monkeypatch):
     # As if Newton's method and bisection had got nowhere.
-    monkeypatch.setattr(search, "close", lambda *a, **k: (False, 0.0))
+    monkeypatch.setattr(search, "close_by_newton", lambda *a, **k: (False, 0.0))
     monkeypatch.setattr(search, "_narrow", lambda *a, **k: 0.0)
     with pytest.warns(st.AccuracyWarning, match=r"2 of 2 samples \(0, 1\).*apart"):
         found = exact_onset(PLANE, TWO)

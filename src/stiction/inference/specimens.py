@@ -512,7 +512,7 @@ class WithFactors:
         Examples
         --------
         >>> import stiction as st
-        >>> problem = st.paper.problem(nodes=64)
+        >>> problem = st.paper.problem(nodes=512)
         >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
         >>> tests = st.infer(
         ...     problem, strength, [0.70e6, 0.71e6, 0.74e6], method=st.LocalCriterion(), samples=100
