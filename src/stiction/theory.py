@@ -18,11 +18,7 @@ from stiction.methods.criterion.windows import windows_of
 from stiction.problem.problem import Problem, refuse_specimen
 from stiction.random.fields import RandomField
 
-__all__ = [
-    "griffith_length",
-    "nucleation_statistics",
-    "nucleation_stress",
-]
+__all__ = ["griffith_length", "nucleation_statistics", "nucleation_stress"]
 
 
 def __dir__() -> list[str]:  # what completion lists

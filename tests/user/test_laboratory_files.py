@@ -137,12 +137,7 @@ def test_maps_without_headings(tmp_path):
     for options in ({"interface": interface}, {}):
         given = read(tmp_path, "\n".join(lines), **options)
         np.testing.assert_array_equal(given, heights)
-    size = "# Channel: Height\n# Width: 8.00 mm\n# Height: 10.00 mm\n# Value units: Pa\n"
     matrix = "\n".join("\t".join(f"{v:.12g}" for v in row) for row in heights.T)
-    for options in ({}, {"interface": interface}):
-        given = read(tmp_path, size + matrix, **options)
-        np.testing.assert_array_equal(given, heights)
-        np.testing.assert_allclose(given.y, interface.coordinates["y"])
     refuses("np.loadtxt(path).T", lambda: read(tmp_path, matrix, interface=interface))
 
 

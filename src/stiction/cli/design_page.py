@@ -30,11 +30,7 @@ LIGHT = ("positive entries",)
 
 
 def write_page(
-    design: Answer,
-    place: Path,
-    evidence: Sequence[Any],
-    sources: Mapping[str, str],
-    title: str,
+    design: Answer, place: Path, evidence: Sequence[Any], sources: Mapping[str, str], title: str
 ) -> Path:
     """Write a design as an HTML page. See `Answer.write_page`."""
     if not design.of_stress:

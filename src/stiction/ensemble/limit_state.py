@@ -257,11 +257,7 @@ def solve_part(state: LimitState, draws: Array) -> Table:
 
 
 @checked
-def limit_state(
-    problem: Problem,
-    random: AnyRandom,
-    method: MethodObject,
-) -> LimitState:
+def limit_state(problem: Problem, random: AnyRandom, method: MethodObject) -> LimitState:
     """Make a function that maps standard normal draws to the stress at onset.
 
     External reliability codes can call it. Failure below a stress s is

@@ -22,11 +22,7 @@ from stiction.base.errors import (
 )
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
 from stiction.base.progress import Meter, Show, duration
-from stiction.ensemble.batches import (
-    solve_spans,
-    spans_of,
-    usable_cores,
-)
+from stiction.ensemble.batches import solve_spans, spans_of, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.pilot import compare, pilot_doubt

@@ -576,9 +576,7 @@ def _curve(name: str, readings: Readings, noise: float | None, split: Split | No
     noise, threshold = _threshold(force, noise)
     top = int(np.argmax(force))
     # 3.
-    starts, ends = turning_points(force, threshold)
-    before = starts < top
-    starts, ends = starts[before], ends[before]
+    starts, ends = precursors(force, threshold)
     # 4.
     begin = int(ends.max(initial=0))
     peak, error = _peak(force[begin:], top - begin, noise, threshold)
@@ -642,11 +640,17 @@ def _doubt_readings(
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
     """Return number of precursors, largest size, and force at the first precursor or else
     the peak."""
+    starts, ends = precursors(force, threshold)
+    sizes = force[starts] - force[ends]
+    first = force[starts[0]] if sizes.size else force.max()
+    return float(sizes.size), float(sizes.max(initial=0.0)), float(first)
+
+
+def precursors(force: Array, threshold: float) -> tuple[Any, Any]:
+    """Return the readings at which drops before the peak begin and end (step 3)."""
     starts, ends = turning_points(force, threshold)
     before = starts < int(np.argmax(force))
-    sizes = force[starts[before]] - force[ends[before]]
-    first = force[starts[before][0]] if sizes.size else force.max()
-    return float(sizes.size), float(sizes.max(initial=0.0)), float(first)
+    return starts[before], ends[before]
 
 
 def noise_of(force: Array) -> float:

@@ -67,9 +67,7 @@ class PosteriorGrid:
 
 
 def grid_of(
-    function: Callable[[Array], Array],
-    box: Array,
-    points: int = GRID_POINTS,
+    function: Callable[[Array], Array], box: Array, points: int = GRID_POINTS
 ) -> PosteriorGrid | None:
     """Return the posterior from a log density at points (points, parameters) in a box, or None.
 

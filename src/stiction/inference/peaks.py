@@ -310,18 +310,12 @@ def _of_table(
     )
     if len(lengths) > 1 or len(names) > 1:
         raise InputError(unclear(columns, "specimen or its length", "value", lengths + names))
-    used |= dict(zip(("length",), lengths, strict=False))
-    used |= dict(zip(("specimen",), names, strict=False))
+    used |= dict(zip(["length"] * len(lengths) + ["specimen"], lengths + names, strict=False))
     _refuse_curve(columns, [peak, *used.values()])
     if texts := [c.text for c in (peak, *lengths, *filter(None, [force])) if c.text]:
         raise InputError(texts)
-    values, si = column_in_si(
-        replace(peak, values=without_missing(peak.values, options)),
-        "peak",
-        unit,
-        VARIABLES,
-        "unit",
-    )
+    known = replace(peak, values=without_missing(peak.values, options))
+    values, si = column_in_si(known, "peak", unit, VARIABLES, "unit")
     # A stated word or number marks a test without a peak. Any other NaN
     # is a mistake.
     kept = ~np.isnan(values) if options.missing is not None else np.ones(values.size, np.bool_)

@@ -101,8 +101,7 @@ def monte_carlo(
             style: Any = {"linestyle": "none", "marker": "|", "markersize": 14.0, "color": INK}
             label = f"{peaks.size} tests"
             axes.plot(peaks * factor, np.zeros(peaks.size), label=label, clip_on=False, **style)
-        axes.set_xlabel(text)
-        axes.set_ylabel(f"density (1/{unit})" if unit else "density")
+        axes.set(xlabel=text, ylabel=f"density (1/{unit})" if unit else "density")
         axes.set_ylim(bottom=0.0)
         if axes.get_legend_handles_labels()[1]:
             axes.legend(title=scaled(dataset[along[0]])[2] if along else None)
@@ -204,8 +203,7 @@ def quantiles(
             axes.fill_between(place, values[1], values[3], alpha=pale, **band)
             style = {"capsize": 2, "label": label, **series(number, marker=True)}
             axes.errorbar(place, values[2], yerr=errors, **style)
-        axes.set_xlabel(name)
-        axes.set_ylabel(text)
+        axes.set(xlabel=name, ylabel=text)
         if not by_name and place.min() > 0.0 and place.max() >= 4.0 * place.min():
             axes.set_xscale("log")
         if by_name or place.size <= 8:  # powers of ten would not name the steps
@@ -347,8 +345,7 @@ def failure_curve(
             axes.axvline(stress * factor, color=ACCENT, linewidth=0.9, label=text)
         axes.set_yscale("log")
         axes.set_ylim(0.5 * float(chance.min()), 1.0)
-        axes.set_xlabel(f"stress $s$ ({unit})")
-        axes.set_ylabel(r"$P(\tau_{\mathrm{cr}} < s)$")
+        axes.set(xlabel=f"stress $s$ ({unit})", ylabel=r"$P(\tau_{\mathrm{cr}} < s)$")
         if area is not None:
             scale, name = unit_for("N", x / factor * area)
             add_scale(axes, "x", area * scale / factor, with_unit("shear force", name))

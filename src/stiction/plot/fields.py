@@ -136,8 +136,7 @@ def name_line(axes: Axes, interface: Interface, text: str) -> None:
     """Label the scales of profiles along a line."""
     factor, unit = unit_for("m", interface.lengths)
     axes.set_xlim(0.0, interface.measure * factor)
-    axes.set_xlabel(f"position $x$ ({unit})")
-    axes.set_ylabel(text)
+    axes.set(xlabel=f"position $x$ ({unit})", ylabel=text)
 
 
 def draw_map(
@@ -152,8 +151,7 @@ def draw_map(
     axes.figure.colorbar(
         drawn, ax=axes, label=text, location="bottom", shrink=0.8, pad=0.02, aspect=40
     )
-    axes.set_xlabel(f"$x$ ({unit}), direction of slip")
-    axes.set_ylabel(f"$y$ ({unit})")
+    axes.set(xlabel=f"$x$ ({unit}), direction of slip", ylabel=f"$y$ ({unit})")
     axes.autoscale(False)  # whatever is drawn beyond it
     return drawn
 

@@ -18,16 +18,7 @@ from stiction.inference.fit import FieldFit
 from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.whittle import Observed, periodograms_of
 from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
-from stiction.plot.style import (
-    ACCENT,
-    INK,
-    PAGE,
-    PALE,
-    QUIET,
-    color,
-    panel,
-    paper_style,
-)
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, panel, paper_style
 
 SHOWN = 100
 """Repetitions, or simulated records, behind a band that contains 90 % of them."""
@@ -110,12 +101,20 @@ def _peaks(axes: Axes, peaks: Peaks, rng: np.random.Generator) -> None:
             place, *band, color=paint, alpha=0.2, linewidth=0.0, label=f"90 % of fits{of}"
         )
         axes.plot(place, ndtr((at - mean) / spread), color=paint, label=f"log-normal{of}")
-        steps = np.r_[place[0], np.sort(values) * factor, place[-1]]
-        shares = np.minimum(np.arange(values.size + 2) / values.size, 1.0)
-        axes.step(steps, shares, where="post", color=INK, label=f"{values.size} tests{of}")
-    axes.set_ylim(0.0, 1.02)
+        _steps(axes, np.r_[place[0], np.sort(values) * factor, place[-1]], of, color=INK)
+    _name_scales(axes, peaks, unit)
+
+
+def _steps(axes: Axes, steps: Array, of: str, **style: Any) -> None:
+    """Draw the share of tests up to each peak. `steps` also holds both ends of the drawing."""
+    count = steps.size - 2
+    shares = np.minimum(np.arange(steps.size) / count, 1.0)
+    axes.step(steps, shares, where="post", label=f"{count} tests{of}", **style)
+
+
+def _name_scales(axes: Axes, peaks: Peaks, unit: str) -> None:
     name = "coefficient of friction" if peaks.unit == "1" else "peak"
-    axes.set(xlabel=with_unit(name, unit), ylabel="share of tests up to it")
+    axes.set(ylim=(0.0, 1.02), xlabel=with_unit(name, unit), ylabel="share of tests up to it")
     axes.legend()
 
 
@@ -192,8 +191,7 @@ def _correlation(
     spread = [_pooled_correlation(lag, some, _powers(some)) for some in simulated]
     _compare(axes, lag * factor, measured, fitted, spread, "measured", "fitted")
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
-    axes.set_xlabel(with_unit("lag along x", unit))
-    axes.set_ylabel("correlation in the window")
+    axes.set(xlabel=with_unit("lag along x", unit), ylabel="correlation in the window")
     axes.legend()
 
 
@@ -303,16 +301,9 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
             margin = 0.05 * (high - low)
             ends += [(low - margin) * factor, (high + margin) * factor]
             steps = np.concatenate(([low - margin], np.sort(values), [high + margin])) * factor
-            reached = np.minimum(np.arange(values.size + 2) / values.size, 1.0)
-            style = {"color": INK if number == 0 else paint, "linewidth": 1.2}
-            axes.step(steps, reached, where="post", label=f"{values.size} tests{of}", **style)
+            _steps(axes, steps, of, color=INK if number == 0 else paint, linewidth=1.2)
         axes.set_xlim(min(ends), max(ends))
-        axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel(
-            with_unit("coefficient of friction" if peaks.unit == "1" else "peak", unit)
-        )
-        axes.set_ylabel("share of tests up to it")
+        _name_scales(axes, peaks, unit)
         p = result.p_values["cramer_von_mises"]
         axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
-        axes.legend()
     return axes

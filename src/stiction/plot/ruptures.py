@@ -270,11 +270,7 @@ def crack_moment(problem: Problem, drop: float, sizes: Array) -> Array:
 
 
 def film(
-    run: xr.Dataset,
-    path: str | Path,
-    *,
-    frames: int = 160,
-    progress: Show = True,
+    run: xr.Dataset, path: str | Path, *, frames: int = 160, progress: Show = True
 ) -> Path:
     """Write a film of the stress and the slip rate in a rupture.
 
@@ -445,8 +441,7 @@ def _line_film(run: xr.Dataset) -> tuple[Figure, Moving]:
     first, last = x[breaks[0]], x[breaks[-1]] + x[1] - x[0]
     beside = 0.05 * (last - first) * (breaks.size < x.size)
     below.set_xlim(first - beside, last + beside)
-    below.set_xlabel(f"position $x$ ({length_unit})")
-    below.set_ylabel("slip rate (m/s)")
+    below.set(xlabel=f"position $x$ ({length_unit})", ylabel="slip rate (m/s)")
     return figure, [(line, "ydata", stress), (slip, "ydata", slip_rate), _clock(figure, run)]
 
 

@@ -31,11 +31,7 @@ from stiction.problem.specimen import Pusher, Slider
 
 
 def specimen(
-    problem: Problem,
-    strength: Any = None,
-    result: xr.Dataset | None = None,
-    *,
-    sample: int = 0,
+    problem: Problem, strength: Any = None, result: xr.Dataset | None = None, *, sample: int = 0
 ) -> NDArray[Any]:
     """Draw a specimen and its drive, and the shear and pressure on the interface.
 

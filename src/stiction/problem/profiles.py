@@ -30,14 +30,7 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.base.model import (
-    FilePath,
-    Number,
-    as_numbers,
-    check,
-    checked,
-    real_array,
-)
+from stiction.base.model import FilePath, Number, as_numbers, check, checked, real_array
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.reading.columns import Wanted
@@ -254,8 +247,7 @@ def read_profile(
         ``.xlsx`` file has columns, with or without a line of
         names such as ``x (mm), strength (MPa)``. A ``.nc`` file
         has variables with `units`, and x as a coordinate. A map
-        over 'x' and 'y' is a table with both as columns, a matrix
-        below comments that state its width and height (Gwyddion), or
+        over 'x' and 'y' is a table with both as columns, or
         a binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
         Heading, name or number (from 0) of the column, coordinate or

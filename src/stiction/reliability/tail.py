@@ -50,8 +50,6 @@ from stiction.reliability.two_level import bridge
 
 FREQUENT = 0.01
 """Probability above which counting needs no more evaluations than subset simulation."""
-UNLIMITED_EVALUATIONS = 10**18
-"""More evaluations than any repetition needs."""
 SIZE_MARGIN = 1.1
 """Factor on the sample size, because the variance so far is itself an estimate."""
 DEEPER = 0.3
@@ -430,37 +428,24 @@ def _repetitions(
         tail = Tail(repetitions)
         return tail.cv(tail.quantile(goal.probability) if goal.probability else goal.stress)
 
+    def make(samples: int, number: int, max_evaluations: int) -> Descent:
+        # 2. A repetition depends only on the seed, the kind and its number.
+        options: dict[str, Any] = {
+            "samples": samples, "max_evaluations": max_evaluations, "threshold": goal.stress,
+            "floor": state.bounds[0], "label": state.member,
+            "rng": generator(state.experiment.seed, sizes.key, number),
+        }  # fmt: skip
+        chance = goal.probability
+        with one_blas_thread():  # the number of threads changes the last bits
+            if guide is None:
+                return descend(state, state.dimension, probability=DEEPER * chance, **options)
+            return bridge(guide, state, state.dimension, probability=chance, **options)
+
     # Take fewer samples if the budget would not allow four levels.
     return repeat_until_precise(
-        lambda *size: repetition(state, goal, guide, sizes.key, *size), judge, target_cv=goal.cv,
-        first=min(sizes.first, max(budget // 4, 20)), largest=sizes.largest,
-        max_evaluations=budget, meter=state.meter,
+        make, judge, target_cv=goal.cv, first=min(sizes.first, max(budget // 4, 20)),
+        largest=sizes.largest, max_evaluations=budget, meter=state.meter,
     )  # fmt: skip
-
-
-def repetition(
-    state: LimitState,
-    goal: Goal,
-    guide: LimitState | None,
-    key: int,
-    samples: int,
-    number: int,
-    max_evaluations: int = UNLIMITED_EVALUATIONS,
-) -> Descent:
-    """Return a repetition down to the goal. It depends only on seed, key and number (step 2)."""
-    options: dict[str, Any] = {
-        "samples": samples,
-        "max_evaluations": max_evaluations,
-        "threshold": goal.stress,
-        "floor": state.bounds[0],
-        "label": state.member,
-        "rng": generator(state.experiment.seed, key, number),
-    }
-    chance = goal.probability
-    with one_blas_thread():  # the number of threads changes the last bits
-        if guide is None:
-            return descend(state, state.dimension, probability=DEEPER * chance, **options)
-        return bridge(guide, state, state.dimension, probability=chance, **options)
 
 
 def _share_failing(descent: Descent) -> float:

@@ -9,9 +9,7 @@ from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
-_HOMES = {
-    "agreement": "stiction.inference.agreement",
-}
+_HOMES = {"agreement": "stiction.inference.agreement"}
 
 __all__ = ["agreement"]
 

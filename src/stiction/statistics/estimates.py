@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.stats
@@ -13,15 +12,13 @@ from scipy.ndimage import gaussian_filter1d
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Real, RealArray, check, checked
-from stiction.base.representation import Result, Row, Summary, brief
 
 GRID_CELLS = 4096
 KERNEL_END = 8.0
 """End of the kernel, in standard deviations."""
 
 
-@dataclass(frozen=True)
-class WithError:
+class WithError(NamedTuple):
     """Estimated number and its standard error, which is zero if the number is exact."""
 
     value: float
@@ -58,38 +55,15 @@ def standard_deviation(values: Any) -> WithError:
     return WithError(s, error / (2.0 * s) if s else 0.0)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Quantiles(Result):
-    """Quantiles of a sample.
+class Quantiles(NamedTuple):
+    """Quantiles of a sample, and the ends of their 95 % confidence intervals, in its unit.
 
-    Attributes
-    ----------
-    probability : (m,) array
-    value : (m,) array
-        Quantiles of the sample, in the unit of the values.
-    lower, upper : (m,) arrays
-        Ends of the 95 % confidence intervals. An end is infinite if the
-        sample is too small to bound a quantile.
-    unit : str
-        Unit of the values, if they state a unit, as an
-        `xarray.DataArray` does.
+    An end is infinite if the sample is too small to bound a quantile.
     """
 
-    probability: Array
     value: Array
     lower: Array
     upper: Array
-    unit: str = ""
-
-    def _summary(self) -> Summary:
-        pairs = zip(self.lower.tolist(), self.upper.tolist(), strict=True)
-        rows = [
-            Row(f"{probability:g}", value, ends, self.unit)
-            for probability, value, ends in zip(
-                self.probability, self.value, pairs, strict=True
-            )
-        ]
-        return Summary("Quantiles of a sample", rows, "95 % interval")
 
 
 @checked
@@ -130,31 +104,16 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     padded = np.concatenate(([-np.inf], ordered, [np.inf]))
     value = np.quantile(ordered, p, method="median_unbiased")
     lower, upper = padded[np.clip(low, 0, n + 1)], padded[np.clip(high, 0, n + 1)]
-    return Quantiles(p, value, lower, upper, getattr(values, "attrs", {}).get("units", ""))
+    return Quantiles(value, lower, upper)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Density(Result):
-    """Estimated probability density.
+class Density(NamedTuple):
+    """Estimated probability density at the centres x of equal cells."""
 
-    Attributes
-    ----------
-    x, value : (m,) arrays
-        Centres of equal cells, in the unit of the values, and the
-        density there, 1/unit.
-    error : (m,) array
-        Standard error of the density from sampling, without the effect
-        of smoothing.
-    bandwidth : float
-        Standard deviation of the smoothing kernel, in the unit of the values.
-    """
-
-    x: Array
-    value: Array
-    error: Array
-    bandwidth: float
-
-    __repr__ = brief
+    x: Array  # in the unit of the values
+    value: Array  # 1/unit
+    error: Array  # standard error from sampling, without the effect of smoothing
+    bandwidth: float  # standard deviation of the smoothing kernel, in the unit of the values
 
 
 @checked

@@ -105,7 +105,6 @@ class Table(NamedTuple):
     columns: tuple[Column, ...]
     source: str
     lines: Array  # the number of the line of each row
-    comments: Sequence[str] = ()
     headed: bool = True  # whether columns have names
     left_out: tuple[str, ...] = ()  # rows that were not read, and why
     begins: tuple[int, ...] = ()  # lines at which tables begin, if remarks separate several

@@ -6,12 +6,11 @@ names and units follow no standard. A wrong choice would give a wrong
 number, so an ambiguous choice is refused. `labelled` takes these steps:
 
 1. Make the source a DataArray or a Dataset.
-2. Take a table without headings for a map if its comments say so.
-3. Choose the variable and its coordinates by the argument. Without an
+2. Choose the variable and its coordinates by the argument. Without an
    argument, choose by the name, and then by the unit.
-4. Name the dimensions 'x' and 'y', or 'row' for a list of points. The
+3. Name the dimensions 'x' and 'y', or 'row' for a list of points. The
    sample comes first.
-5. Convert values and coordinates to SI, and check them.
+4. Convert values and coordinates to SI, and check them.
 """
 
 from __future__ import annotations
@@ -23,17 +22,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import (
-    AccuracyWarning,
-    InputError,
-    UnitWarning,
-    prefixed,
-    warn_user,
-)
+from stiction.base.errors import AccuracyWarning, InputError, UnitWarning, prefixed, warn_user
 from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
 from stiction.problem.reading.columns import (
+    MAX_LISTED,
     Column,
     Reading,
     Table,
@@ -46,7 +40,7 @@ from stiction.problem.reading.columns import (
     unclear,
 )
 from stiction.problem.reading.files import HEIGHT, heights_of, load
-from stiction.problem.reading.tables import Options, name_and_unit, sizes_of, table_of_frame
+from stiction.problem.reading.tables import Options, name_and_unit, table_of_frame
 
 NAMES = {
     "strength": ("tau_p", "taup", "tau", "peak_strength", "shear_strength"),
@@ -75,8 +69,6 @@ SAID_BY_ROLE = {
     "strength": "friction", "friction_coefficient": "friction", "normal_pressure": "pressing force"
 }  # fmt: skip
 """Roles of columns that may hold a quantity, whatever they are called."""
-LISTED_COLUMNS = 20
-"""Names of columns in a message."""
 Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
 ]
@@ -84,8 +76,8 @@ TALL = 1e-3
 """Range of heights without a unit, m, above which they are probably in um or nm."""
 
 OF_A_PLANE = (
-    ". A map has columns or coordinates x and y, or is an .npy of shape (nx, ny), and needs an"
-    " interface of two lengths and two numbers of nodes"
+    ". A map has columns or coordinates x and y, or is an array (nx, ny), as np.loadtxt(path).T"
+    " reads a matrix, and needs an interface of two lengths and two numbers of nodes"
 )
 """Advice for two dimensions where a line was expected."""
 
@@ -257,10 +249,7 @@ def labelled(
             "holds heights. Pass strength=, a function that maps them to strengths (Pa), or keep"
             " them with quantity='height'"
         )
-    # 2. A table without headings may be a map.
-    if isinstance(data, Table):
-        data = _as_map(data, dims, value)
-    # 3. Choose the column and its coordinates by the rule.
+    # 2. Choose the column and its coordinates by the rule.
     lines: Any = ()
     read: Reading | None
     if isinstance(data, Table):
@@ -269,11 +258,11 @@ def labelled(
     else:
         array, read = _of_variables(data, quantity, dims, x, value)
     dims = dims or (("x", "y") if "y" in array.coords else ("x",))
-    # 4. Name the dimensions.
+    # 3. Name the dimensions.
     array = _directed(array, dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
-    # 5. Convert to SI, and check.
+    # 4. Convert to SI, and check.
     if options.missing is not None:
         array = array.copy(data=without_missing(array.values, options))
     values = in_si(array, quantity, QUANTITIES[quantity].units, unit)
@@ -315,35 +304,7 @@ def _of_array(values: Any, source: Any) -> Any:
     return xr.DataArray(array, dims=("x", "y")[: array.ndim])
 
 
-# -- step 2: maps --------------------------------------------------------------------------------
-
-
-def _as_map(table: Table, dims: Any, value: Wanted) -> Any:
-    """Return a matrix from a text file as a map. Return other tables unchanged.
-
-    Comments may state the width, the height and the unit of a map, as
-    Gwyddion writes them.
-    """
-    import xarray as xr
-
-    if table.headed or len(table.columns) < 2:
-        return table
-    sizes = sizes_of(table.comments)
-    if not {"width", "height"} <= sizes.keys():
-        if value is None and dims is not None and len(dims) == 2 and len(table.columns) != 3:
-            raise InputError(
-                f"holds {len(table.columns)} columns without names. Pass a map as columns x, y and"
-                " value, or as an array: np.loadtxt(path).T if each line has a single y"
-            )
-        return table
-    # Each line of the file has a single y.
-    array = xr.DataArray(np.stack([column.values for column in table.columns]), dims=("x", "y"))
-    for dim, name in (("x", "width"), ("y", "height")):
-        length, unit = sizes[name]
-        at = np.arange(array.sizes[dim]) * (length / array.sizes[dim])
-        array = array.assign_coords({dim: (dim, at, {"units": unit or "m"})})
-    array.attrs["units"] = sizes.get("value units", (1.0, ""))[1]
-    return array
+# -- step 2: the column and its coordinates -----------------------------------------------------
 
 
 def _is_map(columns: Sequence[Column]) -> bool:
@@ -353,9 +314,6 @@ def _is_map(columns: Sequence[Column]) -> bool:
         return all(np.unique(named[name]).size <= named[name].size // 2 for name in "01")
     both = len(named) > 2 and {"x", "y"} <= {*named}
     return both and np.unique(named["x"]).size < named["x"].size
-
-
-# -- step 3: the column and its coordinates ------------------------------------------------------
 
 
 def _of_table(
@@ -440,7 +398,7 @@ def _chosen(
         if bare and table and len(columns) == 3:
             places, chosen = {"x": columns[0], "y": columns[1]}, chosen or columns[2]
         if table and len(places) < 2:
-            listed = ", ".join(repr(column.label) for column in columns[:LISTED_COLUMNS])
+            listed = ", ".join(repr(column.label) for column in columns[:MAX_LISTED])
             raise InputError(f"has no columns x and y: got {listed}{OF_A_PLANE}")
     elif stated is not None:
         places = {"x": stated}
@@ -492,7 +450,7 @@ def _plain(name: Any) -> str:
     return str(name).casefold().replace(" ", "_")
 
 
-# -- step 4: dimensions --------------------------------------------------------------------------
+# -- step 3: dimensions --------------------------------------------------------------------------
 
 
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
@@ -519,7 +477,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     return array.transpose(*samples, *along)
 
 
-# -- step 5: checks ------------------------------------------------------------------------------
+# -- step 4: checks ------------------------------------------------------------------------------
 
 
 def _place(entry: int, lines: Any, size: int) -> str:

@@ -131,23 +131,13 @@ def table_of(grid: Grid, numbers: Numbers, source: str) -> Table:
                 f"column {number} has numbers, such as in line {numbers.lines[0]}, but no heading."
                 " If commas mark thousands, separate columns with ';'"
             )
-    columns = tuple(
-        Column(
-            name,
-            unit,
-            values,
-            number,
-            heading,
-            numbers.texts.get(number, ""),
-            numbers.words.get(number, ()),
-        )
-        for number, (values, (name, unit, heading)) in enumerate(
-            zip(numbers.columns, headings, strict=True)
-        )
-    )
-    return Table(
-        columns, source, numbers.lines, grid.comments, headed, numbers.left_out, numbers.begins
-    )
+    columns: tuple[Column, ...] = ()
+    for number, (values, (name, unit, heading)) in enumerate(
+        zip(numbers.columns, headings, strict=True)
+    ):
+        text, words = numbers.texts.get(number, ""), numbers.words.get(number, ())
+        columns += (Column(name, unit, values, number, heading, text, words),)
+    return Table(columns, source, numbers.lines, headed, numbers.left_out, numbers.begins)
 
 
 def table_of_frame(frame: Any) -> Table:
@@ -164,12 +154,9 @@ def table_of_frame(frame: Any) -> Table:
         if values.dtype.kind not in "fiu" or (values.isna() & column.notna()).any():
             text = f"column {heading!r} does not hold numbers"
             values = np.full(len(frame), np.nan)
-        name, unit = name_and_unit(heading)
-        values, cells = (
-            np.asarray(values, dtype=np.float64),
-            [*map(str, column)] if text else (),
-        )
-        columns.append(Column(name, unit, values, number, heading, text, cells))
+        cells = [*map(str, column)] if text else ()
+        values = np.asarray(values, dtype=np.float64)
+        columns.append(Column(*name_and_unit(heading), values, number, heading, text, cells))
     return Table(tuple(columns), "DataFrame", np.arange(len(frame)))
 
 
@@ -198,7 +185,7 @@ def numbers_of(grid: Grid, options: Options) -> Numbers:
     rows = _without_cut_end(rows, width, left_out)
     # Without a line of headings, the last comment may name as many
     # columns as there are.
-    if not header and grid.comments and not _SIZE.match(grid.comments[-1]):
+    if not header and grid.comments:
         comment = grid.comments[-1]
         at_blanks = split_at_blanks(comment, words)
         if len(at_blanks) == 2 * width and all(map(parse, at_blanks[1::2])):  # x mm  tau kPa
@@ -499,10 +486,3 @@ _SHORT = {
     "min": ("time",), "mil": ("travel", "length"), "g": (), "J": (), "1": (), "-": (), "%": (),
 }  # fmt: skip
 """Units that may be a part of a name, and the roles of names behind which they are units."""
-_SIZE = re.compile(r"(width|height|value units)\s*[:=]\s*(?:([\d.,eE+-]+)\s*)?(\S*)$", re.I)
-
-
-def sizes_of(comments: Iterable[str]) -> dict[str, tuple[float, str]]:
-    """Return from comments the 'width', 'height' and 'value units' of a map, with their units."""
-    matches = filter(None, map(_SIZE.match, comments))
-    return {m[1].lower(): (float(m[2] or 1.0), m[3]) for m in matches}
