@@ -106,6 +106,9 @@ def test_the_list_widens_an_interval_beyond_sampling():
     for (low, high), estimate, cv, by_list in answers():
         assert low <= estimate <= high
         assert by_list < cv
+        # The interval is at least the log-normal interval of its own error, at 90 %.
+        whole = 2.0 * 1.644 * math.sqrt(math.log1p(cv**2))
+        assert math.log(high / low) > whole or high == 1.0
         # A log-normal interval by sampling alone, with normal quantiles, is shorter.
         sampling = math.sqrt(math.log1p(cv**2 - by_list**2))
         assert math.log(high / low) > 2.0 * 1.64 * sampling or high == 1.0
