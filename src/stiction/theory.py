@@ -112,7 +112,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 
 
 def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
-    """Return the share of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
+    """Return the fraction of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
     interface = problem.interface
     # The spectrum is the transform of the correlation. A mode stands
     # for its conjugate, too.

@@ -209,7 +209,7 @@ def test_families_are_compared_by_one_number_of_independent_values():
     assert list(weights.values()) == pytest.approx(shares)
     assert len(weights) > len(fit.tied) > 1
     assert f"{fit.tied[1]} {found[fit.tied[1]]:.1f}" in str(fit)
-    assert f"({', '.join(fit.tied)} are not told apart)" in str(fit)
+    assert f"({', '.join(fit.tied)} cannot be distinguished)" in str(fit)
     types = [one.strength.marginal.type for one in fit.interfaces(400, seed=3)]
     for name, weight in weights.items():
         assert types.count(name.partition(",")[0]) == pytest.approx(400 * weight, abs=1.0)

@@ -102,7 +102,7 @@ def test_words_and_numbers_for_missing_values(tmp_path):
     refuses("is 0 in line 6 (2 such values) ... missing=0", lambda: read(tmp_path, zero))
     assert is_read(read(tmp_path, zero, missing=[0, -9999])[:4])
     heights = zero.replace("strength (MPa)", "height (um)")
-    with pytest.warns(st.AccuracyWarning, match="-9999 stands in line 7"):
+    with pytest.warns(st.AccuracyWarning, match="-9999 occurs in line 7"):
         assert read(tmp_path, heights, quantity="height")[-1] == pytest.approx(-9999e-6)
     peaks = tmp_path / "peaks.csv"
     peaks.write_text("length (mm);peak (N)\n10;71.5\n10;72\n20;-1\n20;69\n10;lost\n20;75\n")

@@ -79,7 +79,7 @@ def unknown(given: str, valid: Iterable[str]) -> str:
     near = nearest(given, names)
     hint = f"; did you mean {near!r}?" if near else ""
     if given == "anisotropy":
-        hint = "; it belongs to RandomField(anisotropy=), beside the spectrum"
+        hint = "; it belongs to RandomField(anisotropy=), next to the spectrum"
     return f"unknown {shown}{hint} (valid: {', '.join(names)})"
 
 

@@ -1,4 +1,4 @@
-"""Four numbers at once in a kernel, so that the order of a sum stands in the source.
+"""Four numbers at once in a kernel, so that the source fixes the order of summation.
 
 A dot product is fast only if it is summed in the lanes of a vector
 unit. Left to the compiler (fast-math), the order changes with the

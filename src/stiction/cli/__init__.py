@@ -3,5 +3,5 @@
 `commands` has a function for each command. Its arguments are the options, and its
 docstring is the help. `main` at the end turns errors into messages and exit codes.
 `report` writes a page with text, figures and tables of a run, with the template
-beside it. `design_page` writes a page for a design.
+next to it. `design_page` writes a page for a design.
 """

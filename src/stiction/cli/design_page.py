@@ -70,7 +70,7 @@ def write_page(
 
 
 def _repeat(design: Answer) -> str:
-    """Return a sentence with all that a checker needs beside the data to repeat the design."""
+    """Return a sentence with all that a checker needs, besides data, to repeat the design."""
     method, seed = design.experiment.method, design.experiment.seed
     source: Any = design.experiment.random.source
     of_tests = f", seed of infer {source.seed}" if hasattr(source, "seed") else ""

@@ -266,7 +266,7 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
     """Return the pressure (n,) between blocks glued to rigid platens, divided by its mean.
 
     With rollers the pressure would be uniform, 1, and the top would
-    widen by the share (3 - kappa)/(8 G) of its length. Glue prevents
+    widen by the fraction (3 - kappa)/(8 G) of its length. Glue prevents
     this through a shear traction without resultant.
     """
     with one_blas_thread():

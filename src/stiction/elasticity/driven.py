@@ -31,9 +31,9 @@ from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 MAX_WINDOWS_PER_WIDTH = 32
 """Windows that begin within the width of a window. Weighted means hardly change between them."""
 POSITIVE_RTOL = 1e-12
-"""Largest positive entry of K off its diagonal that is round-off, as a share of the diagonal."""
+"""Largest positive entry of K off its diagonal that is round-off, as a fraction of the diagonal."""
 MIN_SHEAR = 1e-9
-"""Smallest value of the profile of a drive far from a pusher, as a share of the largest."""
+"""Smallest value of the profile of a drive far from a pusher, as a fraction of the largest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
 
     1. Lengthen the run until it is unstable.
     2. Shorten it from its end as long as it remains unstable, and keep it.
-    3. Move on by a share of the width, and go to step 1. The last run
+    3. Move on by a fraction of the width, and go to step 1. The last run
        ends with the specimen.
     """
     n, runs = len(matrix), []

@@ -52,7 +52,7 @@ MAX_WIDTH = 4096
 MAX_INVERSE_ITERATIONS = 60
 """Iterations, each of which more than halves the error, until a double gains no further digit."""
 MODE_RTOL = 1e-14
-"""Change of an eigenvector in an iteration, as a share of its largest entry, that is round-off."""
+"""Change of an eigenvector in an iteration, relative to its largest entry, that is round-off."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:

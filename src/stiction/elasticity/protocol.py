@@ -127,7 +127,7 @@ class Elasticity(Protocol):
 
     @property
     def positive(self) -> float:
-        """Largest positive off-diagonal entry of K, as a share of the diagonal.
+        """Largest positive off-diagonal entry of K, as a fraction of the diagonal.
 
         If it is not zero, slip at one node can stop slip at other nodes.
         """

@@ -155,7 +155,7 @@ class LimitState:
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
-        """Return bounds that hold for all samples except a negligible share."""
+        """Return bounds that hold for all samples except a negligible fraction."""
         lows, highs = zip(*self.bounds_of_members(negligible), strict=True)
         return min(lows), max(highs)
 

@@ -22,7 +22,7 @@ Steps for a predicted sample:
    of the remaining values, and the integral is over all values.
 2. Choose n values at random, and compute both distances between these
    and the remaining values.
-3. The p-value is the share of choices whose distance is at least the
+3. The p-value is the fraction of choices whose distance is at least the
    distance of the measured values.
 
 Steps for a posterior. The peaks of one campaign share the unknown parameters.
@@ -32,7 +32,7 @@ Steps for a posterior. The peaks of one campaign share the unknown parameters.
 5. Draw each simulated campaign from one of these distributions, and
    compute its distances from their mean. If a campaign has several
    kinds of specimens, add W^2 over the kinds and take the largest D.
-6. The p-value is the share of campaigns whose distance is at least the
+6. The p-value is the fraction of campaigns whose distance is at least the
    distance of the measured campaign.
 """
 
@@ -55,9 +55,9 @@ from stiction.inference.posterior import Posterior
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
 """Draws that represent a posterior, and number of values in the table of a distribution."""
 RANGE_MARGIN = 0.25
-"""Share of the range of predicted peaks that is added to it on either side."""
+"""Fraction of the range of predicted peaks that is added to it on either side."""
 OUTLYING_SHARE = 1e-3
-"""Share of the predicted peaks on either side that is left out of this range, because their
+"""Fraction of the predicted peaks on either side that is left out of this range, because their
 distribution may have heavy tails."""
 DOUBTFUL_P_VALUE = 0.05
 """P-value below which measured and predicted peaks contradict each other."""
@@ -77,14 +77,14 @@ class Agreement(Result):
     cramer_von_mises, largest_deviation : float
         The two distances. W^2 is the sum over the tests of
         the squared differences between measured and
-        predicted shares. The largest difference is
+        predicted fractions. The largest difference is
         multiplied by the square root of the number of tests.
     p_values : dict of str to float
         For each distance, by name: the probability of a distance at
         least as large if the prediction is right.
-    predicted : tuple of (values, share)
+    predicted : tuple of (values, fraction)
         Predicted distribution function for each kind of specimen:
-        rising values in the unit of the peaks, and the share of peaks
+        rising values in the unit of the peaks, and the fraction of peaks
         up to each value.
     band : float
         The largest deviation stays below this value in 90 % of campaigns.
@@ -330,7 +330,7 @@ def _with_posterior(
 
 
 def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
-    """Return peaks (points, LAW_VALUES) at parameters u, and the share of peaks up to each."""
+    """Return peaks (points, LAW_VALUES) at parameters u, and the fraction of peaks up to each."""
     ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
     margin = RANGE_MARGIN * (high - low)
@@ -353,7 +353,7 @@ def _distances(share: Array) -> tuple[Array, Array]:
 
 
 def _p_values(distances: Array) -> list[float]:
-    """Return the share of rows with distances that are at least the distances in the first row."""
+    """Return the fraction of rows whose distances are at least the distances of the first row."""
     # Equal distances may differ by round-off.
     as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
     return ((1 + as_far) / len(distances)).tolist()

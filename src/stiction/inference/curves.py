@@ -80,22 +80,22 @@ FORCE_UNITS, TRAVEL_UNITS = ("N", "Pa", "1"), ("m", "s")
 MIN_READINGS = 8
 """Fewest readings of a test."""
 MAX_BACKWARD_SHARE = 0.05
-"""Largest share of its range by which travel may go back. A larger one begins another cycle."""
+"""Largest fraction of its range by which travel may go back. A larger one begins another cycle."""
 ROUND_OFF = 1e-12
-"""Share of the largest force below which differences of readings are round-off."""
+"""Fraction of the largest force below which differences of readings are round-off."""
 MIN_DROP_SHARE = 1e-6
-"""Share of the peak below which a fall is round-off if there is no noise."""
+"""Fraction of the peak below which a fall is round-off if there is no noise."""
 MAX_SPIKES_SHARE = 0.01
-"""Share of readings above which spikes are no errors of single readings."""
+"""Fraction of readings above which spikes are no errors of single readings."""
 MIN_FITTED = 12
 """Fewest readings at the peak to which a parabola is fitted."""
 TARE = 0.05
-"""Share of the peak that the first readings may have."""
+"""Fraction of the peak that the first readings may have."""
 HIGH, LOW, MAX_RETURNS = 0.8, 0.7, 3
 """A test falls below LOW of its peak and returns above HIGH of it fewer times than this. A record
 of stick-slip does so in each cycle."""
 BOTH_SIGNS = 0.2
-"""Share of the largest force that a force of the other sign reaches in a reciprocating test."""
+"""Fraction of the largest force that a force of the other sign reaches in a reciprocating test."""
 Split = Literal["cycles", "strokes", "tables"]
 
 

@@ -57,15 +57,15 @@ from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 
 NEGLIGIBLE_CHANGE = 1e-4
-"""Change of the noise variance, as a share of the variance, that does not change a marginal."""
+"""Change of the noise variance, as a fraction of the variance, that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
 """Lags in correlation lengths. The correlation of every spectrum falls to 1/e within them."""
 NAMES = ("correlation_length", "exponent", "anisotropy")
 """Estimated parameters of a spectrum, by their keys."""
 LEAST_LEFT = 0.2
-"""Least share of the variance that mean and trend are assumed to leave."""
+"""Least fraction of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
-"""Rounds of step 6. The error of the field's share falls to this share of itself in each round."""
+"""Rounds of step 6. Each round reduces the error of the field's variance to this fraction."""
 BANDS_PER_OCTAVE = 3
 """Bands of wavenumbers whose averages measure the roughness."""
 DRAWN = 5.0
@@ -247,9 +247,9 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
 
 
 def _left(windows: Sequence[RecordWindow], model: Model) -> float:
-    """Return the expected share of the field's variance that remains about mean and trend.
+    """Return the expected fraction of the field's variance that remains about mean and trend.
 
-    For N values with correlation R, the share is tr(M R)/N. The
+    For N values with correlation R, the fraction is tr(M R)/N. The
     projection M removes the trend of each record, and the mean of all
     records, from the values.
     """
@@ -281,7 +281,7 @@ class Goodness(NamedTuple):
     `distance` is Kolmogorov's distance. `score` is the score
     (step 4) minus the score of the best family: 0 for the best
     family, negative for others. Differences below 2 do not
-    distinguish families. `weight` is the share of fields that
+    distinguish families. `weight` is the fraction of fields that
     `FieldFit.interfaces` draws from the family. It is
     proportional to the likelihood of these fields. Because the
     fields scatter about the estimate, their log likelihood is on

@@ -338,9 +338,9 @@ class FieldFit(WithFactors, Result):
         lines = [missing] * bool(self.missing[0])
         p_values = ", ".join(f"{name} {p:.3g}" for name, p in self.p_values.items())
         if len(self.families) > 1:
-            told = f" ({', '.join(self.tied)} are not told apart)" if len(self.tied) > 1 else ""
+            tied = f" ({', '.join(self.tied)} cannot be distinguished)" if self.tied[1:] else ""
             scores = ", ".join(f"{name} {one.score:.1f}" for name, one in self.families.items())
-            lines.append(f"scores of families: {scores}{told}")
+            lines.append(f"scores of families: {scores}{tied}")
         lines.append(f"p-values: {p_values} ({len(self.repetitions)} repetitions)")
         lines += [f"! {doubt}" for doubt in self.doubts]
         return Summary(title, rows, f"{100 * CONFIDENCE:g} % interval", lines)

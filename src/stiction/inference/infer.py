@@ -84,11 +84,11 @@ TOLERABLE = 0.25
 NEVER = 1e-9
 """Neglected probability of a peak outside the bounds of the onset."""
 WIDEN = 0.1
-"""Share of the width of the first posterior by which its box is widened on either side."""
+"""Fraction of the width of the first posterior by which its box is widened on either side."""
 BOX_END_SHARE, HELD = 0.05, 1e-3
-"""Share of the box at either end, and posterior mass there above which the box grows."""
+"""Fraction of the box at either end, and posterior mass there above which the box grows."""
 PRIOR_END, PILED = 0.02, 4.0
-"""Share of a prior at either end, and multiple of this share above which the posterior piles up."""
+"""Fraction of a prior at either end, and multiple of it above which the posterior piles up."""
 OUTWARDS = np.array([[-1.0], [1.0]])
 """Directions in which the lower and the upper corner of a box move when it grows."""
 
@@ -465,12 +465,13 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
     usual = profiles.prior.scatter is FactorPrior().scatter
     if usual and math.log(shares.size) - float(entropy(shares)) < LITTLE_INFORMATION:
         notes.append(
-            "the measurements say little about the scatter between specimens, so its prior decides"
+            "the measurements say little about the scatter between specimens, so its prior controls"
             f" rare failures. Measure further specimens, or give prior={{'{SCATTER_KEY}': ...}}"
         )
     if profiles.levels.size == 1:
         notes.append(
-            "the profiles come from one specimen, whose field within stands for all. Scan further"
+            "the profiles come from one specimen, and all others are assumed to vary along their"
+            " length as it does. Scan further"
             " specimens. If the records are of different specimens, fit them with between=True"
         )
     return notes

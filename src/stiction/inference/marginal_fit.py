@@ -54,9 +54,9 @@ WIDEST = 10.0
 LEAST_SHAPE = 1.0
 """Least shape of 'beta' at a free bound."""
 NEGLIGIBLE_NOISE = 1e-4
-"""Share of noise in the variance that does not change a marginal."""
+"""Fraction of noise in the variance that does not change a marginal."""
 BOUND_MARGIN = 1e-2
-"""Least distance of noisy values from a bound for a first guess, as a share of their range."""
+"""Least distance of noisy values from a bound for a first guess, as a fraction of their range."""
 MOST_NOISE = 0.95
 LEAST_TOTAL = 0.2
 """Least sum of the shapes of 'beta' that follow from moments."""

@@ -38,7 +38,7 @@ MIN_RECORD_POINTS = 64
 NARROWEST = 8
 """Fewest points in each direction."""
 UNEVEN = 0.02
-"""Share of a spacing by which rounding in a file may move a point."""
+"""Fraction of a spacing by which rounding in a file may move a point."""
 OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
 CORRELATED = 2.5

@@ -61,7 +61,7 @@ RANGES = {
     # small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
-"""Ends of the searched range of each parameter. The noise is given by its share of the variance."""
+"""Ends of the searched range of each parameter. The noise is a fraction of the variance."""
 TRIED = {
     "variance": [1.0],
     "exponent": [1.0, 2.0, 4.0],
@@ -70,13 +70,13 @@ TRIED = {
 }
 """Values of the coarse grid of step 5."""
 FLOOR = 1e-3
-"""Floor as a share of the highest power, which is averaged over records and neighbours."""
+"""Floor as a fraction of the highest power, which is averaged over records and neighbours."""
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
 """Hermite orders of the map of a marginal, and steps of z that give them to 1e-4."""
 REPORTED_AT_END = ("correlation_length", "exponent", "anisotropy")
 AT_END = 1e-3
-"""Largest distance of an estimate at an end of a range, as a share of the range."""
+"""Largest distance of an estimate at an end of a range, as a fraction of the range."""
 LOG_STEP = 1e-4
 SETTLED = 1e-3
 """Gain of log likelihood below which scoring ends. A standard error is worth one half."""

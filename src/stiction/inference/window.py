@@ -43,7 +43,7 @@ from scipy.signal.windows import tukey
 from stiction.base.arrays import Array
 
 TAPERED = 0.5
-"""Share of a record over which the cosine taper rises and falls."""
+"""Fraction of a record over which the cosine taper rises and falls."""
 EXACT = {1: 16, 2: 2}
 """Wavenumbers, as numbers of modes, up to which the expectation contains the trend."""
 ROOM = {1: 4, 2: 2}
@@ -52,7 +52,7 @@ EDGE = 2.0
 """Modes over which a spectrum fades out at its end. The likelihood would move in steps
 with the correlation length if the end were sharper."""
 LEFT_OUT = 1e-4
-"""Share of the variance above the end of a spectrum without truncation."""
+"""Fraction of the variance above the end of a spectrum without truncation."""
 FOLDS = 6
 """Multiples of the sampling wavenumber whose aliases are added one by one."""
 NEAR, FEW = 1, {1: 65, 2: 33}

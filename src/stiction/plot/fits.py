@@ -32,7 +32,7 @@ PER_OCTAVE = 4
 
 @checked
 def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
-    """Draw a fitted random field beside the records, or the distribution of measured peaks.
+    """Draw a fitted random field with the records, or the distribution of measured peaks.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
         spectrum. The bands come from records that were simulated from
         the fitted field. In (a) and (b) they contain 90 % of the fits
         to such records. In (c) and (d) they contain 90 % of the sets of
-        such records. Of peaks, the share of tests up to each peak, with
+        such records. Of peaks, the fraction of tests up to each peak, with
         the log-normal distribution of the same mean and standard
         deviation of the logarithm. The band contains 90 % of the fits to
         as many peaks that were simulated from it.
@@ -86,7 +86,7 @@ def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
 
 
 def _peaks(axes: Axes, peaks: Peaks, rng: np.random.Generator) -> None:
-    """Draw the share of tests up to each peak, and the log-normal fit with its band."""
+    """Draw the fraction of tests up to each peak, and the log-normal fit with its band."""
     factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
     for number, (length, values) in enumerate(zip(peaks.lengths, peaks.values, strict=True)):
         of = "" if length is None else f", {length:g} m"
@@ -106,7 +106,7 @@ def _peaks(axes: Axes, peaks: Peaks, rng: np.random.Generator) -> None:
 
 
 def _steps(axes: Axes, steps: Array, of: str, **style: Any) -> None:
-    """Draw the share of tests up to each peak. `steps` also holds both ends of the drawing."""
+    """Draw the fraction of tests up to each peak. `steps` also holds both ends of the drawing."""
     count = steps.size - 2
     shares = np.minimum(np.arange(steps.size) / count, 1.0)
     axes.step(steps, shares, where="post", label=f"{count} tests{of}", **style)
@@ -114,7 +114,9 @@ def _steps(axes: Axes, steps: Array, of: str, **style: Any) -> None:
 
 def _name_scales(axes: Axes, peaks: Peaks, unit: str) -> None:
     name = "coefficient of friction" if peaks.unit == "1" else "peak"
-    axes.set(ylim=(0.0, 1.02), xlabel=with_unit(name, unit), ylabel="share of tests up to it")
+    axes.set(
+        ylim=(0.0, 1.02), xlabel=with_unit(name, unit), ylabel="fraction of tests up to it"
+    )
     axes.legend()
 
 

@@ -57,10 +57,10 @@ BEFORE = 0.11
 FILMED_RATE = 1e-3
 """Slip rate, over the largest of a run, from which its frames are in a film."""
 SHOWN_RATE, BESIDE_PULSE = 0.05, 0.25
-"""Moment rate from which on a rupture is drawn, as a share of its largest, and the time before and
-after, as a share of its duration. Slip that follows the load reaches a hundredth."""
+"""Moment rate from which on a rupture is drawn, relative to its largest, and the time before and
+after, as a fraction of its duration. Slip that follows the load reaches a hundredth."""
 FRONT_SHARE = 0.9
-"""Share of the nodes that the front has reached at the last of its contours."""
+"""Fraction of the nodes that the front has reached at the last of its contours."""
 STRENGTH = LinearSegmentedColormap.from_list("strength", ["0.85", "0.25"])
 """Greys of strength. White is where nothing breaks."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"

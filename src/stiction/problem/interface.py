@@ -449,9 +449,9 @@ class Interface(Listed):
 
     @property
     def in_plane_share(self) -> Array:
-        """Share of mode II, (kx/k)², at each wave vector of a plane. The other share is mode III.
+        """Fraction of mode II, (kx/k)², at each wave vector of a plane. The rest is mode III.
 
-        The constant mode counts as mode II. On a line the share is 1,
+        The constant mode counts as mode II. On a line the fraction is 1,
         because the problem sets the mode.
         """
         k = self.wavenumbers

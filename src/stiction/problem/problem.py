@@ -104,7 +104,7 @@ class Problem(Listed):
         problems += self._place_profiles()
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
-                "solid.plane: solids beside a plane interface are three-dimensional. Leave 'strain'"
+                "solid.plane: solids of a plane interface are three-dimensional. Leave 'strain'"
             )
         if self.interface.is_plane and self.mode != "II":
             problems.append(f"mode: a plane has both modes. Leave 'II', got {self.mode!r}")
@@ -186,7 +186,7 @@ class Problem(Listed):
         if machine > 0.0:
             text = (
                 f"specimen.drive.stiffness: {machine:.3g} N/m hardly differs from dead load, 0,"
-                f" beside the stiffness of the blocks, {blocks:.3g} N/m. Check its unit (N/m)"
+                f" next to the stiffness of the blocks, {blocks:.3g} N/m. Check its unit (N/m)"
             )
             doubt_units(
                 [Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf), (0.0, math.inf))]
@@ -384,8 +384,8 @@ class Problem(Listed):
         Notes
         -----
         A node whose strength is not above its residual strength has a constant
-        strength. An `AccuracyWarning` gives the share of such nodes. It also gives
-        the share of nodes whose initial stress is below minus the strength.
+        strength. An `AccuracyWarning` gives the fraction of such nodes. It also gives
+        the fraction of nodes whose initial stress is below minus the strength.
         """
         return placed_sample(self, profiles, accept)
 

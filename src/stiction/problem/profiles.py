@@ -10,7 +10,7 @@ is periodic, so points may come in any order and begin
 anywhere. On a specimen, the nodes are x_i = (i + 1/2)
 L/n, and the profile stops at its ends. The steps of placing are:
 
-1. Find the common offset of the points from the nodes, as a share of
+1. Find the common offset of the points from the nodes, as a fraction of
    the spacing. Warn about an offset. Refuse points that do not lie on
    nodes.
 2. Number the node of each point. Refuse two different values at a node.
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TOLERANCE = 0.02
-"""Share of the spacing by which rounding in a file may move a point."""
+"""Fraction of the spacing by which rounding in a file may move a point."""
 
 
 def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
@@ -269,7 +269,7 @@ def read_profile(
         Map from heights (m, an array) to strengths (Pa):
         ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
     missing : float, str or sequence of them, optional
-        Numbers and words that stand for a missing value, such as
+        Numbers and words that mark a missing value, such as
         ``-9999`` or ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``,
         ``***`` and ``#N/A`` always do.
     decimal : {".", ","}, optional

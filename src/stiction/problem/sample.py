@@ -421,7 +421,7 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     place. In the messages, `owner` stands before the names.
     """
     twice = [
-        f"problem.{key}: has no effect beside {owner}.{name}. Leave either out"
+        f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"
         for name in names
         for key in REPLACED.get(name, ())
         if (value := attrgetter(key)(problem)) is not None and np.any(value)

@@ -150,7 +150,7 @@ class RandomField(Listed):
         profile : xarray.DataArray over x (m), on a plane over x and y
             Measured values, for example
             ``st.read_profile("scan.csv")``, at any places and in the
-            unit of the field. NaN stands for a missing value.
+            unit of the field. NaN marks a missing value.
         noise : float
             Standard deviation of the measurement error, in the same
             unit, positive.

@@ -34,7 +34,7 @@ Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------
 4. Compute c_m of (2) with the trapezoidal rule on [-8, 8], and the polynomials with
    their recursion.
-5. Stop after at least `MIN_TERMS` terms, when the remaining share of
+5. Stop after at least `MIN_TERMS` terms, when the remaining fraction of
    the variance is small.
 6. Append a coefficient for the remaining variance, so that the
    correlation is 1 at zero lag.

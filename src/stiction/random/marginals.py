@@ -196,7 +196,9 @@ class Weibull(_ByMoments):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
-            raise InputError(f"cv: must be 0.001 to 10 as a share of mean - low, got {ratio:g}")
+            raise InputError(
+                f"cv: must be 0.001 to 10 as a fraction of mean - low, got {ratio:g}"
+            )
 
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)

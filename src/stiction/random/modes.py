@@ -56,12 +56,12 @@ class Modes:
 
     @property
     def unresolved(self) -> float:
-        """Share of the variance at wavelengths that the nodes do not resolve."""
+        """Fraction of the variance at wavelengths that the nodes do not resolve."""
         limit = np.array(self.interface.embedding.shape)[:, None] // 2
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
-        """Return how many nodes leave at most a given share unresolved, in the same proportions."""
+        """Return how many nodes leave at most a given fraction unresolved, in equal proportions."""
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
         # Refinement of the present grid that resolves each mode.

@@ -164,15 +164,15 @@ class ScaledSpectrum(SpectralDensity):
     correlation_length: Magnitude
     power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
     default_power: ClassVar[float] = 0.9997
-    """Share of the power retained by the default truncation."""
+    """Fraction of the power retained by the default truncation."""
 
     @abstractmethod
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
-        """Return the share of the power at wave vectors shorter than `wavenumber` (rad/m)."""
+        """Return the fraction of the power at wave vectors shorter than `wavenumber` (rad/m)."""
 
     @abstractmethod
     def quantile(self, share: float, dimensions: int = 1) -> float:
-        """Return the wavenumber (rad/m) below which a share of the power lies."""
+        """Return the wavenumber (rad/m) below which a fraction of the power lies."""
 
     @abstractmethod
     def untruncated_correlation(self, lag: Array) -> Array:

@@ -1,6 +1,6 @@
 """Random properties as stresses. Friction coefficients are multiplied by the pressure.
 
-`share_below_residual` estimates the share of the strength that does not
+`share_below_residual` estimates the fraction of the strength that does not
 exceed the residual strength. The algorithm is our own:
 
 1. Replace the residual strength by equally likely values.
@@ -184,9 +184,9 @@ def share_below_residual(problem: Problem, random: RandomInterface) -> float:
 
 
 def check_residual(problem: Problem, random: RandomInterface) -> None:
-    """Warn if a share of the strength above 1e-6 does not exceed the residual strength.
+    """Warn if a fraction of the strength above 1e-6 does not exceed the residual strength.
 
-    Nodes with such a strength do not weaken. A share above a half
+    Nodes with such a strength do not weaken. A fraction above a half
     raises an `InputError`.
     """
     share = share_below_residual(problem, random)

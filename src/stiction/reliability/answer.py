@@ -65,7 +65,7 @@ class Answer(Result):
         slide below the stress. Their mean is `probability`, the
         predictive probability, on which a decision should rest.
     survived : float
-        Share of plain samples in which the event does not happen at any
+        Fraction of plain samples in which the event does not happen at any
         stress. With a stiff machine, an interface may stay stable and
         carry any load.
     warnings : tuple of str
@@ -349,7 +349,7 @@ def unseen_batch(specimens: int) -> list[str]:
         return []
     unseen = 1.0 - (1.0 - UNSEEN_CONFIDENCE) ** (1.0 / specimens)
     return [
-        f"{specimens} specimens cannot exclude a weaker batch with a share of up to"
+        f"{specimens} specimens cannot exclude a weaker batch of up to"
         f" {unseen:.0%} of all specimens"
     ]
 

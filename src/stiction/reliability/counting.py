@@ -16,7 +16,7 @@ Steps:
 2. Draw samples until there are r failures, within the limits on samples.
 3. If the last failure ended the count, the unbiased estimate is (r -
    1)/(n - 1) for n samples up to this failure. Otherwise it is the
-   share of failures.
+   fraction of failures.
 """
 
 import math

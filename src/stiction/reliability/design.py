@@ -67,7 +67,7 @@ from stiction.reliability.tail import FREQUENT, Goal, TailPoint, sample_tail
 SAMPLES_PER_END = 300
 """Samples that are solved at each end of a range."""
 USUAL_SHARE = 0.1
-"""Share of a constant below and above its value if no range is stated."""
+"""Fraction of a constant below and above its value if no range is stated."""
 CONSTANTS = (
     "friction.residual_ratio", "friction.residual_strength", "friction.weakening_rate",
     "friction.critical_slip", "friction.fracture_energy", "load.normal_pressure",

@@ -20,7 +20,7 @@ Steps:
    of their distributions. This gives `SPECIMENS_PER_SAMPLE` specimens
    for each solved sample.
 4. The specimens from one solved sample form a family. The error follows
-   from the share of each family among the failures
+   from the fraction of each family among the failures
    (`subset.ancestral_variance`), as in subset simulation.
 5. Solve more samples until the error is small enough.
 
@@ -49,7 +49,7 @@ from stiction.reliability.tail import Goal, Tail
 SPECIMENS_PER_SAMPLE = 128
 """Specimens for each solved sample."""
 CHARACTERISTIC = 0.05
-"""Share of the specimens below the characteristic value."""
+"""Fraction of the specimens below the characteristic value."""
 FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
 """Samples that are solved at first, and most samples in a later step."""
 COUNT_MARGIN = 1.1
@@ -102,7 +102,7 @@ class Counts:
         return Tail([descent], "plain", reason, samples)
 
     def characteristic(self, confidence: float) -> float:
-        """Return the 5 % quantile, Pa, that a share `confidence` of the interfaces exceeds.
+        """Return the 5 % quantile, Pa, that a fraction `confidence` of the interfaces exceeds.
 
         The onsets of an interface are computed from the onsets in its
         group at a mean and a factor of 1. These are multiplied by its

@@ -68,13 +68,13 @@ PILOT_SAMPLES = 1_000
 NEGLIGIBLE_PROBABILITY = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
-"""Share of the mean strength below which a stress is probably in another unit."""
+"""Fraction of the mean strength below which a stress is probably in another unit."""
 THOUSAND = 1e3
 """Ratio to the mean strength that means another unit, such as kN for N or MPa for Pa."""
 SHOWN_PROFILES = 20
 """Number of failing profiles in an answer."""
 COVERED = 0.8
-"""Share of the failures below which the first stage leads to a warning."""
+"""Fraction of the failures below which the first stage leads to a warning."""
 QUANTITIES = {"stress": "Pa", "force": "N", "friction_coefficient": "1"}
 """Units of the quantities in which a stress may be given."""
 

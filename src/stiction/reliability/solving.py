@@ -46,7 +46,7 @@ evaluations on one core, s, unless `max_evaluations` allows more."""
 LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
 """Parts of the target for the errors by the list of interfaces and by sampling. Squares add up."""
 REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
-"""Margin on the wanted number of members, and share of the mean that a warning reports."""
+"""Margin on the wanted number of members, and fraction of the mean that a warning reports."""
 FRESH = 1.5
 """Least ratio of different members that makes a longer list worthwhile."""
 EXACT_CHECKS = (8, 64)

@@ -21,7 +21,7 @@ Steps. A level is the set of z with g(z) below its ceiling.
    below the requested threshold, take the threshold. If it is at the
    floor of g, take the number just above the floor.
 3. The probability of the next level is the probability of this level
-   times the share of its samples strictly below the ceiling.
+   times the fraction of its samples strictly below the ceiling.
 4. Stop if the threshold, the floor or the requested
    probability is reached. The walk is incomplete if it
    stops because no sample goes on, after `MOST_LEVELS`
@@ -29,11 +29,11 @@ Steps. A level is the set of z with g(z) below its ceiling.
 5. Each sample that goes on begins a chain, about N states in all. A
    step moves z to z' = sqrt(1 - b^2) z + b w, with a standard normal w.
    This preserves the normal distribution. The chain stays at z if g(z')
-   is not below the ceiling. After step t, b is multiplied by exp((share
+   is not below the ceiling. After step t, b is multiplied by exp((fraction
    of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b = 1. The states
    are the samples of the next level. Continue with step 2.
 6. P(g < y) is the probability of the rarest level whose ceiling is at
-   least y, times the share of its samples below y. The error follows
+   least y, times the fraction of its samples below y. The error follows
    from their first ancestors (`ancestral_variance`).
 
 Departures. Only samples strictly below the ceiling go on. The product
@@ -58,9 +58,9 @@ Function = Callable[[Array], Array]
 Label = Callable[[Array], NDArray[np.int64]]
 
 LEVEL_PROBABILITY = 0.1
-"""Share of a level's samples that continue to the next."""
+"""Fraction of a level's samples that continue to the next."""
 ACCEPTANCE = 0.37
-"""Target share of accepted steps; from 0.25 to 0.44 efficiency differs by 10 % at most."""
+"""Target fraction of accepted steps; from 0.25 to 0.44 efficiency differs by 10 % at most."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEPT_POPULATIONS = 3
@@ -78,7 +78,7 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     of the families among the failures therefore measure the error, v =
     sum (w_i - 1/N)^2. It is computed in three steps:
 
-    1. Sum the squared shares, and subtract 1/N.
+    1. Sum the squared fractions, and subtract 1/N.
     2. If all samples fail, v is zero. Use at least (2/N)^2, as if two
        more samples had not failed. This bounds the error as the
        binomial distribution does.
@@ -158,7 +158,7 @@ class Descent(NamedTuple):
 
     @property
     def survived(self) -> float:
-        """Share of infinite values among plain samples."""
+        """Fraction of infinite values among plain samples."""
         return _share(np.isinf(self.populations[0].values))
 
     def light(self) -> Self:

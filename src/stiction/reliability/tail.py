@@ -23,7 +23,7 @@ Steps:
 4. If the coefficient of variation is above the target, make the next
    repetition (step 2) and pool again (step 3). Choose the size that
    should reach the target, within the limits on size and evaluations.
-5. Suppose that 'auto' chose the guide. If less than a share `POOR` of
+5. Suppose that 'auto' chose the guide. If less than a fraction `POOR` of
    the samples that the guide selects are failures, sample again by
    subset simulation.
 6. The stress at a probability follows from p(s) by bisection. The
@@ -53,15 +53,15 @@ FREQUENT = 0.01
 SIZE_MARGIN = 1.1
 """Factor on the sample size, because the variance so far is itself an estimate."""
 DEEPER = 0.3
-"""Share of a probability to which repetitions go on for the lower end of the interval."""
+"""Fraction of a probability to which repetitions go on for the lower end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
 """Number of plain samples that decide about a guide."""
 LEAST_SHARE_PICKED = 0.9
-"""Share of the weakest of them that a guide must pick."""
+"""Fraction of the weakest of them that a guide must pick."""
 RESOLVED = 3
 """Fewest samples that determine the probability of one of the equally likely interfaces."""
 POOR = 0.02
-"""Least share of failures among the samples of a guide."""
+"""Least fraction of failures among the samples of a guide."""
 
 
 class Sizes(NamedTuple):
@@ -146,7 +146,7 @@ class Tail(NamedTuple):
 
     @property
     def survived(self) -> float:
-        """Share of plain samples in which the event does not happen."""
+        """Fraction of plain samples in which the event does not happen."""
         return float(self._weights @ [descent.survived for descent in self.repetitions])
 
     @property
@@ -178,7 +178,7 @@ class Tail(NamedTuple):
         """Return the probability for each of the equally likely interfaces.
 
         The probability is NaN if fewer than `RESOLVED` samples of an
-        interface are so low. For plain samples, it is the share among
+        interface are so low. For plain samples, it is the fraction among
         the samples of the interface, because their number is random and
         causes most of the error near P = 1.
         """
@@ -206,7 +206,7 @@ class Tail(NamedTuple):
         """Return the coefficient of variation due to the list, which is a sample of interfaces.
 
         Members with the same number in `kinds` are one entry of the
-        list. An entry has the share w of the list and the share p of
+        list. An entry has the fraction w of the list and the fraction p of
         the failures. As in importance sampling, the square of the
         result is the sum of (p - w)^2 over the entries.
         """
@@ -449,6 +449,6 @@ def _repetitions(
 
 
 def _share_failing(descent: Descent) -> float:
-    """Return the share of failures among samples that the guide selects, or 1 without samples."""
+    """Return the fraction of failures among samples that the guide selects, 1 without samples."""
     values = descent.populations[-1].values
     return float(np.mean(values < descent.threshold)) if descent.complete else 1.0

@@ -21,11 +21,11 @@ Steps:
    as many samples per level. Each level is a candidate for L < b, and
    its probability P(L < b) is known.
 2. Begin with the rarest level, and solve some of its samples exactly.
-   The share with E < s is the middle factor. If a probability is
+   The fraction with E < s is the middle factor. If a probability is
    requested, s is the quantile of E that gives this probability.
 3. Start from failures among these samples, walk among the failures E <
    s (`subset.grow`), and discard the first `FORGOTTEN_STEPS` steps. The
-   share of the later states with L < b is the last factor. `_covered`
+   fraction of the later states with L < b is the last factor. `_covered`
    estimates its error, with one observation for each family of walkers.
 4. Take this level if the last factor is at least `LAST_FACTOR`.
    Otherwise repeat from step 2 at the next, less rare level, as far as

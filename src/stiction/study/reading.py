@@ -21,7 +21,7 @@ T = TypeVar("T")
 TABLES = "problem", "random", "method"
 """Tables that a study file must have."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
-"""Bytes of a study file, bytes beside lists of numbers, and dots in a line of those bytes."""
+"""Bytes of a study file, bytes apart from lists of numbers, and dots in a line of those bytes."""
 SHOWN_KEYS = 10
 """Keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
@@ -37,11 +37,13 @@ def check_toml(content: bytes) -> None:
             line = line[: match.start(1)]
         words += len(line)
         if line.count(b".") > MAX_DOTS and not line.lstrip().startswith(b"#"):
-            raise InputError(f"has a line with more than {MAX_DOTS} dots beside its numbers")
+            raise InputError(
+                f"has a line with more than {MAX_DOTS} dots apart from its numbers"
+            )
     if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
         raise InputError(
-            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} beside lists of numbers."
-            " Name profiles by files beside the study, such as strength.npy"
+            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} outside lists of numbers."
+            " Name profiles by files next to the study, such as strength.npy"
         )
 
 

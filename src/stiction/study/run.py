@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OVERHEAD = 2**16
-"""Bytes of a NetCDF file beside its arrays."""
+"""Bytes of a NetCDF file apart from its arrays."""
 FEWEST_BLOCKS = 8
 """Blocks in a part, if there are enough, so that parts take about the same time."""
 

@@ -64,7 +64,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 MOST_WRITTEN = 8
-"""Random interfaces that a study file holds itself; more of them are in a file beside it."""
+"""Random interfaces that a study file holds itself; more of them are in a file next to it."""
 MethodOfStudy: Any = Annotated[
     Any,
     OneOf(
@@ -123,7 +123,7 @@ def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
 
 
 PeaksOfStudy: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plain_peaks)]
-"""Measured peaks; in a study file the name of a file beside it, as `read_peaks` reads."""
+"""Measured peaks; in a study file the name of a file next to it, as `read_peaks` reads."""
 
 
 @model(kw_only=True)
@@ -432,7 +432,7 @@ class Study(_Parts):
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the study to a TOML file. Many interfaces are written to a JSON file beside it.
+        """Write the study to a TOML file. Many interfaces are written to a JSON file next to it.
 
         Raises an `InputError` if a part exists only in Python, and a
         `StoreError` if the file cannot be written.
@@ -473,7 +473,7 @@ class Study(_Parts):
 
 
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
-    """Return the study in a TOML file, and the files beside it that it names."""
+    """Return the study in a TOML file, and the files next to it that it names."""
     named: list[Path] = []
     return validated(Study, read_toml(path), path.parent, named), named
 

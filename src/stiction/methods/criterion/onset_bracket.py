@@ -49,11 +49,11 @@ squares of all nodes, summed over steps."""
 FROZEN_STEPS = 4
 """Steps with frozen strengths before Newton's method is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9
-"""Overstress, as a share of the strength, below which slip is an equilibrium, and below which a
+"""Overstress, as a fraction of the strength, below which slip is an equilibrium, and below which a
 node does not join S."""
 BRACKETS_RATIO = 2.0**0.5
 BRACKETS = tuple(0.01 * BRACKETS_RATIO**i for i in range(7))
-"""Half-widths of the brackets around a predicted load, as shares of it: 1 to 8 %."""
+"""Half-widths of the brackets around a predicted load, as fractions of it: 1 to 8 %."""
 GRIFFITH_MARGIN = 1.5
 """Safety factor on the length of a crack that counts as unstoppable."""
 

@@ -17,7 +17,7 @@ from stiction.problem.resolution import (
 from stiction.problem.sample import Sample
 
 FAST_RISE = 1e-3
-"""Rise of the load while shear waves cross the nucleation length, as a share of the stress scale,
+"""Rise of the load while shear waves cross the nucleation length, relative to the stress scale,
 above which arrested events depend on the rate of loading."""
 MISSED_PERCENT = 2.0
 """Distance of a first instability from equilibrium, %, from which there is a warning."""
@@ -133,7 +133,7 @@ def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
     """Return the rise of the load while shear waves cross the nucleation length, and its rate.
 
-    The rise is a share of the stress scale, and the rate is in Pa/s.
+    The rise is a fraction of the stress scale, and the rate is in Pa/s.
     Both are zero without arrested events.
     """
     first_slip = run.first_slip()

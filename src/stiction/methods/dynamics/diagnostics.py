@@ -51,7 +51,7 @@ Algorithm, after each step of a run (`observe`)
 5. Note <tau> once all nodes that can break are at their
    residual strength. From then on no instability can begin.
    Reaching this state is not an instability by itself, because
-   the last nodes beside the end of an extent may creep to this
+   the last nodes next to the end of an extent may creep to this
    state. If they do, the interface slid in the previous
    instability, which then does not count as arrested.
 6. Slip is fast while a node slips at `Thresholds.unstable_slip_rate`

@@ -162,7 +162,7 @@ def _effect(
 ) -> Any:
     """Step 4: return (largest weakening of a node, total slip, Z <V>) due to slip increments u.
 
-    Weakening is a share of tau_p - tau_r. Creep at the residual
+    Weakening is a fraction of tau_p - tau_r. Creep at the residual
     strength counts if it is fast.
     """
     nodes, slip, past = setting.nodes, state.slip, state.past

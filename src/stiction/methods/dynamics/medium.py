@@ -16,7 +16,7 @@ Algorithm: our own
 2. Bisect between the last two values of kappa.
 3. On a line the largest |k| is pi/dx. On a plane the shortest waves lie
    on the rim of the rectangle |kx| <= pi/dx, |ky| <= pi/dy, and differ
-   in length and in their share of mode II. The waves on the axes and in
+   in length and in their fraction of mode II. The waves on the axes and in
    the corner grow first, so take the smallest of their steps.
 """
 
@@ -190,7 +190,7 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
 
 
 def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
-    """Return the kernel for a wave vector on a plane, with the share (kx/k)² of mode II."""
+    """Return the kernel for a wave vector on a plane, with the fraction (kx/k)² of mode II."""
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
     return ExponentialSum(

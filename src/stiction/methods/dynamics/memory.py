@@ -49,7 +49,7 @@ Layout
 Variables lie in blocks of 64 modes, so that the sums of a pass stay in registers.
 Tables have an entry for each wave vector with different waves: on a line k > 0,
 on a plane kx >= 0 and ky >= 0, because (kx, ky) and (-kx, ky) have the same |k|
-and share of mode II. On a plane an entry therefore has multiplicity 2. Entries
+and fraction of mode II. On a plane an entry therefore has multiplicity 2. Entries
 are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier
 arrays as [block][copy][real, imaginary][64] and memory variables as
 [block][copy][pair][4][64]. The four rows hold the memory of the real signal (real

@@ -74,7 +74,7 @@ class Mesh(NamedTuple):
     """Coefficients of the force on a node by its neighbours, (rows, 2, 5, 3); see `_stencils`."""
     anti_plane: bool
     push: Array
-    """Share of the pusher's force on the left and on the right of each row, (rows, 2)."""
+    """Fraction of the pusher's force on the left and on the right of each row, (rows, 2)."""
     platen: bool
     stiffness: float
     """Stiffness of the machine for a block, half of the specimen, Pa."""
@@ -227,7 +227,7 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return each row's share of a uniform traction. The interface takes no share."""
+    """Return each row's fraction of a uniform traction. The interface takes no share."""
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)

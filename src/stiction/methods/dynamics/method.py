@@ -102,7 +102,7 @@ class Rupture(Listed):
     implicit : bool
         If false, take explicit steps only, a million for slow loading.
     arrival : float
-        Share of tau_p - tau_r that a node has lost when the front
+        Fraction of tau_p - tau_r that a node has lost when the front
         arrives: 0.5 for the middle of the cohesive zone, 1e-3 for its tip.
     start : {"equilibrium", "rest"}
         Start of a run: close below the first instability in equilibrium,

@@ -84,7 +84,7 @@ SCALARS: dict[str, Variable] = over(
     mean_stress=("Pa", "mean shear stress on the interface"),
     mean_slip=("m", "mean slip"),
     top_slip_rate=("m/s", "largest slip rate"),
-    weakened_fraction=("1", "share of nodes at the residual strength"),
+    weakened_fraction=("1", "fraction of nodes at the residual strength"),
     seismic_moment=("N", "seismic moment per length"),
     work=("J/m", "work of the load on the slip"),
     strain_energy=("J/m", "static strain energy of the slip"),
@@ -328,7 +328,7 @@ class Recorder:
             write_checkpoint(folder / _CHECKPOINT, self.run, state, self._saved)
 
     def finish(self, dataset: xr.Dataset, stopped: str) -> None:
-        """Write the variables of the whole run beside its frames, unless the run can continue."""
+        """Write the variables of the whole run next to its frames, unless the run can continue."""
         if self.save.to is not None and stopped != "max_steps":
             without_time = dataset.drop_dims(["time", "step"], errors="ignore")
             _write(self.save.to / _SUMMARY, without_time)

@@ -52,11 +52,11 @@ from stiction.problem.specimen import Slider
 OPTIONS = ("courant", "arrival", "max_steps", "events")
 """Options of `Rupture` with an effect on specimens. The others need a load that rises in time."""
 LOAD_RISE = 1e-5
-"""Rise of the drive in an event, as a share of the mean fall of strength."""
+"""Rise of the drive in an event, as a fraction of the mean fall of strength."""
 INITIAL_GROWTH = 1e-3
-"""Largest growth of the slip at the start, as a share of d_c."""
+"""Largest growth of the slip at the start, as a fraction of d_c."""
 RESTING_SLIP = 1e-4
-"""Share of the largest slip of an event below which a node counts as resting."""
+"""Fraction of the largest slip of an event below which a node counts as resting."""
 CHECKS_PER_WINDOW = 8
 """Number of checks for rest while shear waves cross the block and return."""
 

@@ -76,7 +76,7 @@ those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6
 
 PULSE_SHARE = 0.1
 """Slip is fast if a node slips at the rate of an instability, and if the mean slip rate is above
-this share of its largest in the event. Echoes of images in a period of two extents reach 0.06."""
+this fraction of its maximum in the event. Echoes in a period of two extents reach 0.06."""
 
 DIAGNOSTICS = np.dtype(
     [

@@ -5,7 +5,7 @@
 2. The work of the load is dissipated by friction, stored as strain
    energy or radiated. The first two follow from the slip alone, so the
    radiated energy is the difference (`_energies`).
-3. The front arrives at a node when the node has lost a share of its
+3. The front arrives at a node when the node has lost a fraction of its
    strength. The distance of two nodes on a line over the difference of
    their arrival times is an apparent speed (`rupture_speed`). Each
    speed is a mean over a window of two or half a nucleation length.

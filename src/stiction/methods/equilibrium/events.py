@@ -7,7 +7,7 @@ d_1 - d_0, the event releases the stress K delta, at the load at which it begins
 The table holds these measures:
 
 1. The patch of an event is the region around the largest delta in which
-   delta exceeds the share `MIN_ADDED_SLIP` of its largest value. The
+   delta exceeds the fraction `MIN_ADDED_SLIP` of its largest value. The
    patch has extents, an area and a mean slip. Outside the patch, slip
    also grows a little.
 2. The moment is G times the integral of delta. On a plane, the
@@ -64,7 +64,7 @@ BETWEEN_HALF_SPACES = {
     "event_settled": Variable("1", "whether the event ended before its run did", ("event",)),
 }
 MIN_ADDED_SLIP = 1e-3
-"""Smallest added slip of the nodes in the patch of an event, as a share of the largest."""
+"""Smallest added slip of the nodes in the patch of an event, as a fraction of the largest."""
 
 
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:

@@ -66,7 +66,7 @@ class Equilibrium(Listed):
     stress and load profile may vary along the interface.
 
     On planes the programme is solved with Fourier transforms. The
-    distance between its bounds is the share `tolerance` of the load. Results
+    distance between its bounds is the fraction `tolerance` of the load. Results
     contain the lower bound, at which there is an equilibrium.
 
     Parameters
@@ -86,7 +86,7 @@ class Equilibrium(Listed):
         and slip continue from event to event. The variables are
         described in `equilibrium_path`.
     tolerance : float
-        On planes, the distance between the bounds as a share of the
+        On planes, the distance between the bounds as a fraction of the
         load, 1e-10 to 1e-2. Lines are solved to round-off, or to 1e-9
         if thousands of nodes slip.
 

@@ -26,7 +26,7 @@ from stiction.base.jit import jit
 Mask = NDArray[np.bool_]
 
 MIN_PATCH_WEIGHT = 0.1
-"""Share of the largest weight above which a node of a plane belongs to the critical patch.
+"""Fraction of the largest weight above which a node of a plane belongs to the critical patch.
 
 At the border of a patch y falls off over a few nodes. Half or twice the
 share changes areas by a sixth to a quarter, and no other result.
@@ -166,7 +166,7 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
     """Return the nodes of the patch around the largest weight, and the patch.
 
     The weight is not negative, and positive somewhere. Nodes belong to
-    a patch if their weight exceeds a share of the largest weight.
+    a patch if their weight exceeds a fraction of the largest weight.
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:  # a line

@@ -65,14 +65,14 @@ ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
 }
 MIN_PEAK_HEIGHT = 0.02
 """A peak that is hardly higher than the stress of sliding gets a warning. This is its smallest
-height above the mean residual strength, as a share of the fall of strength."""
+height above the mean residual strength, as a fraction of the fall of strength."""
 OF_INSTABILITY = {
     "first_instability", "critical_position", "critical_patch_length", "critical_patch_extent",
     "critical_patch_area",
 }  # fmt: skip
 """Variables that are NaN without an instability."""
 STRENGTH_STEP = 1e-7
-"""Rise of a node's strength in a difference quotient, as a share of the mean strength."""
+"""Rise of a node's strength in a difference quotient, as a fraction of the mean strength."""
 
 
 class SamplePath(NamedTuple):

@@ -67,7 +67,7 @@ class EquilibriumSearch(Protocol):
     """Thread-safe protocol for the search for equilibria: `DenseSearch` or `PlaneSearch`.
 
     `widest_gap` is the largest certificate gap without a warning, as a
-    share of the load.
+    fraction of the load.
     """
 
     pieces: Pieces

@@ -20,7 +20,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
 
 CONSTANT_STRENGTH_RTOL = 1e-11
-"""Smallest fall of strength, as a share of the mean strength, with which a node counts as
+"""Smallest fall of strength, as a fraction of the mean strength, with which a node counts as
 weakening. A smaller fall is within the round-off of K d: an instability
 of such nodes adds no slip
 and never ends."""

@@ -79,7 +79,7 @@ memory too."""
 UNPACKED_BYTES, UNPACKED_TIMES = 2**23, 20
 """Unpacked size of a workbook: bytes of a small one, and multiples of the size of a larger one."""
 ABOUT_BYTES = 2**20
-"""Unpacked size of the parts beside sheets, texts and images, such as styles."""
+"""Unpacked size of the parts apart from sheets, texts and images, such as styles."""
 SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 NETCDF = (".nc", ".nc4")

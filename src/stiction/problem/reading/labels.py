@@ -169,7 +169,7 @@ def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]
 
 
 def without_missing(values: Array, options: Options) -> Array:
-    """Return values with NaN in place of the numbers that stand for a missing value."""
+    """Return values with NaN in place of the numbers that mark a missing value."""
     numbers = [number for number in options.stated if not isinstance(number, str)]
     absent = [np.isclose(values, number, rtol=1e-6, atol=0.0) for number in numbers]
     return np.where(np.any(absent, axis=0), np.nan, values) if absent else values
@@ -499,7 +499,7 @@ def check_positive(values: Array, quantity: str, lines: Any = (), raw: Any = Non
 
 
 def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
-    """Warn about a number that is far from all others and often stands for a missing value."""
+    """Warn about a number that is far from all others and often marks a missing value."""
     flat = np.ravel(values)
     known = flat[np.isfinite(flat)]
     for end in (known.min(), known.max()) if known.size else ():
@@ -508,7 +508,7 @@ def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
         if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
             where = _place(int(np.argmax(flat == end)), lines, flat.size)
             warn_user(
-                f"{quantity}: {end:.9g} stands in {where} ({known.size - rest.size} such values),"
+                f"{quantity}: {end:.9g} occurs in {where} ({known.size - rest.size} such values),"
                 f" and often means that a value is missing. Pass missing={end:.9g}, or missing=()",
                 AccuracyWarning,
             )

@@ -217,7 +217,7 @@ def numbers_of(grid: Grid, options: Options) -> Numbers:
 
 
 def _not_a_number(line: int, cell: str) -> str:
-    advice = f"If it stands for no value, pass missing={cell!r}"
+    advice = f"If it marks a missing value, pass missing={cell!r}"
     return f"line {line}: {describe(cell)} is not a number. {advice}"
 
 

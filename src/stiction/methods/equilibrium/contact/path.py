@@ -65,11 +65,11 @@ from stiction.base.jit import jit, jit_inside
 Integers = NDArray[np.int64]
 
 RATE_RTOL = 1e-10
-"""A rate below this share of its scale is round-off."""
+"""A rate below this fraction of its scale is round-off."""
 PIVOT_RTOL = 1e-9
-"""Smallest positive pivot, as a share of the diagonal of M."""
+"""Smallest positive pivot, as a fraction of the diagonal of M."""
 OVERSTRESS_RTOL = 1e-12
-"""Overstress that is round-off, as a share of the largest force."""
+"""Overstress that is round-off, as a fraction of the largest force."""
 MAX_EVENTS_PER_NODE = 64
 """Events for each cell and edge, on average, after which a path is given up."""
 NOBODY = -1  # no node, no position in S

@@ -12,7 +12,7 @@ The algorithm is our own (`press`, `begin_push`).
 1. Pressing alone causes shear, because the two bodies expand differently. Each cell has the sign s
    of its shear T_p. With the slip s d, K becomes s K s. If no cell exceeds its strength and each
    edge is pressed, the forces are T_p N.
-2. Otherwise begin at a small share of N. All strengths are zero without N. The nodes beyond their
+2. Otherwise begin at a small part of N. All strengths are zero without N. The nodes beyond their
    strength are on E, edges on top. Follow the path to N.
 3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
    weakening. Edges that are open begin in S.
@@ -38,7 +38,7 @@ from stiction.methods.equilibrium.contact.path import (
 )
 
 FIRST_PRESSING = 1e-3
-"""Share of the normal force at which a pressing that slips begins."""
+"""Fraction of the normal force at which a pressing that slips begins."""
 
 
 class Friction(NamedTuple):

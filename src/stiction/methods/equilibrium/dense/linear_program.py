@@ -39,7 +39,7 @@ weakest window, and from a load below this bound.
    `SHARE_TOWARDS_BOUND` of the way, or to the bound if it is
    within `CLOSE_RTOL`. Solve for the slip, and go to step 1.
 
-The order of the nodes in step 1 and the share in step 4 are for speed.
+The order of the nodes in step 1 and the fraction in step 4 are for speed.
 In a different order the search stalls near the solution. If the load is
 too high, far too many nodes join before a pivot fails.
 
@@ -76,11 +76,11 @@ from stiction.methods.equilibrium.dense.cholesky import SlipState, Workspace
 from stiction.methods.equilibrium.strength import StaticSample, strength_at
 
 OVERSTRESS_RTOL = 1e-12
-"""Share of the mean strength below which an overstress is round-off."""
+"""Fraction of the mean strength below which an overstress is round-off."""
 CLOSE_RTOL = 0.02
 """Relative distance below the bound from which a stable load is raised to the bound itself."""
 SHARE_TOWARDS_BOUND = 0.75
-"""Share of the way to the bound by which a stable load is raised."""
+"""Fraction of the way to the bound by which a stable load is raised."""
 MAX_PASSES = 10_000
 """Passes of a loop in which each pass adds a node or changes the load."""
 

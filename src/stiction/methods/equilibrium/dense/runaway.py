@@ -17,7 +17,7 @@ The algorithm is our own. It uses two known results: the factor of a Toeplitz ma
 
 1. Move along the direction of the instability until a node reaches a
    corner of its law. If no node reaches a corner, the interface slides.
-2. Overloaded nodes beside the run join the
+2. Overloaded nodes next to the run join the
    run, as far as their stress is known.
 3. Take an elastic step. With the present strengths, solve K_RR x =
    (load p - K d - s(d))_R on the run R, with the right side cut off at
@@ -60,7 +60,7 @@ from stiction.methods.equilibrium.strength import (
 MAX_RUN_STEPS = 30
 """Elastic steps; most samples need five to eight."""
 MIN_GROWTH = 1e-3
-"""Growth in a step, as a share of the largest slip, below which the test gives up."""
+"""Growth in a step, as a fraction of the largest slip, below which the test gives up."""
 MAX_RUN = 2048
 """Nodes up to which the test follows a run."""
 UNSTOPPABLE_MARGIN = 1.5

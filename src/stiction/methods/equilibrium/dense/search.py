@@ -63,14 +63,14 @@ WIDEST_GAP_IF_NODES_STOP = 1e-4
 WEAKENING_RATE_RTOL = 1e-12
 """Relative distance of weakening rates that differ by round-off."""
 RESTING_MULTIPLIER_RTOL = 1e-9
-"""Share of the largest multiplier below which it is zero, as at nodes at rest."""
+"""Fraction of the largest multiplier below which it is zero, as at nodes at rest."""
 
 
 class DenseSearch:
     """Search for equilibria of a line or a specimen. It is thread-safe."""
 
     widest_gap = 1e-9
-    """Certificate gap, as a share of the load, above which there is a warning."""
+    """Certificate gap, as a fraction of the load, above which there is a warning."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

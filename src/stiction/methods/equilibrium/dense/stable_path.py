@@ -103,7 +103,7 @@ MAX_MARGIN_AT_STRENGTH = 1e3
 MAX_RESTARTS_PER_NODE = 16
 """How often a node may start again, on average, before the path is given up."""
 NEGATIVE_RATE_RTOL = 1e-10
-"""A rate below zero by less than this share of the largest rate is round-off."""
+"""A rate below zero by less than this fraction of the largest rate is round-off."""
 
 ONE: Any = np.int64(1)  # as `ZERO`: numba would compile a kernel again for a literal
 NOBODY = -1  # no position in S, no node
@@ -181,7 +181,7 @@ def _substitute(state: SlipState, q: Array, first: int, n_slipping: int) -> None
 def _first_to_stop(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, endless: bool
 ) -> tuple[int, float]:
-    """Return the first node whose rate reaches zero (position in S), and the share of the move.
+    """Return the first node whose rate reaches zero (position in S), and the fraction of the move.
 
     Rates move from `v_nodes` to `new` (in S), or, if `endless`, along
     `new` without end.
@@ -208,7 +208,7 @@ def _first_to_stop(
 def _move_v(
     state: SlipState, n_slipping: int, v_nodes: Array, new: Array, share: float, endless: bool
 ) -> None:
-    """Move the rates by a share of the way to `new` (in S). See `_first_to_stop`."""
+    """Move the rates by a fraction of the way to `new` (in S). See `_first_to_stop`."""
     slipping = state.workspace.slipping
     for t in range(n_slipping):
         i = slipping[t]

@@ -61,28 +61,28 @@ MIN_COARSE_NODES = 8
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
 FIRST_LOAD_STEP = 1e-4
-"""First step of the load along a path, as a share of the load. Later steps adapt."""
+"""First step of the load along a path, as a fraction of the load. Later steps adapt."""
 FIRST_SHARE_OF_ONSET = 0.9
-"""Share of the way to the onset without corners that is tried at once. Corners mostly take off less
+"""Part of the way to the onset without corners that is tried at once. Corners mostly take off less
 than a tenth."""
 STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
 """Factors of the next step, after a step that failed and after a step that succeeded."""
 MAX_EXTRAPOLATION = 3.0
 """Steps ahead to which slip is extrapolated as a guess."""
 STEP_RESIDUAL = 0.1
-"""Largest residual stress after a step, as a share of the step."""
+"""Largest residual stress after a step, as a fraction of the step."""
 MAX_STEP_RESIDUAL = 1e-5
-"""Largest residual stress after a step, as a share of the mean strength or load. A rougher slip may
+"""Largest residual stress after a step, relative to the mean strength or load. A rougher slip may
 miss an event."""
 AT_CORNER = 1.0 - 1e-9
-"""Share of the slip at a corner above which a node counts as beyond it, given `SLIP_RTOL`."""
+"""Fraction of the slip at a corner above which a node counts as beyond it, given `SLIP_RTOL`."""
 SLIP_RTOL = 1e-7
-"""Largest residual stress of the slip at a given load, as a share of the mean strength."""
+"""Largest residual stress of the slip at a given load, as a fraction of the mean strength."""
 BISECTED_GAP, BISECTED_GAP_FACTOR = 5e-3, 0.2
 """Relative gap to which a trivial bracket is bisected before Newton's method is tried, and its
 change each time that fails."""
 BISECTED_RESIDUAL = 0.05
-"""Residual stress of bisection, as a share of that gap, or of `COARSE_GAP` if it is smaller."""
+"""Residual stress of bisection, as a fraction of that gap, or of `COARSE_GAP` if it is smaller."""
 
 
 def halved(fine: Array) -> Array:

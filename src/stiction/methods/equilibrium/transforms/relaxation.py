@@ -35,17 +35,17 @@ Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
 1. If the load exceeds the mean strength, the interface slides, because the mean of
    K d is zero.
-2. Step with bounds (`_bound`). Let nodes weaken at only a share of
+2. Step with bounds (`_bound`). Let nodes weaken at only a fraction of
    their present rate, and no further than to their next corner. This
    strength is not below the true strength at any node. Therefore the
    solution of (1) with this strength lies below the least equilibrium.
-   The share is 1 - `omitted`. The larger it is, the longer is the step.
-3. If the share is 1 and all nodes are on the assumed pieces, the
+   The fraction is 1 - `omitted`. The larger it is, the longer is the step.
+3. If the fraction is 1 and all nodes are on the assumed pieces, the
    solution is the least equilibrium, and the interface is arrested.
 4. If the step has a solution, slip moves to it. If hardly any node
-   moves, the next step has the share 1, because only this share can end
+   moves, the next step has the fraction 1, because only this fraction can end
    at the equilibrium.
-5. If a step has negative curvature with the share 1, or if the slip is
+5. If a step has negative curvature with the fraction 1, or if the slip is
    at an instability, move with the true pieces to the first corner
    (`_step_to_corner`). Otherwise omit twice as much of the weakening. A
    step that omits all of it has a solution unless the interface slides.
@@ -94,16 +94,16 @@ PIECES_RESIDUAL = 0.03
 CURVATURE_RESIDUAL = 0.1
 """Factor by which a residual is reduced in the search for negative curvature."""
 DIRECTION_RTOL = 1e-5
-"""Share of the largest entry below which an entry of an unstable direction is round-off."""
+"""Fraction of the largest entry below which an entry of an unstable direction is round-off."""
 DRAG = 1e-3
-"""Stiffness that is added in place of the omitted weakening, as a share of the largest W. Without
+"""Stiffness that is added in place of the omitted weakening, relative to the largest W. Without
 it a step of a plane that slides as a whole would have no solution."""
 BOUND_RESIDUAL = 0.05
-"""Largest residual stress of a step, as a share of the weakening omitted in the step before."""
+"""Largest residual stress of a step, as a fraction of the weakening omitted in the step before."""
 MIN_OMITTED = 0.02
-"""Share of the weakening that is omitted first."""
+"""Fraction of the weakening that is omitted first."""
 CREEP = 0.02
-"""Growth in a step, as a share of d_c, up to which slip hardly moves."""
+"""Growth in a step, as a fraction of d_c, up to which slip hardly moves."""
 
 
 def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> float:
@@ -163,7 +163,7 @@ def stable_equilibrium(
 
     The path begins at an equilibrium with less slip at a lower load.
     The guess is a slip at the end of the path. The accuracy is the
-    largest residual stress as a share of the mean strength or load.
+    largest residual stress as a fraction of the mean strength or load.
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     pieces, start = sample.pieces, present_pieces(sample, slip)
@@ -215,7 +215,7 @@ def _bound(
     omitted: float,
     tolerance: float,
 ) -> Bound:
-    """(b) 2: return the slip if nodes omit a share of their weakening and stop at their corner.
+    """(b) 2: return the slip if nodes omit a fraction of their weakening and stop at their corner.
 
     The assumed strength is the larger of two straight
     lines, and Newton's method finds which line applies
@@ -305,7 +305,7 @@ def least_equilibrium(
     The given slip is zero, or belongs to an equilibrium at a lower
     load, or lies beyond this equilibrium along an unstable direction,
     or (`is_unstable`) belongs to an instability. The accuracy is the
-    largest residual stress as a share of the mean strength or load. If
+    largest residual stress as a fraction of the mean strength or load. If
     an interface ends, it slides when all nodes that can break slip,
     unless it is followed `to_rest`.
     """

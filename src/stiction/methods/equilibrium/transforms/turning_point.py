@@ -66,21 +66,21 @@ MAX_PATCH_CHANGES = 4
 MAX_IDLE_STATES = 8
 """States in a row that hardly narrow the gap, after which the search ends."""
 IDLE_GAP_SHARE = 0.95
-"""Share of the gap that must remain for a state to count as idle."""
+"""Fraction of the gap that must remain for a state to count as idle."""
 PATCH_CHANGE_RETREAT = 2e-3
 """Share by which the load is lowered when another patch is held, twice as much each time."""
 MAX_STEP = 0.3
-"""Longest step, as a share of the amplitude. A longer step may reach another patch."""
+"""Longest step, as a fraction of the amplitude. A longer step may reach another patch."""
 NEWTON_FACTOR = 1.2
 """Length of a step as a multiple of Newton's, which falls short because mu' falls in steps."""
 STALLED_SHARE = 0.7
-"""Share of mu' that must remain after a step for the next step to be twice as long instead."""
+"""Fraction of mu' that must remain after a step for the next step to be twice as long instead."""
 RESIDUAL_SHARE_OF_GAP = 0.05
-"""Residual stress, as a share of the gap that is asked for, so that it does not open the bounds."""
+"""Residual stress, relative to the gap that is asked for, so that it does not open the bounds."""
 LOAD_BELOW_BOUND = 0.3
-"""Distance of the load below the upper bound, as a share of that gap: such a state closes it."""
+"""Distance of the load below the upper bound, as a fraction of that gap: such a state closes it."""
 PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
-"""Residual of the eigenvector of another patch, as a share of the largest W, and iterations."""
+"""Residual of the eigenvector of another patch, as a fraction of the largest W, and iterations."""
 
 
 class Held(NamedTuple):
@@ -100,7 +100,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
     The guess gives the amplitude at which the
     spring has no force. The accuracy is the largest
-    residual stress as a share of the mean strength.
+    residual stress as a fraction of the mean strength.
     """
     excess, profile = bracket.excess, bracket.profile
     load, amplitude = guess.load, guess.amplitude
@@ -136,7 +136,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
 
 
 def _other_patch(bracket: Bracket) -> Array | None:
-    """Step 2: return the unstable patch (unit norm) beside the held patch, or `None`."""
+    """Step 2: return the unstable patch (unit norm) next to the held patch, or `None`."""
     vector = np.where(bracket.inside, np.abs(bracket.operator.direction), 0.0)
     if not vector.any():
         return None
