@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from refusals import refuses
 from setups import EXACT
 from sliders import SLIDER, coefficients, rig_problem
 
@@ -82,9 +83,45 @@ def test_the_sensitivity_is_the_derivative():
 
 
 def test_only_linear_weakening_is_followed():
-    law = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.3, 0.0], critical_slip=1e-5)
+    law = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.3, 0.0], critical_slip=1e-4)
     problem = rig_problem(problem={"friction": law})
     assert "LinearWeakening" in EXACT.supports(problem)[0]
+    mu = coefficients(problem)
+    for call in (
+        lambda: solved(problem, mu),
+        lambda: st.equilibrium_path(problem, mu, [1e6]),
+        lambda: st.plot.specimen(problem, mu),
+    ):
+        refuses("friction ... LinearWeakening", call)
+
+
+def test_a_path_with_inertia_is_refused():
+    problem = rig_problem()
+    refuses(
+        "method ... equal blocks",
+        lambda: st.equilibrium_path(problem, coefficients(problem), [1e6], method=st.Rupture()),
+    )
+
+
+@pytest.mark.parametrize("rate", [5e9, 2e10])
+@pytest.mark.parametrize("mean", [0.05, 0.1])
+def test_a_pressing_that_slips_at_both_ends_comes_to_rest(rate, mean):
+    """Slip of one half unloads the other. A cell that stops there does not slip back."""
+    n, force, rng = 48, 4e3 / 0.006, np.random.default_rng(1)
+    rig = rig_problem(n).rig
+    matrices = stages.make_matrices(rig.K, rig.T_p)
+    for ratio in (0.2, 0.6):
+        for _ in range(10):
+            peak = mean * np.exp(0.15 * rng.normal(size=n))
+            weakening = np.full(n, rate * 0.14 / n)
+            friction = stages.Friction(peak, ratio * peak, weakening)
+            pressed = stages.press(matrices, friction, force)
+            sign, pressure = np.sign(rig.T_p[:n]), stages.on_cells(-pressed.forces[n:])
+            slip = sign * pressed.moved[:n]
+            assert slip.min() >= 0.0
+            falls = np.where(pressed.friction.peak > ratio * peak, weakening * slip, 0.0)
+            strength = pressed.friction.peak * pressure - falls
+            assert np.all(sign * pressed.forces[:n] <= strength + 1e-9 * force / n)
 
 
 def test_a_slider_that_topples_before_it_slides():

@@ -12,6 +12,7 @@ from stiction.methods.equilibrium.contact.solver import (
     OF_SLIDERS,
     SliderSolver,
     push_variables,
+    refused_laws,
 )
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.sample import pieces_of, refused
@@ -158,11 +159,8 @@ class Equilibrium(Listed):
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
         reasons = refused(problem.friction)
-        if isinstance(problem.specimen, Slider) and not (reasons or problem.friction.linear):
-            reasons.append(
-                "friction: the strength of a slider falls linearly with slip. Use"
-                " st.LinearWeakening(weakening_rate=...)"
-            )
+        if isinstance(problem.specimen, Slider):
+            reasons = reasons or refused_laws(problem)
         if problem.friction.plateau and problem.interface.is_plane:
             reasons.append(
                 "friction.strength: begins with a plateau, which is followed on lines only. Let it"

@@ -46,7 +46,7 @@ from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
-from stiction.problem.specimen import Slider
+from stiction.problem.specimen import Blocks, Slider
 from stiction.problem.unit_doubts import doubt_sample
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
@@ -125,7 +125,7 @@ def equilibrium_path(
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
     method : Rupture, optional
-        Compute the events of a specimen with inertia.
+        Compute the events of equal blocks with inertia.
 
     Returns
     -------
@@ -184,7 +184,7 @@ def equilibrium_path(
     -----
     A patch jumps to the least equilibrium at the same load, where an overdamped
     interface would stop. Inertia may carry a rupture further. Only `Rupture` can
-    decide this. On a specimen, pass a `Rupture` as `method`.
+    decide this. On equal blocks, pass a `Rupture` as `method`.
 
     Examples
     --------
@@ -204,8 +204,9 @@ def equilibrium_path(
     """
     given = _check_loads(loads)
     check("problem", problem, Problem)
-    if method is not None and (problem.specimen is None or not hasattr(method, "search")):
-        raise InputError("method: only specimens take a method, st.Rupture(). Leave it out")
+    blocks = isinstance(problem.specimen, Blocks)
+    if method is not None and not (blocks and hasattr(method, "search")):
+        raise InputError("method: only equal blocks take a method, st.Rupture(). Leave it out")
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")

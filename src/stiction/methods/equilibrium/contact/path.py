@@ -29,8 +29,8 @@ Algorithm
 The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E of cells and edges that
 could not start.
 
-1. If E is empty, the load rises and v = M_SS^-1 p_S. A slipping cell whose rate is negative stops.
-   Otherwise the load is held. e, the top of E, moves at the rate 1, and v = -M_SS^-1 M_Se.
+1. If E is empty, the load rises and v = M_SS^-1 p_S. Otherwise the load is held. e, the top of
+   E, moves at the rate 1, and v = -M_SS^-1 M_Se. A slipping cell whose rate is negative stops.
 2. Find the nearest kink: a resting cell or a closed edge has lost its margin (a start), e has
    lost its overstress, a cell meets mu_r N (a corner; a resting cell may meet it while N
    falls), or an open edge closes. Without a kink the slider slides.
@@ -278,7 +278,6 @@ def _find_rates(state: Contact, e: int) -> int:
         change[inside[t]] = 0.0
     if e != NOBODY:
         rate[e] = 1.0
-        return NOBODY
     return stopping
 
 

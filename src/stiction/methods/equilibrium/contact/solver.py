@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.errors import warn_accuracy, warn_of_samples
+from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.base.variables import Variable
 from stiction.elasticity.rig import on_cells
 from stiction.methods.equilibrium.contact.path import N_STACKED, Status, follow
@@ -85,6 +85,13 @@ def push_variables(interface: Interface) -> dict[str, Variable]:
     return {name: variables[name] for name in variables if name not in WITH_FIXED_PRESSURE}
 
 
+def refused_laws(problem: Problem) -> list[str]:
+    """Return why a slider cannot take its friction law, or an empty list."""
+    text = "friction: the strength of a slider falls linearly with slip. Use"
+    text += " st.LinearWeakening(weakening_rate=...)"
+    return [] if problem.friction.linear else [text]
+
+
 class SliderPath:
     """A slider on its path, which only goes on."""
 
@@ -130,6 +137,8 @@ class SliderSolver:
     """Solver for samples of a slider by `Equilibrium` with given options. It is thread-safe."""
 
     def __init__(self, problem: Problem, options: Any = None) -> None:
+        if reasons := refused_laws(problem):
+            raise InputError(reasons)
         rig, machine = problem.rig, problem.specimen.machine  # type: ignore[union-attr]
         relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
         self.problem, self.options, self.rig = problem, options, rig
