@@ -22,7 +22,14 @@ from typing import Annotated, Any
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import AccuracyWarning, InputError, UnitWarning, prefixed, warn_user
+from stiction.base.errors import (
+    AccuracyWarning,
+    InputError,
+    UnitWarning,
+    prefixed,
+    unknown_name,
+    warn_user,
+)
 from stiction.base.model import as_numbers, describe, real_array
 from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
@@ -251,12 +258,21 @@ def labelled(
         )
     # 2. Choose the column and its coordinates by the rule.
     lines: Any = ()
-    read: Reading | None
+    read: Reading | None = None
     if isinstance(data, Table):
         array, read = _of_table(data, quantity, dims, x, value)
         lines = data.lines
+    elif hasattr(data, "data_vars"):
+        array, read = _of_dataset(data, quantity, dims, value)
+    elif value not in (None, data.name):
+        raise InputError(
+            f"value: {value!r} is not the name of the only variable, {data.name!r}"
+        )
     else:
-        array, read = _of_variables(data, quantity, dims, x, value)
+        array = data
+    if not isinstance(data, Table):
+        dims = dims or (("x", "y") if {"x", "y"} <= {*array.dims} else ("x",))
+        array = _with_places(array, dims, x)
     dims = dims or (("x", "y") if "y" in array.coords else ("x",))
     # 3. Name the dimensions.
     array = _directed(array, dims)
@@ -325,7 +341,7 @@ def _of_table(
     if table.begins:
         raise InputError(several_tables(table))
     dims = dims or (("x", "y") if _is_map(table.columns) else ("x",))
-    chosen, places = _chosen(table.columns, quantity, dims, x, value, table=True)
+    chosen, places = _chosen(table.columns, quantity, dims, x, value)
     if texts := [column.text for column in (chosen, *places.values()) if column.text]:
         raise InputError(texts)
     array = xr.DataArray(
@@ -336,30 +352,45 @@ def _of_table(
     return array, reading_of(table, chosen, QUANTITIES[quantity].units, places)
 
 
-def _of_variables(
-    data: Any, quantity: str, dims: Any, x: Wanted, value: Wanted
-) -> tuple[Any, Reading | None]:
-    """Return a variable of labelled data over its coordinates, and what was read."""
-    if not hasattr(data, "data_vars"):
-        if value not in (None, data.name):
-            raise InputError(
-                f"value: {value!r} is not the name of the only variable, {data.name!r}"
-            )
-        data, value = data.to_dataset(name=quantity), quantity
+def _of_dataset(data: Any, quantity: str, dims: Any, value: Wanted) -> tuple[Any, Reading]:
+    """Return a variable of a dataset, with others along it as coordinates, and what was read."""
     dims = dims or (("x", "y") if {"x", "y"} <= {*data.dims} else ("x",))
-    variables = [*data.data_vars, *(name for name in data.coords if data[name].ndim == 1)]
-    columns = [
+    names = [*data.data_vars]
+    columns = tuple(
         Column(str(name), unit_of(data[name]), data[name], -1 - number, str(name))
-        for number, name in enumerate(variables)
-    ]
-    chosen, places = _chosen(columns, quantity, dims, x, value, table=False)
-    array = data[variables[-1 - chosen.number]]
-    at = {dim: data[variables[-1 - column.number]].variable for dim, column in places.items()}
-    at = {dim: along for dim, along in at.items() if {*along.dims} <= {*array.dims}}
+        for number, name in enumerate(names)
+    )
+    if value is not None:
+        chosen = stated_column(columns, "value", value)
+    else:
+        left = [c for c in columns if c.values.ndim >= len(dims)]
+        chosen = _by_rule(left, quantity)
+    array = data[names[-1 - chosen.number]]
+    along = {
+        name: data[name]
+        for name in names
+        if name != array.name and data[name].ndim == 1 and {*data[name].dims} <= {*array.dims}
+    }
+    table = Table(columns, "", np.zeros(0))
+    read = reading_of(table, chosen, QUANTITIES[quantity].units, {})
+    return array.assign_coords(along), read
+
+
+def _with_places(array: Any, dims: tuple[str, ...], x: Wanted) -> Any:
+    """Return a DataArray whose only coordinates are its positions."""
+    along = {_plain(name): at.variable for name, at in array.coords.items() if at.ndim == 1}
+    called = [name for name in along if name in (dims if len(dims) == 2 else PLACES)]
+    if x is not None:
+        if x not in array.coords:
+            raise InputError(unknown_name("x", str(x), [*map(str, array.coords)]))
+        along, called = {"x": array[x].variable}, ["x"]
+    if len(called) > len(dims):
+        raise InputError(
+            f"coordinates {' and '.join(called)} could be the position x. Pass x={called[0]!r}"
+        )
+    places = {name if len(dims) == 2 else "x": along[name] for name in called}
     dropped = [name for name in array.coords if name not in array.dims]
-    table = Table(tuple(columns), "", np.zeros(0))
-    read = reading_of(table, chosen, QUANTITIES[quantity].units, places)
-    return array.drop_vars(dropped).assign_coords(at), read if len(columns) > 1 else None
+    return array.drop_vars(dropped).assign_coords(places)
 
 
 def _units(column: Column) -> dict[str, str]:
@@ -377,48 +408,48 @@ def several_tables(table: Table) -> str:
 
 
 def _chosen(
-    columns: Sequence[Column], quantity: str, dims: tuple[str, ...], x: Wanted, value: Wanted,
-    *, table: bool,
-) -> tuple[Column, dict[str, Column]]:  # fmt: skip
+    columns: Sequence[Column], quantity: str, dims: tuple[str, ...], x: Wanted, value: Wanted
+) -> tuple[Column, dict[str, Column]]:
     """Return the column of a quantity, and by direction the columns of its coordinates."""
-    si = QUANTITIES[quantity].units
-    words = (quantity, *NAMES.get(quantity, ()))
     chosen = None if value is None else stated_column(columns, "value", value)
     stated = None if x is None else stated_column(columns, "x", x)
-    if table and any(column.heading for column in columns):  # without a name, it is an index
+    if any(column.heading for column in columns):  # without a name, it is an index
         columns = [column for column in columns if column.heading]
     plain = [_plain(column.name) for column in columns]
     bare = plain == [str(number) for number in range(len(columns))]
-    along = [
-        column for column in columns if column is not chosen and np.ndim(column.values) == 1
-    ]
     places: dict[str, Column] = {}
     if len(dims) == 2:
         places = {name: c for name, c in zip(plain, columns, strict=True) if name in dims}
-        if bare and table and len(columns) == 3:
+        if bare and len(columns) == 3:
             places, chosen = {"x": columns[0], "y": columns[1]}, chosen or columns[2]
-        if table and len(places) < 2:
+        if len(places) < 2:
             listed = ", ".join(repr(column.label) for column in columns[:MAX_LISTED])
             raise InputError(f"has no columns x and y: got {listed}{OF_A_PLANE}")
     elif stated is not None:
         places = {"x": stated}
-    elif bare and table and len(columns) == 2:
+    elif bare and len(columns) == 2:
         if chosen is not columns[0]:
             places = {"x": columns[0]}
-    elif place := _place_of(along, words, si if table else "", table):
+    elif place := _place_of([c for c in columns if c is not chosen], quantity):
         places = {"x": place}
     if chosen is None:
-        left = [column for column in columns if column not in places.values()]
-        if not table:
-            left = [
-                c for c in left if c.values.ndim >= len(dims) and c.name not in c.values.dims
-            ]
-        others = {name for key, names in NAMES.items() if key != quantity for name in names}
-        left = [c for c in left if _plain(c.name) not in others - {*words}]
-        chosen = read_column(left, quantity, "value", None, [si], _says(words, quantity, left))
-    if table and len(dims) == 1 and not places and len(columns) > 2 and value is None:
+        chosen = _by_rule([c for c in columns if c not in places.values()], quantity)
+    if len(dims) == 1 and not places and len(columns) > 2 and value is None:
         raise InputError(unclear(columns, "position x", "x"))
     return chosen, places
+
+
+def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
+    """Return the column of a quantity by the rule. Other names than its own exclude a column."""
+    words = _words(quantity)
+    others = {name for key in NAMES for name in NAMES[key]} - {*words}
+    left = [column for column in columns if _plain(column.name) not in others]
+    says = _says(words, quantity, left)
+    return read_column(left, quantity, "value", None, [QUANTITIES[quantity].units], says)
+
+
+def _words(quantity: str) -> tuple[str, ...]:
+    return quantity, *NAMES.get(quantity, ())
 
 
 def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any:
@@ -429,16 +460,15 @@ def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any
     return lambda column: role_of(column) == SAID_BY_ROLE[quantity]
 
 
-def _place_of(
-    columns: Sequence[Column], words: Sequence[str], si: str, table: bool
-) -> Column | None:
+def _place_of(columns: Sequence[Column], quantity: str) -> Column | None:
     """Return the column of positions: by its heading, or as the only one in a unit of length."""
+    words = _words(quantity)
     numeric = [c for c in columns if not c.text and _plain(c.name) not in words]
     called = [c for c in numeric if _plain(c.name) in PLACES]
-    if not called and table:
+    if not called:
         called = [c for c in numeric if role_of(c) == "travel" and c.unit not in words]
         called = [c for c in called if not c.unit or is_in(c.unit, "m")]
-    if not called and si != "m" and table:
+    if not called and QUANTITIES[quantity].units != "m":
         called = [c for c in numeric if is_in(c.unit, "m")]
         called = called if len(called) == 1 else []
     if len(called) > 1:
