@@ -64,6 +64,7 @@ from stiction.base.model import (
 )
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
+from stiction.ensemble.experiment import Experiment
 from stiction.inference.grid import grid_of
 from stiction.inference.infer import profiles_of
 from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
@@ -106,7 +107,7 @@ def design_of_tests(
     prior: Any = None,
     designs: dict[str, Any] | None = None,
     probability: Share = 1e-3,
-    method: MethodObject,
+    method: MethodObject | None = None,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
     repetitions: Annotated[Count, Field(ge=10)] = 60,
@@ -125,14 +126,14 @@ def design_of_tests(
     Parameters
     ----------
     problem, random, prior, method, samples, seed, progress
-        As in `infer`.
+        As in `infer`. The method of a posterior is the default.
     designs : mapping
         Designs by name. A design is a number of tests, a mapping of lengths (m)
         to numbers of tests, or a table ``{"tests": ..., "known": [...]}``, in
         which ``known`` lists parameters of the prior that are known from other
         measurements. For a fit or a posterior, a design is ``{"tests": ...,
         "profiles": ...}``, with numbers of further tests and profiles. The default
-        designs are 5, 10, 20 or 40 tests, or 2, 5 or 10 profiles.
+        designs are 5, 10, 20 or 40 tests, or, after profiles, 2, 5 or 10 profiles.
     probability : float
         Probability for the design stress. Used for a fit or a posterior.
     load_cell_error : float
@@ -183,12 +184,24 @@ def design_of_tests(
     True
     """
     error = load_cell_error * factor_of(unit)
+    method = method or getattr(getattr(random, "likelihood", None), "method", None)
+    if method is None:
+        raise InputError("method: is needed without a posterior. Give st.Equilibrium()")
     with Meter("design of tests", show=progress) as meter:
         simulation = Simulation(method, samples, seed, None, meter)
         if prior is None:
-            further = _further(USUAL_DESIGNS if designs is None else designs)
             tables = _present(problem, random, simulation, unit, error)
-            return _widths(tables, further, probability, repetitions, simulation)
+            usual = {
+                name: design
+                for name, design in USUAL_DESIGNS.items()
+                if tables.profiles.levels.size or not isinstance(design, dict)
+            }
+            further = _further(usual if designs is None else designs)
+            # Peaks may be forces or coefficients, and a design is a stress.
+            scale = 1.0 / tables.onsets[0].area
+            if getattr(random, "peaks", None) and random.peaks.unit == "1":
+                scale = Experiment(problem, tables.profiles.fields[0], method).pressure
+            return _widths(tables, further, probability, repetitions, simulation, scale)
         parameters = make_prior(problem, random, prior)
         variable = variable_of(*parameters.at(parameters.middle), unit)
         plans = _plans(designs or {}, parameters.names)
@@ -355,6 +368,7 @@ def _widths(
     probability: float,
     repetitions: int,
     simulation: Simulation,
+    scale: float,
 ) -> xr.Dataset:
     """Return widths of intervals and design stresses after further measurements."""
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
@@ -378,15 +392,13 @@ def _widths(
             widths[row, number] = np.ptp(ends, axis=1)
             stresses[row, number] = both.quantile(grid, probability)
             simulation.meter.advance()
-    # Peaks may be forces, and a design is a stress.
-    area = tables.onsets[0].area
-    low, high = np.quantile(stresses, [0.05, 0.95], axis=1) / area
+    low, high = np.quantile(stresses, [0.05, 0.95], axis=1) * scale
     both_dims, about = ("design", "parameter"), {"units": "Pa"}
     return xr.Dataset(
         {
             "width": (both_dims, widths.mean(axis=1)),
             "standard_error": (both_dims, widths.std(axis=1) / np.sqrt(repetitions)),
-            "design_stress": ("design", stresses.mean(axis=1) / area, about),
+            "design_stress": ("design", stresses.mean(axis=1) * scale, about),
             "design_low": ("design", low, about),
             "design_high": ("design", high, about),
         },

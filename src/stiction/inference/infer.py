@@ -54,7 +54,7 @@ from stiction.inference.likelihood import (
     out_of_reach,
     variable_of,
 )
-from stiction.inference.peaks import Peaks, factor_of, make_peaks
+from stiction.inference.peaks import Peaks, by_specimen, factor_of, make_peaks
 from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, SpecimenPosterior
 from stiction.inference.prior import Prior, make_prior, refuse_conditioned
 from stiction.inference.specimens import (
@@ -68,6 +68,7 @@ from stiction.inference.specimens import (
     tables_of,
 )
 from stiction.methods.criterion.local import LocalCriterion
+from stiction.methods.equilibrium.method import Equilibrium
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
 from stiction.problem.unit_doubts import doubt_strengths
@@ -114,12 +115,12 @@ def _simulating(
 @checked
 def infer(
     problem: Problem,
-    random: AnyRandom,
+    random: AnyRandom | None,
     peaks: Any,
     *,
     prior: Any = None,
     between: Any = None,
-    method: MethodObject,
+    method: MethodObject | None = None,
     load_cell_error: NotNegative = 0.0,
     unit: str = "Pa",
     samples: Annotated[Count, Field(ge=100)] | None = None,
@@ -136,12 +137,15 @@ def infer(
     ----------
     problem : Problem
         One specimen.
-    random : RandomInterface, RandomField, a fit, or a list of interfaces
-        For mean and scatter: a fit, whose records are combined with the peaks, or equally likely
-        fields within a specimen. For other parameters: one interface.
+    random : RandomInterface, RandomField, a fit, a list of interfaces, or None
+        If None, specimens differ only as a whole, and no field within a specimen is assumed.
+        A joint is then a new specimen. For mean and scatter: a fit, whose records are combined
+        with the peaks, or equally likely fields within a specimen. For other parameters: one
+        interface.
     peaks : array, mapping of arrays, or Peaks
         Mean shear stress or force at which each specimen slid, in `unit`, or the result of
-        `read_peaks`. For several lengths (m) of specimens: ``{0.1: [...], 0.2: [...]}``.
+        `read_peaks`. Repeated slip loads of one specimen count as their mean. For several
+        lengths (m) of specimens: ``{0.1: [...], 0.2: [...]}``.
     prior : mapping, optional
         For mean and scatter: ``"mean"``, by default flat in its logarithm, and ``"between"``,
         the coefficient of variation between specimens, by default half-Cauchy with scale 0.1.
@@ -152,7 +156,8 @@ def infer(
         Families of the factor between specimens, as in `fit_field`. By default those of the fit,
         or all.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset.
+        Method that computes the onset. It may be left out if `random` is None: then it has no
+        effect on a joint that is equal to the specimens.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
@@ -216,13 +221,21 @@ def infer(
     >>> 0.9e6 < low < high < 1.1e6
     True
     """
-    measured = make_peaks(peaks, unit)
+    measured, repeated = by_specimen(make_peaks(peaks, unit))
     error = load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
         raise InputError(
             f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
             " standard deviation in the unit of the peaks"
         )
+    error = math.hypot(error, repeated)
+    of_parameters = prior and {*prior} - {MEAN_KEY, SCATTER_KEY}
+    if method is None:
+        if random is not None:
+            raise InputError("method: is needed with a random interface. Give st.Equilibrium()")
+        method = Equilibrium()
+    if random is None and of_parameters:
+        raise InputError("random: is None, so the prior can hold mean and between only")
     # Tests of a single length must be tests of the problem. A posterior
     # from several lengths holds for any problem.
     (length, *others), size = measured.lengths, problem.interface.measure
@@ -233,7 +246,7 @@ def infer(
             " problem of the tests. The posterior serves other problems, too"
         )
     with _simulating(method, samples, seed, workers, progress) as simulation:
-        if prior and {*prior} - {MEAN_KEY, SCATTER_KEY}:
+        if of_parameters:
             if between is not None:
                 raise InputError(
                     "between: has no effect on the parameters of this prior. Leave it out"
@@ -242,7 +255,11 @@ def infer(
             posterior = _of_parameters(unknown, simulation, measured, error)
         else:
             # 1.
-            profiles = profiles_of(random, prior, between, seed)
+            whole = random is None
+            profiles = profiles_of(
+                Profiles.without_field(problem, measured) if whole else random,
+                prior, between, seed,
+            )  # fmt: skip
             posterior = _of_specimens(problem, profiles, simulation, measured, error)
     for text in posterior.notes:
         warn_accuracy(text)
@@ -419,6 +436,8 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
     """Return the profiles of a fit, or the fields of any other source, which has no levels."""
     more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
     more |= {} if families is None else {"families": families_of(families)}
+    if isinstance(random, Profiles):
+        return random._replace(**more)
     if isinstance(random, FieldFit):
         return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
     if isinstance(random, Posterior):

@@ -9,6 +9,7 @@ refused, and so are peaks that are far from the predictions.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ import numpy as np
 import pydantic
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, prefixed
+from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import (
     FilePath,
     Number,
@@ -39,6 +40,7 @@ from stiction.base.units import (
     states_unit,
 )
 from stiction.inference.curves import Curves
+from stiction.inference.standards import standards_of
 from stiction.problem.reading.columns import (
     Column,
     Reading,
@@ -66,6 +68,8 @@ MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks above which their unit must be wrong."""
 MIN_CURVE_LINES = 100
 """Fewest lines of a table that is taken for a curve if its time or travel only rises."""
+PART = re.compile(r"(.*\d)[ ._-]?[A-Za-z]")
+"""Name of a slip load that consists of the number of its specimen and a letter."""
 SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
 """Beginnings of the heading of a column that says which specimen was tested."""
 COEFFICIENTS = (0.05, 1.0)
@@ -94,6 +98,10 @@ class Peaks(Result):
         Name or number of the specimen of each test.
     read : Reading, optional
         File, column, unit and number of values, and what was left out.
+    surfaces : int
+        Number of friction surfaces that carry a slip load.
+    loads : Peaks, optional
+        Single slip loads, if these peaks are the means of specimens.
     """
 
     lengths: tuple[float | None, ...]
@@ -102,6 +110,17 @@ class Peaks(Result):
     normal_forces: tuple[Array, ...] | None = None
     specimens: tuple[Any, ...] | None = None
     read: Reading | None = None
+    surfaces: int = 1
+    loads: Peaks | None = None
+
+    @property
+    def standards(self) -> dict[str, float]:
+        """Mean, standard deviation, and values by EN 1990 and EN 1090-2, of all slip loads.
+
+        `stiction.inference.standards` has the formulas. They are from memory, and not yet
+        compared with the printed standards.
+        """
+        return standards_of(np.concatenate((self.loads or self).values))
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
         """Refuse peaks that differ so much from predictions that their unit must be wrong."""
@@ -132,7 +151,36 @@ def title_of(peaks: Peaks) -> str:
     """Return the numbers of peaks, by the length of specimens."""
     pairs = zip(peaks.lengths, peaks.values, strict=True)
     kinds = [f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs]
+    if peaks.loads is not None:
+        kinds.append(f"means of {sum(map(np.size, peaks.loads.values))} slip loads")
     return ", ".join(kinds)
+
+
+def by_specimen(peaks: Peaks) -> tuple[Peaks, float]:
+    """Return the mean peak of each specimen, and its standard error from repeated slip loads.
+
+    The unit is a specimen: its slip loads say nothing about other specimens. Their pooled
+    coefficient of variation gives the error of a mean. If specimens have different numbers of
+    slip loads, the error is for their harmonic mean.
+    """
+    if peaks.specimens is None:
+        return peaks, 0.0
+    means, squares, loads, shares = [], 0.0, 0, 0.0
+    for values, names in zip(peaks.values, peaks.specimens, strict=True):
+        _, of, counts = np.unique(names, return_inverse=True, return_counts=True)
+        means.append(np.bincount(of, values) / counts)
+        squares += float(np.sum((values / means[-1][of] - 1.0) ** 2))
+        loads, shares = loads + values.size, shares + float(np.sum(1.0 / counts))
+    total = np.concatenate(means)
+    if loads == total.size:
+        return peaks, 0.0
+    if total.size < MIN_PEAKS:
+        raise InputError(
+            f"peaks: are of {total.size} specimens, at least {MIN_PEAKS} are needed. Several tests"
+            " of a specimen say nothing about other specimens"
+        )
+    error = math.sqrt(squares / (loads - total.size) * shares / total.size) * total.mean()
+    return replace(peaks, values=tuple(means), specimens=None, loads=peaks), float(error)
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
@@ -328,6 +376,14 @@ def _of_table(
     labels = (
         np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept] if names else None
     )
+    if labels is not None and (alike := [PART.fullmatch(str(name)) for name in labels]):
+        stems = [part[1] if part else "" for part in alike]
+        if all(stems) and len({*stems}) < np.unique(labels).size:
+            warn_accuracy(
+                f"{names[0].label!r}: {labels[0]}, {labels[1]}, ... are read as slip loads of"
+                f" specimens {', '.join(dict.fromkeys(stems))}. Otherwise number the specimens"
+            )
+            labels = np.array(stems)
     if labels is not None and 1 < np.unique(labels).size < MIN_PEAKS:
         raise InputError(
             f"holds {np.unique(labels).size} specimens in {names[0]}, at least {MIN_PEAKS} are"
@@ -342,9 +398,14 @@ def _of_table(
             raise InputError(f"length: missing in row {row}. Give the length of each specimen")
     whole = {None: np.ones(values.size, dtype=bool)}
     groups = whole if sizes is None else {size: sizes == size for size in np.unique(sizes)}
+    if labels is None and normal is not None:
+        warn_accuracy(
+            "no column says which specimen was tested, so each slip load counts as a specimen."
+            " Repeated slip loads of a specimen need a column 'specimen'"
+        )
     made = make_peaks({size: values[rows] for size, rows in groups.items()}, si)
     return replace(
-        made, read=read,
+        made, read=read, surfaces=int(surfaces),
         normal_forces=None if forces is None else tuple(forces[rows] for rows in groups.values()),
         specimens=None if labels is None else tuple(labels[rows] for rows in groups.values()),
     )  # fmt: skip

@@ -332,7 +332,7 @@ class SpecimenPosterior(Posterior):
     def assumed(self) -> dict[str, float]:
         """Parameters of a field within a specimen that was stated and not measured, by key."""
         profiles = self.grid.profiles
-        if profiles.levels.size or len(profiles.fields) > 1:
+        if profiles.whole or profiles.levels.size or len(profiles.fields) > 1:
             return {}
         field = profiles.fields[0].strength
         values = {
@@ -345,12 +345,26 @@ class SpecimenPosterior(Posterior):
     def assumptions(self) -> tuple[str, ...]:
         """What was stated and not measured, in words."""
         profiles, texts = self.grid.profiles, []
-        if not profiles.levels.size:
+        if profiles.whole:
+            texts.append(
+                "specimens differ only as a whole, and no field within a specimen is assumed. A"
+                " joint is a new specimen with its own factor"
+            )
+            if self.peaks.unit == "1":
+                ratio = self.likelihood.onsets[0].ratios.mean() / profiles.reference
+                texts.append(f"the slip factor of a specimen is {ratio:.4g} of its mean")
+        elif not profiles.levels.size:
             field = profiles.fields[0].strength
             more = f" and {len(profiles.fields) - 1} more" * (len(profiles.fields) > 1)
             texts.append(
                 f"the field within a specimen is stated, not measured: {field.marginal!r},"
                 f" {field.spectrum!r}{more}. Its mean has no effect"
+            )
+        if self.peaks.loads is not None:
+            texts.append(
+                "the unit is a specimen: its slip loads scatter about their mean, which has an"
+                f" error of {self.likelihood.error / np.mean(self.peaks.values[0]):.1%}. This is"
+                " no scatter between joints"
             )
         usual = profiles.prior.scatter is FactorPrior().scatter
         law = f"half-Cauchy with scale {PRIOR_SCALE:g}" if usual else "as stated"
@@ -388,6 +402,11 @@ class SpecimenPosterior(Posterior):
         if same and self.peaks.unit != "1":
             return Prediction(tests, grid)
         return Prediction.of(grid, joint, simulation._replace(method=method))
+
+    def law(self, problem: Problem, method: Any) -> Prediction | None:
+        """Return the prediction if it needs no samples: specimens differ only as a whole."""
+        exact = self.grid.profiles.whole and not self._between
+        return self.prediction(problem, method, {}, None) if exact else None
 
     @property
     def prior(self) -> Any:

@@ -36,7 +36,7 @@ their levels.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
@@ -67,8 +67,9 @@ from stiction.inference.marginal_fit import multiplied
 from stiction.inference.peaks import Peaks
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distribution_of
-from stiction.random.fields import RandomInterface
-from stiction.random.marginals import FACTOR_FAMILIES
+from stiction.random.fields import RandomField, RandomInterface
+from stiction.random.marginals import FACTOR_FAMILIES, Lognormal
+from stiction.random.spectra import PowerLawSpectrum
 
 MEAN_KEY, SCATTER_KEY = "mean", "between"
 """Keys of the two parameters in a prior and among the draws."""
@@ -99,6 +100,8 @@ TABULATED_DEVIATIONS = 6.0
 """Standard deviations up to which the likelihood of a number is tabulated."""
 FEW_FIELDS = 10
 """Fields within a specimen for what moves a design, of which only ratios are used."""
+UNIFORM = 1e-8
+"""Coefficient of variation of a field that counts as uniform."""
 LEAST_DEVIATION = 1e-3
 """Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
 
@@ -158,6 +161,23 @@ class Profiles(NamedTuple):
     within: Array  # variance of the logarithm of a level by the field, (fields, specimens)
     families: tuple[str, ...] = tuple(FACTOR_FAMILIES)
     prior: FactorPrior = FactorPrior()
+    whole: bool = False  # specimens differ only as a whole: the field is uniform
+
+    @classmethod
+    def without_field(cls, problem: Problem, peaks: Peaks, **more: Any) -> Self:
+        """Return specimens with a uniform strength, a coefficient if there is a pressure."""
+        level, pressure = float(np.median(peaks.values[0])), problem.given_pressure
+        if peaks.unit == "N":
+            level /= problem.area or math.nan
+        if pressure is not None and peaks.unit != "1":
+            level /= float(np.mean(pressure))
+        length = 0.25 * float(np.max(problem.interface.length))
+        field = RandomField(
+            Lognormal(mean=level, cv=UNIFORM), PowerLawSpectrum(length),
+            quantity=None if pressure is None else "friction_coefficient", mean_mode=True,
+        )  # fmt: skip
+        fields = (RandomInterface(strength=field),)
+        return cls(fields, level, np.zeros(0), np.zeros((1, 0)), whole=True, **more)
 
     def few(self) -> Self:
         """Return the profiles with at most `FEW_FIELDS` fields."""
@@ -191,11 +211,17 @@ class Onsets:
 
     def of(self, order: Any) -> Self:
         """Return the onsets for the fields with given numbers."""
-        densities = tuple(self.densities[k] for k in order)
+        densities = tuple(self.densities[k] for k in order) if self.densities else ()
         return replace(self, ratios=self.ratios[order], densities=densities)
 
     def tabulated(self, field: int, peaks: Array, error: float, x: Array) -> Array:
         """Return the log density (peaks, points) of each peak at x for a field."""
+        if not self.densities:  # uniform fields: peaks scatter by their error alone
+            deviation = np.maximum(error / peaks, LEAST_DEVIATION)[:, None]
+            onsets = np.log(self.area * self.ratios[field].mean(axis=1))
+            away = np.log(peaks)[:, None] - x - np.interp(x, self.at, onsets)
+            normal: Array = -0.5 * (away / deviation) ** 2 - np.log(deviation * peaks[:, None])
+            return normal
         known, near = (
             self.densities[field],
             corners([Axis(0, self.at, np.positive)], x[:, None]),
@@ -212,6 +238,9 @@ class Onsets:
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
+        if not self.densities:
+            deviation = max(error / peaks.max(), LEAST_DEVIATION)
+            away = TABULATED_DEVIATIONS * max(error / peaks.min(), LEAST_DEVIATION)
         ends = np.log(peaks.min()), np.log(peaks.max())
         return ends[0] - logs.max() - away, ends[1] - logs.min() + away, deviation
 
@@ -286,9 +315,10 @@ class FactorGrid:
         strengths = [one.strength for one in self.profiles.fields]
         deviations = np.array([one.standard_deviation for one in strengths])
         lengths = np.array([one.spectrum.efolding_length for one in strengths])
-        return {
-            MEAN_KEY: self.profiles.reference * scale,
-            SCATTER_KEY: drawn[:, 2],
+        known = {MEAN_KEY: self.profiles.reference * scale, SCATTER_KEY: drawn[:, 2]}
+        if self.profiles.whole:
+            return known
+        return known | {
             "standard_deviation": deviations[field] * scale,
             "efolding_length": lengths[field],
         }
@@ -432,6 +462,19 @@ class Tables:
         grid, or over the part of the grid with one `family` of the
         factor. No draws are needed.
         """
+        chance, (low, high) = self.distribution(grid, family)
+        if chance(low) >= probability:  # a rarer peak than those of the table
+            return float(np.exp(low))
+        return float(
+            np.exp(
+                brentq(lambda log_peak: chance(log_peak) - probability, low, high, xtol=1e-6)
+            )
+        )
+
+    def distribution(
+        self, grid: FactorGrid, family: str | None = None
+    ) -> tuple[Callable[[float], float], tuple[float, float]]:
+        """Return the probability below the logarithm of a peak, and a range of logarithms."""
         if family is not None:
             place = self.profiles.families.index(family)
             mass = np.zeros_like(grid.mass)
@@ -453,18 +496,15 @@ class Tables:
         # it is t, for each field and sample.
         logs = np.log(known.area * known.ratios) + known.at[:, None]
 
-        def excess(log_peak: float) -> float:
+        def chance(log_peak: float) -> float:
             at = log_peak - logs[:, 0]
             if known.at.size > 1:
                 at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
             pairs = zip(at, below, strict=True)
-            shares = [np.interp(row, x, chance).sum() for row, chance in pairs]
-            return float(sum(shares)) / logs.shape[2] - probability
+            shares = [np.interp(row, x, part).sum() for row, part in pairs]
+            return float(sum(shares)) / logs.shape[2]
 
-        low, high = x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1]
-        if excess(low) >= 0.0:  # a rarer peak than those of the table
-            return float(np.exp(low))
-        return float(np.exp(brentq(excess, low, high, xtol=1e-6)))
+        return chance, (x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1])
 
 
 class Prediction(NamedTuple):
@@ -482,6 +522,32 @@ class Prediction(NamedTuple):
     def quantile(self, probability: float, family: str | None = None) -> float:
         """Return the stress, Pa, at a probability, for all families of the factor or for one."""
         return self.tables.quantile(self.grid, probability, family) / self.tables.onsets[0].area
+
+    def probability(self, stress: float) -> float:
+        """Return the probability of an onset below a stress, Pa."""
+        chance, _ = self.tables.distribution(self.grid)
+        return chance(math.log(stress * self.tables.onsets[0].area))
+
+    def characteristic(self, draws: Array, probability: float, confidence: float) -> float:
+        """Return the stress, Pa, above whose quantile a share `confidence` of draws lies.
+
+        Fields are uniform, and `draws` are (draws, 4).
+        """
+        x, known = draws[:, 3].copy(), self.tables.onsets[0]
+        for family, cv, places in _factor_groups(self.tables.profiles, draws):
+            x[places] += math.log(factor_of_family(family, cv).distribution.ppf(probability))
+        onsets = np.exp(x) * np.interp(x, known.at, known.ratios[0, :, 0])
+        return float(np.quantile(onsets, 1.0 - confidence))
+
+    def divergence(self, first: str, second: str) -> float:
+        """Return the divergence, nats, of one family from another at the mean scatter."""
+        scatters = self.tables.profiles.prior.cells()
+        cv = float(self.grid.mass.sum(axis=(0, 1, 3)) @ scatters)
+        x = np.linspace(-LOWEST, LOG_MEAN_MARGIN, PREDICTED)
+        first_mass, second_mass = (
+            masses(one, cv, np.zeros(1), x)[0] for one in (first, second)
+        )
+        return float(scipy.stats.entropy(first_mass, np.maximum(second_mass, 1e-300)))
 
     @property
     def families(self) -> list[str]:
@@ -570,12 +636,13 @@ def _onsets(
     """Return the onsets of all fields for a kind of specimen. Its `peaks` need not be measured."""
     method, meter, workers = simulation.method, simulation.meter, simulation.workers
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
+    samples = 1 if profiles.whole else samples
     simulation = simulation._replace(samples=samples, workers=1)  # fields run in threads
     forces = variable == "critical_force"
     area = (problem.area or math.nan) if forces else 1.0
     of = "critical_stress" if forces else variable
 
-    def onsets(place: int, at: Array) -> tuple[Array, Densities]:
+    def onsets(place: int, at: Array) -> tuple[Array, Any]:
         """Return onsets (steps, samples) divided by c/reference, and their densities."""
         strengths = np.exp(at)
         fields = [of_mean(profiles.fields[place], c * profiles.reference) for c in strengths]
@@ -584,6 +651,8 @@ def _onsets(
         relative = simulate(experiments, simulation, first, of) / strengths[:, None]
         if not np.isfinite(relative).all() or relative.min() <= 0.0:
             raise InputError("method: some simulated specimens have no positive onset")
+        if profiles.whole:
+            return relative, None
         bounds = np.array([bounds_of(one, of)[0] for one in experiments]) / strengths
         return relative, densities_of(relative, np.maximum(bounds, 0.0))
 
@@ -593,12 +662,15 @@ def _onsets(
         # peaks range.
         ratios, known = onsets(0, at)
         peaks = peaks if peaks.size else area * ratios.ravel()
-        low, high, _ = Onsets(at, ratios[None], (known,), area).ranges(peaks, error)
+        known = () if profiles.whole else (known,)
+        low, high, _ = Onsets(at, ratios[None], known, area).ranges(peaks, error)
         at = np.linspace(low - LOG_STRENGTH_MARGIN, high + LOG_STRENGTH_MARGIN, ONSET_MEANS)
     total = len(fields) * at.size * samples
     warn_if_long(Experiment(problem, profiles.fields[0], method), total, workers)
     meter.stage("simulated onsets", total)
     by_field = in_threads(lambda place: onsets(place, at), fields, workers or usable_cores())
+    if profiles.whole:
+        return Onsets(at, np.stack([ratios for ratios, _ in by_field]), (), area)
     # Standardised densities differ little between fields. Their mean
     # has a smaller error.
     table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))

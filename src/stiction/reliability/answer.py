@@ -300,7 +300,9 @@ class Answer(Result):
             Row(
                 name.replace("_", " "),
                 values[name][0],
-                self.interval.get(name, ()),
+                ()
+                if self.algorithm == "exact" and not self.cv
+                else self.interval.get(name, ()),
                 values[name][1],
             )
             for name in names

@@ -51,16 +51,20 @@ from stiction.random.equally_likely import AnyRandom, Predictive, as_random
 from stiction.random.marginals import FACTOR_FAMILIES
 from stiction.random.spectra import Share
 from stiction.reliability.answer import Answer
-from stiction.reliability.factors import Counts, count_tail, solve_specimens
+from stiction.reliability.factors import CHARACTERISTIC, Counts, count_tail, solve_specimens
 from stiction.reliability.solving import (
     Budget,
     Probability,
     TargetCv,
     answered,
     exact_doubts,
+    exact_law,
+    exact_tail,
     imprecise,
+    method_of,
     prepare,
     sampling_target,
+    undetermined,
 )
 from stiction.reliability.tail import FREQUENT, Goal, TailPoint, sample_tail
 
@@ -84,7 +88,7 @@ def design_stress(
     random: AnyRandom,
     *,
     probability: Probability,
-    method: MethodObject,
+    method: MethodObject | None = None,
     target_cv: TargetCv = 0.1,
     seed: Number = 0,
     max_evaluations: Budget | None = None,
@@ -103,6 +107,7 @@ def design_stress(
     probability : float
         Between 0 and 1, such as 1e-6.
     method : LocalCriterion or Equilibrium
+        By default the method of a posterior.
         `Rupture`, or a method that would take more than
         a quarter of an hour on one core, is refused
         unless `max_evaluations` is 20,000 or more.
@@ -161,6 +166,7 @@ def design_stress(
             answer = replace(answer, sensitivities=effects)
         return replace(answer, quantity="stress" if math.isnan(answer.area) else "force")
 
+    method = method_of(random, method)
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
     return answered(experiment, target_cv, "design_stress", progress, max_evaluations, solve)
 
@@ -172,7 +178,17 @@ def _quantile(
     lowest = state.bounds[0]
     goal = Goal(sampling_target(state, target_cv), probability=probability)
     asked: dict[str, Any] = {"probability": probability, "of_stress": True}
-    # 1. Counted specimens are whole samples, so they also give the
+    # 1. Specimens that differ only as a whole need no samples.
+    if (law := exact_law(state)) is not None:
+        stress, tail = law.quantile(probability), exact_tail(state)
+        source: Any = state.experiment.random.source
+        whole = law.characteristic(source.u, CHARACTERISTIC, confidence)
+        return Answer.at(
+            TailPoint(state, tail, stress), (stress, stress),
+            undetermined(state, law, probability), cv=0.0, members_cv=0.0, members=np.zeros(0),
+            characteristic_stress=whole, confidence=confidence, **asked,
+        )  # fmt: skip
+    # Counted specimens are whole samples, so they also give the
     # characteristic value.
     counts, enough = count_tail(state, goal, budget)
     if counts:

@@ -48,10 +48,14 @@ from stiction.reliability.solving import (
     answered,
     different,
     exact_doubts,
+    exact_law,
+    exact_tail,
     imprecise,
+    method_of,
     prepare,
     sampling_target,
     too_slow,
+    undetermined,
 )
 from stiction.reliability.subset import generator
 from stiction.reliability.tail import (
@@ -85,7 +89,7 @@ def failure_probability(
     random: AnyRandom,
     stress: Real | None = None,
     *,
-    method: MethodObject,
+    method: MethodObject | None = None,
     friction_coefficient: Positive | None = None,
     force: Positive | None = None,
     algorithm: Literal["auto", "plain", "subset", "two_level"] = "auto",
@@ -111,8 +115,8 @@ def failure_probability(
     stress : float, optional
         Mean shear stress to carry, Pa. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
-        `Rupture` and other methods that are too slow for subset
-        simulation use plain Monte Carlo, unless `max_evaluations` is
+        By default the method of a posterior. `Rupture` and other methods
+        that are too slow for subset simulation use plain Monte Carlo, unless `max_evaluations` is
         20,000 or more.
     friction_coefficient : float, optional
         Instead of `stress`: ratio of the mean shear stress to carry to
@@ -188,6 +192,7 @@ def failure_probability(
         answer = _probability(state, wanted, algorithm, target_cv, budget, max_evaluations)
         return replace(answer, quantity=name)
 
+    method = method_of(random, method)
     experiment = Experiment(problem, as_random(random, seed), method, seed=seed)
     return answered(
         experiment, target_cv, "failure_probability", progress, max_evaluations, solve
@@ -219,6 +224,13 @@ def _probability(
     likely = state.likely_bounds(NEGLIGIBLE_PROBABILITY)
     if not likely[0] < stress < likely[1]:
         return _certain(state, stress, likely)
+    if (law := exact_law(state)) is not None:
+        chance = law.probability(stress)
+        return Answer.at(
+            TailPoint(state, exact_tail(state), stress), (chance, chance),
+            undetermined(state, law, chance) if 0.0 < chance < FREQUENT else (), probability=chance,
+            cv=0.0, members_cv=0.0, members=np.zeros(0),
+        )  # fmt: skip
     counted, reason, pilot = 0, "as requested", None
     least = min(PILOT_SAMPLES, max(budget // 5, 50))
     goal = Goal(sampling_target(state, target_cv), stress)

@@ -23,6 +23,7 @@ from stiction.base.errors import (
 )
 from stiction.base.model import Count, Real
 from stiction.base.progress import Meter, Show
+from stiction.base.units import in_words
 from stiction.ensemble.batches import usable_cores
 from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
@@ -31,7 +32,7 @@ from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
 from stiction.random.equally_likely import MAX_MEMBERS, specimens_of_fit
 from stiction.reliability.answer import Answer
-from stiction.reliability.tail import TailPoint
+from stiction.reliability.tail import Tail, TailPoint
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
 """A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
@@ -49,6 +50,9 @@ REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
 """Margin on the wanted number of members, and fraction of the mean that a warning reports."""
 FRESH = 1.5
 """Least ratio of different members that makes a longer list worthwhile."""
+UNDETERMINED, ODDS = 1.5, 20.0
+"""Ratio of the stresses by family from which tests do not determine a rare failure, and odds
+that tell families apart."""
 EXACT_CHECKS = (8, 64)
 """Fewest and most samples of an approximate method that are solved exactly as a check."""
 CHECK_SECONDS = 10.0
@@ -83,6 +87,55 @@ def prepare(
     # that is refused.
     check_fields([experiment])
     return state, allowed(experiment, max_evaluations) - spent
+
+
+def method_of(random: Any, method: Any) -> Any:
+    """Return the method, by default the method of a posterior."""
+    known = method or getattr(getattr(random, "likelihood", None), "method", None)
+    if known is None:
+        raise InputError("method: is needed without a posterior. Give st.Equilibrium()")
+    return known
+
+
+def exact_law(state: LimitState) -> Any:
+    """Return the distribution of the onset if no samples are needed, else None."""
+    experiment, law = state.experiment, getattr(state.experiment.random.source, "law", None)
+    return law(experiment.problem, experiment.method) if law else None
+
+
+def exact_tail(state: LimitState) -> Tail:
+    """Return an empty tail with the reason why no samples are needed."""
+    experiment = state.experiment
+    reason = "specimens differ only as a whole, so the answer is an average over families"
+    if experiment.problem != getattr(experiment.random.source, "problem", None):
+        reason += (
+            ". The joint differs from the specimens: the strength of a specimen is carried over,"
+            f" and {experiment.method.label} computes the onset of the joint"
+        )
+    return Tail((), "exact", reason)
+
+
+def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
+    """Return a doubt if the families of the factor lead to very different stresses.
+
+    The number of specimens is that for which the likelihoods of the two families differ by
+    `ODDS` on average, by the divergence of one family from the other.
+    """
+    stresses = {name: law.quantile(probability, name) for name in law.families}
+    low, high = (pick(stresses, key=stresses.__getitem__) for pick in (min, max))
+    if stresses[high] < UNDETERMINED * stresses[low]:
+        return []
+    area = state.experiment.problem.area
+    ends = [
+        in_words("N" if area else "Pa", (area or 1.0) * stresses[name]) for name in (high, low)
+    ]
+    needed = math.ceil(math.log(ODDS) / law.divergence(low, high))
+    return [
+        f"the tests do not determine P = {probability:g}: the {high} family leads to"
+        f" {ends[0]} and the {low} family to {ends[1]}. About {needed} specimens"
+        f" would tell these two apart, with odds of {ODDS:g} to 1. Without a family about"
+        f" {3.0 / probability:.0e} specimens are needed"
+    ]
 
 
 def allowed(experiment: Experiment, max_evaluations: int | None) -> int:

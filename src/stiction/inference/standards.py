@@ -1,0 +1,60 @@
+"""Characteristic and design values of slip factors by the standards, for comparison.
+
+Problem. Given n slip factors with mean m and standard deviation s, what
+do the standards state?
+
+Sources, from memory and not yet compared with the printed standards:
+EN 1990:2002, annex D, tables D1 and D2 for an unknown coefficient of
+variation. EN 1090-2:2018, annex G.
+
+Steps:
+
+1. EN 1990 D7.2: characteristic value m - k s, with
+   k = t sqrt(1 + 1/n), where t is the 95 % quantile of Student's
+   distribution with n - 1 degrees of freedom.
+2. EN 1990 D7.3: design value m - k_d s, with the same k_d for the
+   99.9 % quantile. This is the 'about 0.1 %' of 0.8 times the
+   reliability index 3.8.
+3. EN 1090-2 G: characteristic value m - 2.05 s of ten slip loads from
+   five specimens. If s exceeds 8 % of m, more than (s/3.5)^2 specimens
+   are tested in all, with s in per cent of m.
+"""
+
+import math
+
+from scipy.stats import t
+
+from stiction.base.arrays import Array
+
+DESIGN = 1e-3
+"""Probability below the design value of EN 1990."""
+SCATTERS, PER_SPECIMEN = 0.08, 3.5
+"""Coefficient of variation above which EN 1090-2 asks for more specimens, and its divisor, %."""
+WHY = {
+    "EN 1990 characteristic value": "5 % of the slip loads are below it, if they are normal and"
+    " each counts as a specimen",
+    "EN 1990 design value": "0.1 % of the slip loads are below it, if they are normal: families"
+    " with a heavier lower tail are left out",
+    "EN 1090-2 characteristic value": "takes ten slip loads as independent, with a fixed factor"
+    " of 2.05",
+    "EN 1090-2 specimens in all": "depends on the scatter alone, not on the probability",
+}
+"""Why each value differs from a design by specimens, averaged over families."""
+
+
+def fractile_factor(count: int, probability: float = 0.05) -> float:
+    """Return k in the value m - k s, for a number of results (steps 1 and 2)."""
+    return float(t.isf(probability, count - 1) * math.sqrt(1.0 + 1.0 / count))
+
+
+def standards_of(factors: Array) -> dict[str, float]:
+    """Return mean, standard deviation and the values of the standards (steps 1 to 3)."""
+    mean, deviation, count = float(factors.mean()), float(factors.std(ddof=1)), factors.size
+    further = math.floor((100.0 * deviation / mean / PER_SPECIMEN) ** 2) + 1
+    values = (
+        mean - fractile_factor(count) * deviation,
+        mean - fractile_factor(count, DESIGN) * deviation,
+        mean - 2.05 * deviation,
+        float(max(5, further if deviation > SCATTERS * mean else 5)),
+    )
+    return {"mean": mean, "standard deviation": deviation} | dict(zip(WHY, values, strict=True))

@@ -1,0 +1,144 @@
+"""Slip factors by the book: five specimens with two slip loads each, no scans."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from joint import FIELD, PROBLEM
+from refusals import refuses
+from setups import EXACT
+
+import stiction as st
+from stiction.inference.standards import fractile_factor
+
+JOINT = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
+FACTORS = np.array([[0.43, 0.41], [0.47, 0.46], [0.45, 0.46], [0.40, 0.42], [0.44, 0.45]])
+FORCES = 390e3 + 1e3 * np.arange(10.0).reshape(5, 2)
+HEADING = "specimen;slip load (kN);clamping force (kN)"
+QUIET = {"progress": False}
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Return a function that writes lines as a test house does, and reads them."""
+
+    def read(lines, heading=HEADING, **more):
+        path = tmp_path / "slip.csv"
+        path.write_text("\n".join([heading, *lines]))
+        return st.read_peaks(path, **({"normal": "clamping force (kN)"} | more))
+
+    return read
+
+
+def lines_of(factors, names="{0}"):
+    return [
+        f"{names.format(k + 1, 'ab'[i])};{1e-3 * factors[k, i] * FORCES[k, i]:.3f};"
+        f"{1e-3 * FORCES[k, i]:.1f}"
+        for k in range(len(factors))
+        for i in range(2)
+    ]
+
+
+def mixture(factors, probabilities):
+    """Slip factors of a new specimen at probabilities, by a plain sum over s and log m."""
+    means, within = factors.mean(axis=1), factors / factors.mean(axis=1, keepdims=True) - 1.0
+    error = math.sqrt(np.sum(within**2) / len(factors) / 2) * means.mean()
+    scatters = 0.1 * np.tan((np.arange(40) + 0.5) / 40 * math.atan(9.0))
+    logs = np.log(means.mean()) + np.linspace(-0.3, 0.3, 121)
+    at = np.exp(np.linspace(-1.8, -0.4, 401))
+    weight, below = 0.0, 0.0
+    for family in (st.Lognormal, st.TruncatedNormal, st.Weibull):
+        for cv in scatters:
+            law = family(mean=1.0, cv=float(cv)).distribution
+            b = np.exp(logs)[:, None] * law.ppf((np.arange(150) + 0.5) / 150)
+            noise = np.exp(-0.5 * ((means[:, None, None] - b) / error) ** 2)
+            likely = np.prod(noise.mean(axis=2), axis=0)
+            weight += likely.sum()
+            below += likely @ law.cdf(at / np.exp(logs)[:, None])
+    return np.exp(np.interp(probabilities, below / weight, np.log(at)))
+
+
+def test_a_dozen_lines_of_numpy_reproduce_the_design(written):
+    peaks = written(lines_of(FACTORS))
+    np.testing.assert_allclose(peaks.values[0], FACTORS.ravel(), rtol=1e-5)
+    posterior = st.infer(JOINT, None, peaks, **QUIET)
+    assert posterior.specimens == 5
+    assert posterior.peaks.loads is peaks
+    chances = np.array([1e-2, 1e-3])
+    with pytest.warns(st.AccuracyWarning, match="do not determine P = 1e-05"):
+        rare = st.design_stress(
+            JOINT, posterior, probability=1e-5, sensitivities=False, **QUIET
+        )
+    designs = [
+        st.design_stress(JOINT, posterior, probability=p, sensitivities=False, **QUIET)
+        for p in chances
+    ]
+    # Steps of s and of log m are coarser in the package: 40 and 48 cells.
+    found = [design.friction_coefficient for design in designs]
+    np.testing.assert_allclose(found, mixture(FACTORS, chances), rtol=0.01)
+    assert rare.stress < designs[1].stress
+    for design, chance in zip(designs, chances, strict=True):
+        back = st.failure_probability(JOINT, posterior, design.stress, **QUIET)
+        assert back.probability == pytest.approx(chance, rel=1e-3)
+        assert design.stress < design.characteristic_stress
+
+
+def test_the_elastic_model_has_no_effect_on_a_joint_that_equals_the_specimens(written):
+    peaks = written(lines_of(FACTORS))
+    softer = dataclasses.replace(JOINT, solid=dataclasses.replace(JOINT.solid, density=1.0))
+    coefficients = []
+    for joint, method in ((JOINT, None), (JOINT, st.LocalCriterion()), (softer, EXACT)):
+        posterior = st.infer(joint, None, peaks, method=method, **QUIET)
+        design = st.design_stress(
+            joint, posterior, probability=1e-3, sensitivities=False, **QUIET
+        )
+        coefficients.append(design.friction_coefficient)
+    # Quantiles are found to 1e-6 of their logarithm; the grid moves with the strength.
+    np.testing.assert_allclose(coefficients, coefficients[0], rtol=2e-3)
+
+
+def test_the_unit_is_a_specimen(written):
+    """Slip loads that scatter about equal means lower the design less than as ten specimens."""
+    twice = written(lines_of(FACTORS))
+    with pytest.warns(st.AccuracyWarning, match="1a, 1b, ... are read as slip loads"):
+        named = written(lines_of(FACTORS, names="{0}{1}"))
+    assert named.specimens[0].tolist() == twice.specimens[0].tolist()
+    single = dataclasses.replace(twice, specimens=None)
+    unit, tens = (st.infer(JOINT, None, peaks, **QUIET) for peaks in (twice, single))
+    assert (unit.specimens, tens.specimens) == (5, 10)
+    widths = [np.ptp(posterior.interval["between"]) for posterior in (unit, tens)]
+    assert widths[0] > widths[1]
+
+
+def test_values_of_the_standards(written):
+    """Factors of EN 1990, tables D1 and D2, for an unknown coefficient of variation."""
+    tables = {3: 3.37, 5: 2.33, 10: 1.92, 20: 1.76}
+    for count, factor in tables.items():
+        assert fractile_factor(count) == pytest.approx(factor, rel=0.01)
+    for count, factor in {5: 7.85, 10: 4.51, 20: 3.64}.items():
+        assert fractile_factor(count, 1e-3) == pytest.approx(factor, rel=0.01)
+    peaks = written(lines_of(FACTORS))
+    values, of = FACTORS.ravel(), peaks.standards
+    mean, deviation = values.mean(), values.std(ddof=1)
+    expected = [mean, deviation, mean - 1.92 * deviation, mean - 4.51 * deviation]
+    expected += [mean - 2.05 * deviation, 5]
+    np.testing.assert_allclose(list(of.values()), expected, rtol=2e-3)
+    scattered = written(lines_of(0.44 + 3.0 * (FACTORS - 0.44))).standards
+    cv = 100.0 * scattered["standard deviation"] / scattered["mean"]
+    needed = scattered["EN 1090-2 specimens in all"]
+    assert needed == (math.floor((cv / 3.5) ** 2) + 1 if cv > 8.0 else 5)
+
+
+def test_bad_input_is_refused(written):
+    rows = lines_of(FACTORS)
+    swapped = "specimen;clamping force (kN);slip load (kN)"
+    refuses("not swapped", lambda: written(rows, swapped))
+    units = "specimen;slip load (N);clamping force (kN)"
+    refuses("their units", lambda: written(rows, units))
+    refuses("holds no force in line", lambda: written([*rows[:4], "3;180.0;", *rows[5:]]))
+    refuses("holds 2 specimens", lambda: written(rows[:4]))
+    peaks = written(rows)
+    refuses("method: is needed with a random", lambda: st.infer(JOINT, FIELD, peaks))
+    prior = {"marginal.cv": (0.1, 0.2)}
+    refuses("can hold mean and between", lambda: st.infer(JOINT, None, peaks, prior=prior))
