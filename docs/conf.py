@@ -20,6 +20,11 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 # Notebooks show figures by a backend of their own, which this would switch off.
 os.environ.pop("MPLBACKEND", None)
+# Their figures are wide enough for dense screens.
+KERNEL = ROOT / "build" / "ipython" / "profile_default" / "ipython_kernel_config.py"
+KERNEL.parent.mkdir(parents=True, exist_ok=True)
+KERNEL.write_text('c.InlineBackend.print_figure_kwargs = {"bbox_inches": "tight", "dpi": 270}\n')
+os.environ["IPYTHONDIR"] = str(KERNEL.parents[1])
 sys.path.insert(0, str(HERE / "_extensions"))
 
 import stiction  # noqa: E402  # after the environment is set
