@@ -213,10 +213,6 @@ def quantity_of(key: str) -> str:
     return "load_profile" if field == "profile" else field
 
 
-READ = ("source", "column", "unit_in_source", "values", "other_columns", "left_out")
-"""Attributes that state what was read."""
-
-
 @checked
 def read_profile(
     source: Any,
@@ -352,7 +348,7 @@ def read_profile(
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
     names = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
-    array.attrs = names | {key: read[key] for key in READ if read.get(key)}
+    array.attrs = names | read
     return array.rename(quantity)
 
 

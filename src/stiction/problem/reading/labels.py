@@ -295,9 +295,10 @@ def labelled(
             raise InputError(f"{dim} must be finite, and {where} is not")
         array = array.assign_coords({dim: (array[dim].dims, place)})
     array = array.copy(data=values)
+    array.attrs = {}
     if read is not None:
-        stated = unit or read.unit
-        array.attrs |= read._replace(source=_source(source), unit=stated).attributes
+        about = read._replace(source=_source(source), unit=unit or read.unit).attributes
+        array.attrs = {key: value for key, value in about.items() if value}
     return array
 
 
