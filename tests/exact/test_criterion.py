@@ -8,15 +8,15 @@ from setups import ROUND_OFF, edge_load, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.protocol import SMALLEST_EIGENVALUE
-from stiction.methods.criterion.eigenfunction import (
+from stiction.methods.criterion.griffith import energy_release_rate
+from stiction.methods.criterion.windows import (
     around,
     eigenvalue_and_vector,
     grid_weights,
     multiplier,
     weight,
+    windows_of,
 )
-from stiction.methods.criterion.griffith import energy_release_rate
-from stiction.methods.criterion.windows import windows_of
 from stiction.theory import griffith_length, nucleation_statistics
 
 

@@ -18,8 +18,7 @@ from stiction.inference.likelihood import (
     moved,
     simulate,
 )
-from stiction.inference.prior import make_prior
-from stiction.inference.scaling import find_scaling
+from stiction.inference.prior import find_scaling, make_prior
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length

@@ -20,9 +20,8 @@ from oracles import angle_rule, dense, largest_load, symbol_of
 from setups import exact_onset, local_onset
 
 import stiction as st
-from stiction.methods.criterion.eigenfunction import weight
 from stiction.methods.criterion.griffith import energy_release_rate
-from stiction.methods.criterion.windows import STRETCHES
+from stiction.methods.criterion.windows import STRETCHES, weight
 from stiction.problem.profiles import at_nodes
 from stiction.theory import griffith_length
 

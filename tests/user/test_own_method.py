@@ -9,8 +9,7 @@ from setups import beta_strength, make_problem
 import stiction as st
 from stiction import extensions
 from stiction.base.variables import Variable
-from stiction.inference.prior import make_prior
-from stiction.inference.scaling import find_scaling
+from stiction.inference.prior import find_scaling, make_prior
 from stiction.methods.protocol import optional_member
 from stiction.problem.results import onset_variables
 

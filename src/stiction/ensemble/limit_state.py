@@ -228,12 +228,12 @@ def weakest_first(state: LimitState) -> LimitState:
 
 
 def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
-    """Return whether the onset is proportional to the strength. See `inference.scaling`."""
+    """Return whether the onset is proportional to the strength. See `inference.prior`."""
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
     if isinstance(problem.specimen, Slider):  # its shear and pressure do not scale
         return False
-    # See the derivation in `inference.scaling`: the weakening rate is
+    # See the derivation in `inference.prior`: the weakening rate is
     # given, and the initial stress is uniform. It must be zero if the
     # load varies.
     zero = scaling == "stretch"  # neither residual strength nor initial stress scales

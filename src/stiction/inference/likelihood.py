@@ -12,7 +12,7 @@ applied to quantiles in place of a mean.
 Steps:
 
 1. Find the parameters that only shift and stretch the onset
-   (`stiction.inference.scaling`). They need no simulation.
+   (`stiction.inference.prior`). They need no simulation.
 2. Place nodes along each of the other parameters, at most four, in the
    relevant box of the prior.
 3. Simulate onsets at every node of the product grid. Use the same
@@ -45,8 +45,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.ensemble.limit_state import LimitState
 from stiction.inference.density import ERRORS, Densities, densities_of, log_likelihoods
 from stiction.inference.peaks import VARIABLES, si_of
-from stiction.inference.prior import Prior
-from stiction.inference.scaling import Scaling, find_scaling
+from stiction.inference.prior import Prior, Scaling, find_scaling
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.protocol import optional_member
 from stiction.problem.problem import Problem, warn_of_weld
