@@ -68,3 +68,13 @@ def test_mean_and_deviation_are_those_of_gstools_kriging():
     np.testing.assert_allclose(given.quantile(line, 0.5), mean, atol=2e-3 * 0.2e6)
     ends = [given.quantile(line, float(scipy.stats.norm.cdf(z))) for z in (-1.0, 1.0)]
     np.testing.assert_allclose(0.5 * (ends[1] - ends[0]), variance**0.5, atol=2e-3 * 0.2e6)
+
+
+@pytest.mark.parametrize("exponent", [0.65, 0.75, 0.9, 1.0, 2.0, 4.0, 16.0])
+def test_every_exponent_of_a_fit_can_be_sampled(exponent):
+    """The range of fitted exponents, on an interface of 100 correlation lengths."""
+    field = st.RandomField(
+        st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(1e-3, exponent=exponent), True
+    )
+    modes = field.modes(st.Interface(length=0.1, nodes=512))
+    assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-12)

@@ -28,9 +28,9 @@ def test_quantile_intervals_cover():
     for sample in RNG.exponential(size=(3000, 200)):
         q = quantiles(sample, probabilities)
         inside += (q.lower < truth) & (truth < q.upper)
-    # Whole ranks make it exceed 0.95; three standard errors are 0.012. At 0.02 of 200 values the
-    # count is 4 +- 2, and one rank is worth up to 0.03 on each side.
-    assert np.all((inside / 3000 > 0.95 - 0.012) & (inside / 3000 < 0.995))
+    # Whole ranks make it exceed 0.90; three standard errors are 0.016. At 0.02 of 200 values the
+    # count is 4 +- 2, and one rank is worth up to 0.05 on each side.
+    assert np.all((inside / 3000 > 0.90 - 0.016) & (inside / 3000 < 0.96))
 
 
 def test_quantile_intervals_know_when_the_sample_is_too_small():

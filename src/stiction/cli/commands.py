@@ -341,7 +341,7 @@ def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
     numbers = {
         ("mean strength", unit): field.mean,
         ("standard deviation", unit): field.standard_deviation,
-        ("correlation length", "m (to 1/e)"): field.efolding_length(),
+        ("e-folding length", "m"): field.efolding_length(),
     }
     W = problem.friction.uniform_weakening_rate
     if W is None:  # the nucleation length varies along the interface
@@ -442,7 +442,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="The statistics of static friction: at which load, and where, does an interface let go?",
+    help="Statistics of static friction: when and where a rough interface begins to slide.",
 )
 
 

@@ -194,7 +194,7 @@ def _estimates(samples: Any) -> list[Any]:
     if values.size < 4:
         return [values.size, *[None] * (2 + len(QUANTILE_LEVELS))]
     levels = quantiles(values, QUANTILE_LEVELS)
-    errors = 0.25 * (levels.upper - levels.lower)  # 95 % lie within two
+    errors = (levels.upper - levels.lower) / 3.29  # 90 % lie within 1.645 errors
     estimates = [
         f"{rounded(part.value, part.error)} \N{PLUS-MINUS SIGN} {rounded(part.error, part.error)}"
         for part in (mean(values), standard_deviation(values))

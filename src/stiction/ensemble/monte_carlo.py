@@ -255,13 +255,6 @@ def monte_carlo(
     >>> found = st.monte_carlo(problem, strength, method=method, samples=50, seed=0)
     >>> found.critical_stress.dims, found.critical_stress.attrs["units"]
     (('sample',), 'Pa')
-
-    A table for pandas has a row for each sample. Kept profiles have a
-    separate table, ``found[["strength"]].to_dataframe()``, with a row
-    for each node.
-
-    >>> len(found.drop_dims("x", errors="ignore").to_dataframe())
-    50
     """
     experiment = Experiment(problem, random, method, keep, seed)
     about = study_attributes(

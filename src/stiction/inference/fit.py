@@ -42,7 +42,7 @@ from pydantic import BeforeValidator, Field
 from scipy.stats import t as student
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, unknown_name, warn_accuracy
+from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_accuracy, warn_user
 from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Progress, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
@@ -98,6 +98,8 @@ EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence modulo 1 that fills [0, 1) evenly."""
 CONFIDENCE = 0.9
 """Level of the intervals, as everywhere in the package."""
+USUAL_STRENGTH = 1e4
+"""Least strength of a usual solid, Pa."""
 INTERVAL_DRAWS = 4000
 """Draws of the posterior for intervals."""
 
@@ -418,6 +420,8 @@ def fit_field(
     AccuracyWarning
         For outliers, dropouts and repeated profiles, families that are left out, and each of
         the `doubts`.
+    UnitWarning
+        If the mean strength is below 10 kPa.
 
     Notes
     -----
@@ -452,6 +456,12 @@ def fit_field(
     family = SpectrumFamily(name, fixed, ratio, deviation, (spacing, 2.0 * float(longest)))
     windows, rows = windowed(records, detrend)
     levels = np.array([row.mean() for row in rows])
+    if quantity == "strength" and 0.0 < (level := float(levels.mean())) < USUAL_STRENGTH:
+        warn_user(
+            f"profiles: the mean strength is {level:.4g} Pa, which is unusual for a solid. Check"
+            " the unit, or state it, as in st.read_profile(path, unit='MPa')",
+            UnitWarning,
+        )
     refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:

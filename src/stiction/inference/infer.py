@@ -153,29 +153,24 @@ def infer(
         ``"marginal.low"`` or ``"problem.friction.weakening_rate"``. A prior is a frozen
         `scipy.stats` distribution, a range, or ``{"low": ..., "high": ..., "spacing": "log"}``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`. By default those of the fit,
-        or all.
+        Families of the factor between specimens, as in `fit_field`. By default of the fit, or all.
     method : LocalCriterion, Equilibrium or any other
         Method that computes the onset. It may be left out if `random` is None: then it has no
         effect on a joint that is equal to the specimens.
     load_cell_error : float
         Standard deviation of the error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
-        Unit of peaks and load-cell error. A force needs a known area, and "1" (friction
-        coefficients) a normal pressure.
+        Unit of peaks and error. Forces need an area, coefficients ("1") a normal pressure.
     samples : int, optional
         Simulated specimens at each point (2000 by the local criterion, else 500), or for each
         field within a specimen (200, else 100).
-    seed : int
-        Not negative.
-    workers, progress
+    seed, workers, progress
         As in `monte_carlo`.
 
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats). Use
-        `to_arviz()` to plot and compare posteriors with ArviZ.
+        With `draws`, `mean`, `interval` and `information` (nats). `to_arviz()` is for ArviZ.
 
     Raises
     ------
@@ -203,9 +198,8 @@ def infer(
     >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
     >>> peaks = [0.695, 0.702, 0.731, 0.688, 0.715]
     >>> prior = {"marginal.low": (0.5e6, 0.8e6), "marginal.high": (1.2e6, 2.0e6)}
-    >>> posterior = st.infer(
-    ...     problem, strength, peaks, unit="MPa", prior=prior, method=st.LocalCriterion()
-    ... )
+    >>> local = st.LocalCriterion()
+    >>> posterior = st.infer(problem, strength, peaks, unit="MPa", prior=prior, method=local)
     >>> low, high = posterior.interval["marginal.low"]
     >>> 0.5e6 < low < high < 0.75e6
     True
@@ -214,10 +208,8 @@ def infer(
 
     >>> records = strength.sample(problem.interface, samples=3, seed=2)
     >>> fit = st.fit_field(records, problem.interface, marginal="beta", noise=0.0, bootstrap=20)
-    >>> both = st.infer(
-    ...     problem, fit, peaks, unit="MPa", method=st.LocalCriterion(), samples=100
-    ... )
-    >>> low, high = both.interval["mean"]
+    >>> joined = st.infer(problem, fit, peaks, unit="MPa", method=local, samples=100)
+    >>> low, high = joined.interval["mean"]
     >>> 0.9e6 < low < high < 1.1e6
     True
     """

@@ -259,7 +259,8 @@ def family_table(given: Any) -> dict[str, Any]:
         return dict(given)
     if not isinstance(given, str):
         raise InputError(
-            f"must be a name, or a table such as {{'type': 'beta', ...}}. Got {describe(given)}"
+            f"must be a name, or a table {{'type': name, ...}} that fixes parameters, got"
+            f" {describe(given)}"
         )
     return {"type": given}
 

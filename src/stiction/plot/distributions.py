@@ -161,7 +161,7 @@ def quantiles(
     Returns
     -------
     matplotlib.axes.Axes
-        Medians with their 95 % confidence intervals, and bands between
+        Medians with their 90 % confidence intervals, and bands between
         quartiles. A single curve also has a paler band between the 5 %
         and 95 % quantiles.
 

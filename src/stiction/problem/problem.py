@@ -64,15 +64,13 @@ class Problem(Listed):
         Finite bodies instead of half-spaces. Their drive determines the
         load profile. The interface ends with the blocks or the slider
         (`interface.ends` is "free"). tau_0 is the mean stress that the
-        drive would cause without slip. `solid` is the material of the
-        slider.
+        drive would cause without slip. `solid` is a slider's material.
 
     Raises
     ------
     InputError
-        If an array does not have the shape of the interface, fewer than
-        four nodes span the nucleation length, or another argument is
-        invalid. The message lists every problem.
+        The message lists every invalid argument. At least four nodes
+        must span the nucleation length.
 
     Examples
     --------
@@ -361,31 +359,15 @@ class Problem(Listed):
         profiles : array, mapping of arrays, xarray.Dataset or Sample
             Peak strength tau_p (Pa) with shape (samples, *shape) or
             (*shape), or profiles by name: 'strength' and other names in
-            `PROFILES`, but at most one of 'weakening_rate',
-            'critical_slip' and 'fracture_energy'. Give each profile
-            here or in the problem, not in both. Except for the
-            strength, a profile may also be a number or have shape
-            (samples, 1). Such a 'normal_pressure' is a mean, which
-            glued blocks distribute. The strength may be replaced by a
-            'friction_coefficient', or by a DataArray that states the
-            unit 1. These are multiplied by the pressure.
+            `PROFILES`. Give each profile here or in the problem, not in
+            both. Except for the strength, a profile may be a number. A
+            'friction_coefficient', or a DataArray with the unit 1, is
+            multiplied by the pressure.
         accept : collection of {"overstress"}
-            Extreme profiles that the method accepts: initial stress
-            above the strength.
+            Accepts an initial stress above the strength.
 
-        Raises
-        ------
-        InputError
-            If a name, shape or value is invalid, a strength is not
-            above the initial stress, no strength is above the residual
-            strength, or a `Sample` was made by a different problem. The
-            message lists every problem.
-
-        Notes
-        -----
-        A node whose strength is not above its residual strength has a constant
-        strength. An `AccuracyWarning` gives the fraction of such nodes. It also gives
-        the fraction of nodes whose initial stress is below minus the strength.
+        An `InputError` lists every invalid name, shape and value. An
+        `AccuracyWarning` gives the fraction of nodes without weakening.
         """
         return placed_sample(self, profiles, accept)
 

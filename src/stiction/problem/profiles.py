@@ -237,50 +237,40 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas are used, and units of pint
-        and astropy. An ``.npy`` file has the shape (nodes,) or
-        (nx, ny). A ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or
-        ``.xlsx`` file has columns, with or without a line of
-        names such as ``x (mm), strength (MPa)``. A ``.nc`` file
-        has variables with `units`, and x as a coordinate. A map
-        over 'x' and 'y' is a table with both as columns, or
-        a binary file or object that SurfaceTopography reads.
+        Labels of xarray and pandas are used, and units of pint and astropy. A
+        ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or ``.xlsx`` file has columns, with
+        or without a line of names such as ``x (mm), strength (MPa)``. An ``.npy``
+        file has the shape (nodes,) or (nx, ny), a ``.nc`` file variables with
+        `units`, and x as a coordinate. A map over 'x' and 'y' is a table with both
+        as columns, or a binary file or object that SurfaceTopography reads.
     x, value : str or int, optional
-        Heading, name or number (from 0) of the column, coordinate or
-        variable. By default `value` is the column called as the
-        quantity, tau_p, shear strength, COF, Reibzahl, ... or the only
-        column with numbers besides x, specimens and times, and `x` is
-        the column called x, position, travel, Weg, ... or the only
-        column in a unit of length. If two columns have no headings, the
-        first is x.
+        Heading, name or number (from 0) of the column, coordinate or variable. By
+        default `value` is the column called as the quantity, tau_p, shear strength,
+        COF, Reibzahl, ... or the only column with numbers besides x, specimens and
+        times, and `x` is the column called x, position, travel, Weg, ... or the only
+        column in a unit of length. If two columns have no headings, the first is x.
     unit, x_unit : str, optional
-        Units of the values and the positions, if the source does not
-        state them. By default SI.
+        Units of values and positions that the source does not state. By default SI.
     quantity : str
         'strength', 'residual_strength', 'initial_stress',
         'normal_pressure' (Pa), 'critical_slip', 'height' (m),
         'weakening_rate' (Pa/m), 'load_profile' or
         'friction_coefficient' (1).
     strength : callable, optional
-        Map from heights (m, an array) to strengths (Pa):
-        ``strength=lambda h: 1e6 + 5e11 * h``. Heights are then read.
+        Map from heights (m) to strengths (Pa): ``lambda h: 1e6 + 5e11 * h``.
     missing : float, str or sequence of them, optional
-        Numbers and words that mark a missing value, such as
-        ``-9999`` or ``"Bad"``. Empty cells, ``nan``, ``n/a``, ``-``,
-        ``***`` and ``#N/A`` always do.
+        Numbers and words that mark a missing value, such as ``-9999`` or ``"Bad"``.
+        Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
     decimal : {".", ","}, optional
-        Decimal mark of a text file. It is needed if the mark could also
-        separate thousands.
+        Decimal mark of a text file, needed if it could also separate thousands.
     skip : int
-        Number of lines, or rows of a sheet, to pass over before the headings.
+        Number of lines or rows to pass over before the headings.
     sheet : int or str
         Number (from 0) or name of the sheet of a workbook.
     interface : Interface, optional
-        Map the profile to the nodes x_i = i L/n, modulo L. Points may
-        have any order, and no point may be missing. Without an
-        interface, missing values (NaN, empty cells) stay, for
-        `stiction.fit_field` or for `RandomField.given`, which draws
-        equally likely values.
+        Map the profile to the nodes x_i = i L/n, modulo L. Points may have any
+        order, and no point may be missing. Without an interface, missing values stay
+        (NaN), for `fit_field` or `RandomField.given`, which draws them.
 
     Returns
     -------
@@ -292,9 +282,8 @@ def read_profile(
     Raises
     ------
     InputError
-        If the source cannot be read, a unit is
-        unknown or unsuitable, columns are ambiguous,
-        or the profile does not fit the interface.
+        If the source cannot be read, a unit is unknown or unsuitable, columns
+        are ambiguous, or the profile does not fit the interface.
 
     Warns
     -----

@@ -76,33 +76,26 @@ class RandomField(Listed):
     mean_mode : bool
         Whether z has the mean mode, k = 0. Without this mode, as in
         Albertini et al. (2020), the mean of z is the same in every
-        sample. This is harmless only if the correlation length is short
-        compared with the interface.
+        sample, which is harmless on long interfaces only.
     anisotropy : float, optional
-        On a plane, the correlation length along y
-        divided by the length along x, by default 1. The
-        spectrum gives the correlation length along x.
+        On a plane, the correlation length along y over that along x, which
+        the spectrum gives. By default 1.
     quantity : {"friction_coefficient"}, optional
-        Declares that the field holds friction coefficients. The stress
-        (strength, residual strength or initial stress) is their product
-        with the normal pressure.
+        Declares that the field holds friction coefficients, which are
+        multiplied by the normal pressure.
     conditions : Conditions, optional
-        Measured values, as `given` sets them, or a table with
-        ``profile`` and ``noise``.
+        Measured values, as `given` sets them: ``profile`` and ``noise``.
 
     Notes
     -----
     The field is a translation process (Grigoriu, 1995), and z is sampled by its spectral
-    representation (Shinozuka and Deodatis, 1991), as in Albertini et al. (2020), Eqs. 2 to 7. On a
-    plane, a line along x has the correlation of the field on a line, except that truncation removes
-    slightly more power.
+    representation (Shinozuka and Deodatis, 1991), as in Albertini et al. (2020), Eqs. 2 to 7.
 
     Examples
     --------
     >>> import stiction as st
     >>> field = st.RandomField(
-    ...     marginal=st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-    ...     spectrum=st.PowerLawSpectrum(correlation_length=2e-3),
+    ...     st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(correlation_length=2e-3)
     ... )
     >>> field.sample(st.Interface(length=0.1, nodes=512), samples=3, seed=1).shape
     (3, 512)
@@ -114,7 +107,12 @@ class RandomField(Listed):
     anisotropy: Positive | None = None
     quantity: Literal["friction_coefficient"] | None = None
     conditions: Conditions | None = None
-    _internal: ClassVar[tuple[str, ...]] = ("modes", "specimens_of_fit", "warn_if_inaccurate")
+    _internal: ClassVar[tuple[str, ...]] = (
+        "correlation",
+        "modes",
+        "specimens_of_fit",
+        "warn_if_inaccurate",
+    )
     specimens_of_fit: ClassVar[int | None] = None
     """Set for `FieldFit.field`: `specimens` of its fit, so that a call can ask for the fit."""
 
@@ -141,31 +139,12 @@ class RandomField(Listed):
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
         """Return the field conditioned on measured values. It remains random at other places.
 
-        Samples of the conditioned field use the same draws as this
-        field. The larger the noise, the closer they are to the samples
-        of this field.
-
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
-            Measured values, for example
-            ``st.read_profile("scan.csv")``, at any places and in the
-            unit of the field. NaN marks a missing value.
+            Values at any places, in the unit of the field. NaN is missing.
         noise : float
-            Standard deviation of the measurement error, in the same
-            unit, positive.
-
-        Examples
-        --------
-        >>> import stiction as st
-        >>> import xarray as xr
-        >>> problem = st.paper.problem(nodes=256)
-        >>> strength = st.paper.strength(problem, correlation_ratio=1.0)
-        >>> scan = xr.DataArray([0.8e6, 0.9e6], {"x": [0.01, 0.02]}, "x")
-        >>> given = strength.given(scan, noise=10e3)
-        >>> tau_p = given.sample(problem.interface, samples=200, seed=0)
-        >>> bool(abs(tau_p.mean(axis=0)[26] - 0.8e6) < 50e3)
-        True
+            Standard deviation of the measurement error, in this unit.
         """
         if self.conditions is not None:
             raise InputError("profile: the field already has a profile. Combine both profiles")
@@ -196,14 +175,9 @@ class RandomField(Listed):
     ) -> Array:
         """Return sampled profiles (samples, *shape) in the unit of the field.
 
-        Sample i depends on the seed and on i only.
-
-        Warns
-        -----
-        AccuracyWarning
-            If the grid is too coarse for the spectrum, or the interface
-            is short compared with the correlation length and the field
-            has no mean mode.
+        Sample i depends on the seed and on i only. An `AccuracyWarning`
+        says if the grid is too coarse for the spectrum, or the interface
+        too short for a field without mean mode.
         """
         self._alone.warn_if_inaccurate(interface)
         profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
@@ -267,8 +241,7 @@ class RandomField(Listed):
     def efolding_length(self) -> float:
         """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
-        The distance is along a line, or along x on a plane.
-        `spectrum.efolding_length` is the distance for z.
+        `spectrum.efolding_length` is the distance for z. On a plane, it is along x.
         """
         coefficients = self._map_coefficients()
 

@@ -42,6 +42,9 @@ from stiction.base.errors import InputError
 from stiction.base.kinds import Kinds, OneOf, from_table, register
 from stiction.base.model import Listed, Positive, Real, describe, model
 
+LARGEST_CUTOFF = 1e4
+"""Largest default truncation of a power law, in units of lambda."""
+
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
 """Length, wavenumber, or ratio of two, whose powers do not underflow or overflow."""
@@ -234,9 +237,10 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     power_kept : float, optional
         Fraction of the power retained by truncation, in (0, 1). By
         default the spectrum ends where 0.99969 of the power on a line
-        is retained, but not below 2.5 lambda. It ends at 2.5 lambda for
-        the exponent 4 (as in the paper), at 11 lambda for 2, and at
-        2,100 lambda for 1.
+        is retained, but not below 2.5 lambda nor above 10,000 lambda. It
+        ends at 2.5 lambda for the exponent 4 (as in the paper), at 11
+        lambda for 2, and at 2,100 lambda for 1. Below an exponent of
+        0.92, the upper limit retains less power.
 
     Notes
     -----
@@ -262,7 +266,9 @@ class PowerLawSpectrum(_PowerOfWavenumber):
     def cutoff(self, dimensions: int = 1) -> float:
         if self.power_kept is None:
             # The same wavenumber on a line and on a plane.
-            return max(2.5 * self.scale, self.quantile(self.default_power))
+            # A slow decay would need millions of modes for the last power.
+            cutoff = max(2.5 * self.scale, self.quantile(self.default_power))
+            return min(cutoff, LARGEST_CUTOFF * self.scale)
         return super().cutoff(dimensions)
 
     def untruncated_correlation(self, lag: Array) -> Array:

@@ -201,7 +201,8 @@ def _quantile(
         often, counted = probability >= FREQUENT, len(counts.values) if counts else 0
         tail = sample_tail(
             weakest_first(state), goal, budget=budget - counted,
-            algorithm="subset" if often else "auto", reason="frequent" if often else "rare",
+            algorithm="subset" if often else "auto",
+            reason=f"the probability is {'at least' if often else 'below'} {FREQUENT:g}",
         )  # fmt: skip
         tail = tail._replace(spent=counted + tail.spent)
     if not tail.complete:  # the tail ends at its lowest sample

@@ -56,7 +56,7 @@ def standard_deviation(values: Any) -> WithError:
 
 
 class Quantiles(NamedTuple):
-    """Quantiles of a sample, and the ends of their 95 % confidence intervals, in its unit.
+    """Quantiles of a sample, and the ends of their 90 % confidence intervals, in its unit.
 
     An end is infinite if the sample is too small to bound a quantile.
     """
@@ -80,7 +80,7 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     Notes
     -----
     The number of values below the p-quantile is binomial (N, p). The ends of the interval
-    are order statistics. The number lies between their ranks with a probability of 95 %
+    are order statistics. The number lies between their ranks with a probability of 90 %
     (David and Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous
     distributions, rounded up to whole ranks.
 
@@ -96,7 +96,7 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     p = np.atleast_1d(probability)
     if (wrong := p[~((p > 0.0) & (p < 1.0))]).size:
         raise InputError(f"probability: must be between 0 and 1, exclusive, got {wrong[0]:g}")
-    n, tail = ordered.size, 0.025
+    n, tail = ordered.size, 0.05
     # Rank r is a lower end if fewer than r values lie below the
     # quantile with probability <= tail.
     low = scipy.stats.binom.ppf(tail, n, p).astype(int)  # P(B <= low - 1) < tail <= P(B <= low)

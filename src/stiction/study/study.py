@@ -200,58 +200,40 @@ class _Parts(Listed):
 class Study(_Parts):
     """Definition of a Monte Carlo study.
 
-    Names are the same in Python and TOML. A study that is read from the
-    attributes of a result gives the same numbers again.
+    Names are the same in Python and TOML.
 
     Parameters
     ----------
     problem : Problem
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
-        The random properties. A field is the peak strength, Pa. Members
-        of a list are equally likely.
+        As in `stiction.monte_carlo`.
     profiles : mapping of arrays, optional
-        Given profiles instead of random properties, by name, as in
-        `stiction.onset`. In a study file, a profile may be the name of
-        a file or a table {file, ...} with options of `read_profile`.
+        Given profiles instead of random properties, as in `onset`. In a
+        study file, also files or tables {file, ...} for `read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
         As in `stiction.monte_carlo`.
     sweep : list of dict
         Axes of the sweep. All their combinations are computed. An axis
-        maps dotted keys, which vary together, to lists of values. The
-        samples are the same at every point of the sweep.
+        maps dotted keys, which vary together, to lists of values.
     reliability : Question, optional
         Question for `stiction reliability`: a ``force`` (N), ``stress``
         (Pa) or ``friction_coefficient`` to carry, or the
         ``probability`` of a design, with ``target_cv``.
     peaks : Peaks or as of `stiction.infer`, optional
-        Peaks of tests that were not used to infer ``random``. `stiction
-        reliability` compares them with its prediction. In a study file,
-        give the name of a file that `read_peaks` can read.
+        Peaks of further tests, with which `stiction reliability` compares
+        its prediction. In a study file, the name of a file for `read_peaks`.
     title : str
-        Title of the study, for readers.
-
-    Raises
-    ------
-    InputError
-        If a key is missing, unknown or out of range, or a point of the
-        sweep is not a valid study. The message lists every problem.
 
     Examples
     --------
     >>> import stiction as st
     >>> problem = st.paper.problem(nodes=512)
-    >>> study = st.Study(
-    ...     problem=problem,
-    ...     random=st.paper.strength(problem, correlation_ratio=2.0),
-    ...     method=st.LocalCriterion(),
-    ...     samples=20,
-    ...     sweep=[{"random.strength.spectrum.correlation_length": [3e-3, 6e-3]}],
-    ... )
+    >>> random, method = st.paper.strength(problem, correlation_ratio=2.0), st.LocalCriterion()
+    >>> sweep = [{"random.strength.spectrum.correlation_length": [3e-3, 6e-3]}]
+    >>> study = st.Study(problem=problem, random=random, method=method, samples=20, sweep=sweep)
     >>> dict(study.run().sizes)
     {'correlation_length': 2, 'sample': 20}
-    >>> st.Study.from_dict(study.to_dict()) == study
-    True
     """
 
     profiles: ProfilesOfStudy | None = None
@@ -262,7 +244,9 @@ class Study(_Parts):
     reliability: Question | None = None
     peaks: PeaksOfStudy | None = None
     title: Text = ""
-    _internal: ClassVar[tuple[str, ...]] = ("attributes", "axes", "experiments", "points")
+    _internal: ClassVar[tuple[str, ...]] = (
+        "attributes", "axes", "experiments", "from_dict", "points", "to_dict",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _fits_together(self) -> Study:
@@ -376,29 +360,18 @@ class Study(_Parts):
         Parameters
         ----------
         out : path, optional
-            Folder in which results are stored as they are
-            computed. If you repeat the call, it resumes an
-            interrupted run, computes failed samples again,
-            and adds samples if `samples` was raised.
+            Folder in which results are stored as they are computed. The
+            same call resumes an interrupted run, computes failed samples
+            again, and adds samples if `samples` was raised.
         workers, executor, progress, pilot
             See `stiction.monte_carlo`.
         part : str, optional
-            Part to compute in an independent job, such as "3/100". All
-            parts go into the same folder.
+            Part to compute in a job, such as "3/100", in the same folder.
 
-        Returns
-        -------
-        xarray.Dataset
-            Over the axes of the sweep and 'sample', with NaN for failed
-            and missing samples.
-
-        Raises
-        ------
-        InputError, RunError
-            As in `stiction.monte_carlo`. Also if `out` holds a
-            different study, or if a worker is lost.
-        StoreError
-            If `out` cannot be used.
+        Returns an `xarray.Dataset` over the axes of the sweep and
+        'sample', with NaN for failed and missing samples. Errors are as
+        in `stiction.monte_carlo`. A `StoreError` says why `out` cannot
+        be used, such as a different study in it.
         """
         if part is not None and out is None:
             raise InputError("part: needs out=, the folder in which the parts are stored")
@@ -421,22 +394,14 @@ class Study(_Parts):
     def to_dict(self) -> dict[str, Any]:
         """Return the study as plain dictionaries, lists and numbers, as in TOML.
 
-        Raises
-        ------
-        InputError
-            If a part cannot be written, such as a spectrum that is a
-            Python function.
+        An `InputError` names a part that exists only in Python.
         """
         plain = to_plain(self).items()
         left_out = ("title", "sweep", "first", "keep")
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:
-        """Write the study to a TOML file. Many interfaces are written to a JSON file next to it.
-
-        Raises an `InputError` if a part exists only in Python, and a
-        `StoreError` if the file cannot be written.
-        """
+        """Write the study to a TOML file. Many interfaces are written to a JSON file next to it."""
         plain, place = self.to_dict(), check("path", path, FilePath)
         beside = place.with_suffix(".random.json")
         interfaces = plain["random"]

@@ -111,13 +111,6 @@ def simulate_rupture(
     >>> run = st.simulate_rupture(problem, tau_p[0], method=method, save=st.Save(["slip"]))
     >>> run.attrs["stopped"]
     'onset'
-
-    A table for pandas holds variables over the same dimensions:
-
-    >>> frames = run[["slip"]].to_dataframe()
-    >>> steps = run[["step_time", "step_mean_stress"]].to_dataframe()
-    >>> len(frames) == run.time.size * 256, len(steps) == run.sizes["step"]
-    (True, True)
     """
     save = Save() if save is None else save
     if refused := refusals(problem, method):

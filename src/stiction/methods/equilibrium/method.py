@@ -53,9 +53,6 @@ ON_NODES = {
 class Equilibrium(Listed):
     """Exact quasi-static onset with all interactions between patches.
 
-    A line of 1024 nodes takes under a millisecond, a plane of 128 x 128
-    nodes about 0.15 s.
-
     The load rises until there is no equilibrium. While strength
     falls linearly, this is a linear programme, which is solved
     to round-off with a certificate. After the first instability,
@@ -83,9 +80,8 @@ class Equilibrium(Listed):
     events : int
         Also return this number of arrested events for each sample over
         'event', padded with NaN. If an interface ends, the event in
-        which it slides is included. The events form a sequence: stress
-        and slip continue from event to event. The variables are
-        described in `equilibrium_path`.
+        which it slides is included. Stress and slip continue from event to
+        event. `equilibrium_path` describes the variables.
     tolerance : float
         On planes, the distance between the bounds as a fraction of the
         load, 1e-10 to 1e-2. Lines are solved to round-off, or to 1e-9
@@ -115,8 +111,7 @@ class Equilibrium(Listed):
     `critical_patch_area` (m²) replace the length. `certified` is true
     if the bounds are rigorous, which requires that no node reaches its
     residual strength before the first instability. Slipping nodes
-    belong to the same patch if their cells share an edge, also across
-    the borders.
+    belong to the same patch if their cells have a common edge.
 
     Examples
     --------

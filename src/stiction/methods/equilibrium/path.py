@@ -113,9 +113,6 @@ def equilibrium_path(
 ) -> xr.Dataset:
     """Return the slip and stress of an interface at rising loads, and the arrested events.
 
-    Patches grow, merge and become unstable. An instability that comes
-    to rest is an arrested event.
-
     Parameters
     ----------
     problem : Problem
@@ -125,7 +122,7 @@ def equilibrium_path(
     loads : (loads,) array
         Load factors tau_0, rising, Pa.
     method : Rupture, optional
-        Compute the events of equal blocks with inertia.
+        Adds inertia to the events of equal blocks.
 
     Returns
     -------
@@ -150,9 +147,8 @@ def equilibrium_path(
         `event_slip_stress_drop` is the mean weighted by the added slip.
         `event_energy_stress_drop` is twice the energy that the slip
         releases beyond friction at the residual strength, over the
-        integral of the slip. With a `Rupture` as the method, events
-        have `event_duration` (s). `stiction.external.event_table`
-        converts the events to a data frame.
+        integral of the slip. A `Rupture` adds `event_duration` (s).
+        `stiction.external.event_table` returns the events as a table.
 
         On specimens, `load` is the mean stress that the drive would
         cause without slip. `travel` is the sum of the travels of both
@@ -177,14 +173,13 @@ def equilibrium_path(
     Raises
     ------
     InputError
-        If there are several samples, if the loads do not rise, or if
-        `onset` would raise an error.
+        As in `onset`, or for several samples, or loads that do not rise.
 
     Notes
     -----
     A patch jumps to the least equilibrium at the same load, where an overdamped
-    interface would stop. Inertia may carry a rupture further. Only `Rupture` can
-    decide this. On equal blocks, pass a `Rupture` as `method`.
+    interface would stop. An instability that comes to rest is an arrested event.
+    Inertia may carry it further: on equal blocks, pass a `Rupture` as `method`.
 
     Examples
     --------
@@ -194,13 +189,6 @@ def equilibrium_path(
     >>> path = st.equilibrium_path(problem, tau_p[0], [0.5e6, 2e6])
     >>> path.sliding.values
     array([False,  True])
-
-    A table for pandas holds variables over the same dimensions: here 2
-    loads by 512 nodes, and 2 loads. ``path.drop_dims(["load",
-    "x"]).to_dataframe()`` has a row for each event.
-
-    >>> len(path[["slip", "stress"]].to_dataframe()), len(path.mean_stress.to_dataframe())
-    (1024, 2)
     """
     given = _check_loads(loads)
     check("problem", problem, Problem)

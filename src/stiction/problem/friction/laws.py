@@ -334,6 +334,9 @@ class PiecewiseWeakening(FrictionLaw):
     slip: Corners
     strength: Corners
     type: Literal["piecewise"] = "piecewise"
+    _internal: ClassVar[tuple[str, ...]] = (
+        *FrictionLaw._internal, "area", "corners", "parameters", "slip_at", "steepening",
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _falling(self) -> PiecewiseWeakening:

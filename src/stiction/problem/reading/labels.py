@@ -442,11 +442,21 @@ def _chosen(
 
 def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
     """Return the column of a quantity by the rule. Other names than its own exclude a column."""
-    words = _words(quantity)
-    others = {name for key in NAMES for name in NAMES[key]} - {*words}
-    left = [column for column in columns if _plain(column.name) not in others]
-    says = _says(words, quantity, left)
-    return read_column(left, quantity, "value", None, [QUANTITIES[quantity].units], says)
+    words, si = _words(quantity), QUANTITIES[quantity].units
+    others = {name: key for key in NAMES for name in NAMES[key] if name not in words}
+    named = {c: others[name] for c in columns if (name := _plain(c.name)) in others}
+    left = [column for column in columns if column not in named]
+    if left or not named:
+        says = _says(words, quantity, left)
+        chosen = read_column(left, quantity, "value", None, [si], says)
+        if chosen.unit or si != "Pa" or not is_coefficient_name(chosen):
+            return chosen
+        named = {chosen: "friction_coefficient"}
+    column, other = next(iter(named.items()))
+    raise InputError(
+        f"the heading {column.label!r} says {other}, not {quantity}. Pass quantity={other!r}, or"
+        f" value={column.label!r}"
+    )
 
 
 def _words(quantity: str) -> tuple[str, ...]:
