@@ -23,7 +23,7 @@ def draw(problem: Problem, sample: Sample) -> NDArray[Any]:
     """Draw a rig, and stresses and slip of a sample at its first instability."""
     solver = SliderSolver(problem)
     push = solver.path(sample, 0).follow()
-    profiles = solver.profiles(push.first or push.last)
+    profiles = solver.values_at(push.first or push.last)
     coefficient = sample.strength[0] / sample.normal_pressure[0]
     profiles["peak strength"] = coefficient * profiles["pressure"]
     profiles["shear stress"] = profiles["stress"]

@@ -57,7 +57,9 @@ VARIABLES = {
     "arrested_events": Variable("1", "instabilities that came to rest so far", ("load",)),
     "sliding": Variable("1", "whether the interface as a whole slides", ("load",)),
 }
-TRAVEL = {
+OF_SPECIMENS = {
+    "pressure": Variable("Pa", "normal pressure", ("load",)),
+    "opening": Variable("m", "opening, the mean of both edges of a node", ("load",)),
     "travel": Variable("m", "travel of both drives together", ("load",)),
     "crosshead_travel": Variable("m", "travel of the machine's far ends", ("load",)),
 }
@@ -203,11 +205,12 @@ def equilibrium_path(
     interface = problem.interface
     check_memory("loads", 16.0 * given.size * interface.size)
     if isinstance(problem.specimen, Slider):
-        values, variables = SliderSolver(problem).at_loads(rows, given)
+        values = SliderSolver(problem).at_loads(rows, given)
     else:
-        values, variables = _at_loads(problem, rows, given, method)
-    variables = VARIABLES | TRAVEL | variables
-    variables |= {name: along(interface, VARIABLES[name]) for name in ("slip", "stress")}
+        values = _at_loads(problem, rows, given, method)
+    variables = VARIABLES | OF_SPECIMENS | event_variables(interface, method is not None)
+    for name in ("slip", "stress", "pressure", "opening"):
+        variables[name] = along(interface, variables[name])
     if problem.area is not None:
         values |= forces(values, problem.area, problem.whole_area)
         variables |= force_variables(variables)
@@ -219,10 +222,8 @@ def equilibrium_path(
     return to_dataset(values, variables, coordinates, attributes, interface)
 
 
-def _at_loads(
-    problem: Problem, rows: Sample, given: Array, method: Any
-) -> tuple[dict[str, Array], dict[str, Variable]]:
-    """Return values, and variables of events, at rising loads, Pa."""
+def _at_loads(problem: Problem, rows: Sample, given: Array, method: Any) -> dict[str, Array]:
+    """Return values at rising loads, Pa."""
     interface = problem.interface
     search = make_search(problem) if method is None else method.search(problem)
     warn_of_signs(problem)
@@ -261,8 +262,8 @@ def _at_loads(
         "arrested_events": np.minimum(n_events, len(path.events)),
         "sliding": sliding,
     }
-    of_events = event_variables(interface, inertia=method is not None)
-    values |= event_table(problem, rows, 0, events, of_events)
+    variables = event_variables(interface, inertia=method is not None)
+    values |= event_table(problem, rows, 0, events, variables)
     if interface.is_free:
         values |= {"travel": travel, "crosshead_travel": far}
-    return values, of_events
+    return values

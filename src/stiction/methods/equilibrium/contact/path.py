@@ -30,13 +30,15 @@ The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E of cell
 could not start.
 
 1. If E is empty, the load rises and v = M_SS^-1 p_S. Otherwise the load is held. e, the top of
-   E, moves at the rate 1, and v = -M_SS^-1 M_Se. A slipping cell whose rate is negative stops.
+   E, moves at the rate 1, and v = -M_SS^-1 M_Se.
 2. Find the nearest kink: a resting cell or a closed edge has lost its margin (a start), e has
    lost its overstress, a cell meets mu_r N (a corner; a resting cell may meet it while N
-   falls), or an open edge closes. Without a kink the slider slides.
+   falls), or an open edge closes. A slipping cell stops at once if its rate is negative. e
+   is released at once if others have taken its overstress away. Without a kink the slider
+   slides.
 3. Move to the kink.
    Start: border the inverse if the pivot is positive. Otherwise push the node on E.
-   e has lost its overstress: take e from E, and start it.
+   e has lost its overstress: take e from E, and start it. Released: take e from E.
    Corner: change one row of M. If the cell slips, remove it from the inverse, and border again.
    Close or stop: remove a row and a column from the inverse. If the diagonal of the
    inverse is not positive there, the rest of S is unstable: border all of S again, open
@@ -72,7 +74,6 @@ OVERSTRESS_RTOL = 1e-12
 """Overstress that is round-off, as a fraction of the largest force."""
 MAX_EVENTS_PER_NODE = 64
 """Events for each cell and edge, on average, after which a path is given up."""
-NOBODY = -1  # no node, no position in S
 
 
 class Status(IntEnum):
@@ -85,14 +86,24 @@ class Status(IntEnum):
     GIVEN_UP = 4  # too many events
 
 
+class Motion(IntEnum):
+    """How a cell or an edge moves."""
+
+    REST = 0  # a cell at rest, or a closed edge
+    STABLE = 1  # in S
+    UNSTABLE = 2  # in E
+
+
 class Kind(IntEnum):
     """What happens to a node at a kink."""
 
-    NOTHING = 0
+    TARGET = 0  # nothing, but the load is at its target
     START = 1
-    AT_STRENGTH = 2  # the top of E has lost its overstress
-    CORNER = 3
-    CLOSE = 4
+    AT_STRENGTH = 2  # e has lost its overstress
+    RELEASE = 3  # e has less than no overstress
+    CORNER = 4
+    CLOSE = 5
+    STOP = 6
 
 
 class Kink(NamedTuple):
@@ -103,21 +114,12 @@ class Kink(NamedTuple):
     kind: int
 
 
-class PathStop(NamedTuple):
-    """Load D, force F and largest F so far, N/m, and a `Status`."""
-
-    load: float
-    force: float
-    peak: float
-    status: int
-
-
 class Contact(NamedTuple):
     """A slider on its path. Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
 
     `columns` is M transposed. `difference` is mu_p - mu_r, and `weakening` is W. Both are 0 from
-    the corner on. `counts` holds the sizes of S and E, and how many events there were and how
-    often S was bordered again.
+    the corner on. `loads` holds the load D, the force F and the largest F so far. `counts` holds
+    the sizes of S and E, and how many events there were and how often S was bordered again.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa
@@ -131,10 +133,10 @@ class Contact(NamedTuple):
     moved: Array  # (m,): slip in either direction so far, and opening, m
     inverse: Array  # (m, m): of M_SS in its first rows and columns
     inside: Integers  # (m,): nodes in S, in the order of their starts
-    place: Integers  # (m,): position in S, or NOBODY
     stack: Integers  # (m,): nodes in E
-    stacked: NDArray[np.bool_]  # (m,): whether a node is in E
+    motion: Integers  # (m,): `Motion`
     counts: Integers  # (4,)
+    loads: Array  # (3,): N/m
     rate: Array  # (m,): of slip and opening
     change: Array  # (m,): rate of o
     left: Array  # (m,): M_eS M_SS^-1
@@ -142,6 +144,7 @@ class Contact(NamedTuple):
 
 
 N_INSIDE, N_STACKED, N_EVENTS, N_BORDERED_AGAIN = range(4)
+LOAD, FORCE, PEAK = range(3)
 
 
 @jit_inside
@@ -153,7 +156,7 @@ def normal(edges: Array, n: int, a: int) -> float:
 
 @jit_inside
 def _largest(values: Array) -> float:
-    """Return the largest size of values, or 0."""
+    """Return the largest size of values."""
     largest = 0.0
     for value in values:
         largest = max(largest, abs(value))
@@ -185,15 +188,14 @@ def _start(state: Contact, node: int) -> None:
         left[t] = columns[node, state.inside[t]]
     _multiply_inverse(state, k)
     pivot = columns[node, node]
-    for t in range(k):
-        left[t] = 0.0
+    left[:k] = 0.0
     for t in range(k):
         entry = columns[state.inside[t], node]
         pivot -= entry * right[t]
         for r in range(k):
             left[r] += entry * inverse[t, r]
     if not pivot > PIVOT_RTOL * abs(columns[node, node]):
-        state.stack[state.counts[N_STACKED]], state.stacked[node] = node, True
+        state.stack[state.counts[N_STACKED]], state.motion[node] = node, Motion.UNSTABLE
         state.counts[N_STACKED] += 1
         return
     for t in range(k):
@@ -202,21 +204,21 @@ def _start(state: Contact, node: int) -> None:
             inverse[t, r] += factor * left[r]
         inverse[t, k], inverse[k, t] = -factor, -left[t] / pivot
     inverse[k, k] = 1.0 / pivot
-    state.inside[k], state.place[node] = node, k
+    state.inside[k], state.motion[node] = node, Motion.STABLE
     state.counts[N_INSIDE] += 1
 
 
 @jit_inside
 def _remove(state: Contact, node: int) -> None:
     """Step 3: take a node out of S."""
-    k, t, n = state.counts[N_INSIDE], state.place[node], state.difference.shape[0]
-    inverse, inside, left = state.inverse, state.inside, state.left
+    k, n, left = state.counts[N_INSIDE], state.difference.shape[0], state.left
+    inverse, inside, t = state.inverse, state.inside, 0
+    while inside[t] != node:
+        t += 1
     for r in range(k):
         left[r] = inverse[t, r]
-    state.place[node] = NOBODY
-    for r in range(t + 1, k):
-        inside[r - 1] = inside[r]
-        state.place[inside[r]] = r - 1
+        inside[r - (r > t)] = inside[r]
+    state.motion[node] = Motion.REST
     if left[t] > 0.0:
         for r in range(k):
             if r != t:
@@ -234,16 +236,14 @@ def _remove(state: Contact, node: int) -> None:
         state.change[r] = inside[r]  # before the next rates are written there
     for of_edges in (True, False):
         for r in range(k - 1):
-            member = int(state.change[r])
-            if (member >= n) == of_edges:
-                state.place[member] = NOBODY
-                _start(state, member)
+            if (state.change[r] >= n) == of_edges:
+                _start(state, int(state.change[r]))
 
 
 @jit_inside
 def _pass_corner(state: Contact, a: int) -> None:
     """Step 3: the friction coefficient of a cell is mu_r, and its strength no longer falls."""
-    slips, drop, columns = state.place[a] != NOBODY, state.difference[a], state.columns
+    slips, drop, columns = state.motion[a] == Motion.STABLE, state.difference[a], state.columns
     if slips:
         _remove(state, a)
     columns[a, a] += state.weakening[a]
@@ -256,29 +256,26 @@ def _pass_corner(state: Contact, a: int) -> None:
 
 
 @jit_inside
-def _find_rates(state: Contact, e: int) -> int:
-    """Steps 1 and 2: write the rates of x and o. Return a cell that stops, or NOBODY."""
+def _find_rates(state: Contact) -> None:
+    """Step 1: write the rates of x and o."""
     columns, rate, change = state.columns, state.rate, state.change
-    k, m, inside = state.counts[N_INSIDE], state.rate.shape[0], state.inside
+    k, held, inside = state.counts[N_INSIDE], state.counts[N_STACKED], state.inside
+    e, m = state.stack[held - 1], rate.shape[0]  # without E, e is not read
+    rate[:] = 0.0
     for i in range(m):
-        rate[i] = 0.0
-        change[i] = state.load[i] if e == NOBODY else -columns[e, i]
+        change[i] = -columns[e, i] if held else state.load[i]
     for t in range(k):
         state.left[t] = change[inside[t]]
     _multiply_inverse(state, k)
-    least, stopping = -RATE_RTOL * _largest(state.right[:k]), NOBODY
     for t in range(k):
         speed, column = state.right[t], columns[inside[t]]
         rate[inside[t]] = speed
-        if speed < least and inside[t] < state.difference.shape[0]:
-            least, stopping = speed, inside[t]
         for i in range(m):
             change[i] -= speed * column[i]
     for t in range(k):
         change[inside[t]] = 0.0
-    if e != NOBODY:
+    if held:
         rate[e] = 1.0
-    return stopping
 
 
 @jit_inside
@@ -290,22 +287,27 @@ def _nearer(kink: Kink, gap: float, speed: float, least: float, node: int, kind:
 
 
 @jit_inside
-def _nearest_kink(state: Contact, e: int, longest: float) -> Kink:
-    """Step 2: return the nearest kink within the longest step."""
+def _nearest_kink(state: Contact, target: float) -> Kink:
+    """Step 2: return the nearest kink before the load reaches its target."""
     rate, change, overstress, moved = state.rate, state.change, state.overstress, state.moved
     n, difference, weakening = state.difference.shape[0], state.difference, state.weakening
-    fastest = _largest(rate)
-    forces = _largest(state.load) if e == NOBODY else 0.0
-    kink = Kink(longest, NOBODY, Kind.NOTHING)
+    held, fastest = state.counts[N_STACKED], _largest(rate)
+    e, slowest = state.stack[held - 1], int(np.argmin(rate[:n]))  # without E, e is not read
+    if rate[slowest] < -RATE_RTOL * fastest:
+        return Kink(0.0, slowest, Kind.STOP)
+    if held and overstress[e] < -OVERSTRESS_RTOL * _largest(overstress):
+        return Kink(0.0, e, Kind.RELEASE)
+    forces = 0.0 if held else _largest(state.load)
+    kink = Kink(np.inf if held else target - state.loads[LOAD], 0, Kind.TARGET)
     for i in range(rate.shape[0]):
         stiffness = abs(state.columns[i, i])
         least = RATE_RTOL * (stiffness * fastest + forces)
-        if i == e:
+        if held and i == e:
             least_pivot = max(least, PIVOT_RTOL * stiffness)
             kink = _nearer(kink, overstress[i], -change[i], least_pivot, i, Kind.AT_STRENGTH)
-        elif state.place[i] == NOBODY and not state.stacked[i]:
+        elif state.motion[i] == Motion.REST:
             kink = _nearer(kink, -overstress[i], change[i], least, i, Kind.START)
-        elif i >= n and not state.stacked[i]:
+        elif i >= n and state.motion[i] == Motion.STABLE:
             kink = _nearer(kink, moved[i], -rate[i], RATE_RTOL * fastest, i, Kind.CLOSE)
         # Also cells that rest after slip.
         if i < n and difference[i] > 0.0 and (rate[i] != 0.0 or moved[i] > 0.0):
@@ -315,59 +317,48 @@ def _nearest_kink(state: Contact, e: int, longest: float) -> Kink:
     return kink
 
 
-@jit_inside
-def _pop(state: Contact, e: int) -> None:
-    """Take the top e from E."""
-    state.overstress[e] = min(state.overstress[e], 0.0)
-    state.stacked[e] = False
-    state.counts[N_STACKED] -= 1
-
-
 @jit
-def follow(state: Contact, load: float, force: float, peak: float, target: float) -> PathStop:
-    """Follow the path from a load (N/m) to a target, an instability or an arrest."""
-    counts, overstress, moved = state.counts, state.overstress, state.moved
+def follow(state: Contact, target: float) -> int:
+    """Follow the path to a load (N/m), an instability or an arrest. Return the `Status`."""
+    counts, loads, overstress, moved = state.counts, state.loads, state.overstress, state.moved
     while counts[N_EVENTS] < MAX_EVENTS_PER_NODE * moved.shape[0]:
         counts[N_EVENTS] += 1
         held = counts[N_STACKED] > 0
         # 1.
-        e = state.stack[counts[N_STACKED] - 1] if held else NOBODY
-        stopping = _find_rates(state, e)
-        if stopping != NOBODY:
-            _remove(state, stopping)
-        elif held and overstress[e] < -OVERSTRESS_RTOL * _largest(overstress):
-            _pop(state, e)  # others have taken its overstress away meanwhile
-        else:
-            # 2.
-            kink = _nearest_kink(state, e, np.inf if held else target - load)
-            if kink.step == np.inf:
-                return PathStop(load, force, peak, Status.SLIDING)
-            # 3.
-            rise = 0.0 if held else kink.step
-            load += rise
-            force += rise
-            for i in range(moved.shape[0]):
-                overstress[i] += kink.step * state.change[i]
-                moved[i] += kink.step * state.rate[i]
-                force -= kink.step * state.relief[i] * state.rate[i]
-            peak = max(peak, force)
-            i = kink.node
-            if kink.kind == Kind.NOTHING:
-                return PathStop(target, force, peak, Status.AT_TARGET)
-            if kink.kind == Kind.CORNER:
-                _pass_corner(state, i)
-            elif kink.kind == Kind.CLOSE:
-                moved[i] = 0.0
-                _remove(state, i)
-            else:
-                overstress[i] = 0.0
-                if i == e:
-                    _pop(state, e)
-                _start(state, i)
+        _find_rates(state)
+        # 2.
+        kink = _nearest_kink(state, target)
+        if kink.step == np.inf:
+            return Status.SLIDING
+        # 3.
+        if not held:
+            loads[LOAD] += kink.step
+            loads[FORCE] += kink.step
+        for i in range(moved.shape[0]):
+            overstress[i] += kink.step * state.change[i]
+            moved[i] += kink.step * state.rate[i]
+            loads[FORCE] -= kink.step * state.relief[i] * state.rate[i]
+        loads[PEAK] = max(loads[PEAK], loads[FORCE])
+        node, kind = kink.node, kink.kind
+        if kind == Kind.TARGET:
+            loads[LOAD] = target
+            return Status.AT_TARGET
+        if kind == Kind.AT_STRENGTH or kind == Kind.RELEASE:
+            state.motion[node] = Motion.REST
+            counts[N_STACKED] -= 1
+        if kind == Kind.START or kind == Kind.AT_STRENGTH:
+            overstress[node] = 0.0
+            _start(state, node)
+        elif kind == Kind.CORNER:
+            _pass_corner(state, node)
+        elif kind == Kind.CLOSE or kind == Kind.STOP:
+            if kind == Kind.CLOSE:
+                moved[node] = 0.0
+            _remove(state, node)
         # 4.
         if held and counts[N_STACKED] == 0:
-            return PathStop(load, force, peak, Status.ARRESTED)
+            return Status.ARRESTED
         if not held and counts[N_STACKED] > 0:
-            _find_rates(state, state.stack[counts[N_STACKED] - 1])  # where slip jumps
-            return PathStop(load, force, peak, Status.UNSTABLE)
-    return PathStop(load, force, peak, Status.GIVEN_UP)
+            _find_rates(state)  # where slip jumps
+            return Status.UNSTABLE
+    return Status.GIVEN_UP

@@ -6,7 +6,7 @@ of the push, and opening is the present opening. The travel of the push is U = F
 without the constant part from the pressing.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,8 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.base.variables import Variable
 from stiction.elasticity.rig import on_cells
-from stiction.methods.equilibrium.contact.path import N_STACKED, Status, follow
-from stiction.methods.equilibrium.contact.stages import (
-    Friction,
-    begin_push,
-    forces_of,
-    make_matrices,
-    press,
-)
+from stiction.methods.equilibrium.contact.path import Status
+from stiction.methods.equilibrium.contact.stages import Friction, Push, PushState, SliderPath
 from stiction.methods.equilibrium.events import (
     elongation_of,
     event_variables,
@@ -33,15 +27,10 @@ from stiction.methods.equilibrium.patches import critical_patch, patches_of
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.resolution import warn_if_coarse
-from stiction.problem.results import along
 from stiction.problem.sample import Sample
 
 OF_SLIDERS = {
     "open_fraction": Variable("1", "part of the interface that is open before it slides"),
-}
-ON_PATH = {
-    "pressure": Variable("Pa", "normal pressure", ("load",)),
-    "opening": Variable("m", "opening, the mean of both edges of a node", ("load",)),
 }
 WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
 """Variables of events that are defined for a pressure that does not change."""
@@ -49,34 +38,6 @@ STRENGTH_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
 MIN_NODES = 16
 """Nodes in a nucleation length without a warning about the ends of the slider."""
-MIN_TURNING = 1e-6
-"""Opening over slip of a slider that topples, in the motion that does not end."""
-
-
-class PushState(NamedTuple):
-    """A slider under a load D and a force F (N/m), with arrays over cells, then edges (m,)."""
-
-    load: float
-    force: float
-    moved: Array  # slip of the push, and opening, m
-    forces: Array  # shear force, and tension of edges, N/m
-    direction: Array  # (n,): rate of slip
-    residual: bool  # whether a cell has reached its residual strength
-
-
-class Push(NamedTuple):
-    """The push of a sample until it slides. Without an instability, `first` is None.
-
-    `last` is the last equilibrium, and `peak` the largest force (N/m). `events` holds the states
-    before and after each. `known` is false if the path was not followed to its end.
-    """
-
-    first: PushState | None
-    last: PushState
-    peak: float
-    events: list[tuple[PushState, PushState]]
-    known: bool
-    topples: bool
 
 
 def push_variables(interface: Interface) -> dict[str, Variable]:
@@ -92,47 +53,6 @@ def refused_laws(problem: Problem) -> list[str]:
     return [] if problem.friction.linear else [text]
 
 
-class SliderPath:
-    """A slider on its path, which only goes on."""
-
-    def __init__(self, solver: "SliderSolver", friction: Friction, force: float) -> None:
-        start = press(solver.for_pressing, friction, force)
-        self.friction, self.contact = friction, begin_push(solver.for_push, start)
-        self.before = np.abs(start.moved)
-        self.before[len(friction.peak) :] = 0.0
-        self.load = self.force = self.peak = 0.0
-
-    def move(self, target: float = np.inf) -> int:
-        """Go on to a load, or to the next instability or arrest. Return the `Status`."""
-        stop = follow(self.contact, self.load, self.force, self.peak, target)
-        self.load, self.force, self.peak, status = stop
-        return int(status)
-
-    def state(self) -> PushState:
-        """Return a copy of the present state."""
-        contact, law = self.contact, self.friction
-        direction = np.maximum(contact.rate[: len(law.peak)], 0.0)
-        at_residual = bool(((contact.difference == 0.0) & (law.peak > law.residual)).any())
-        moved, forces = contact.moved - self.before, forces_of(contact, law)
-        return PushState(self.load, self.force, moved, forces, direction, at_residual)
-
-    def follow(self) -> Push:
-        """Follow the path until the slider slides."""
-        events, first = [], None
-        while (status := self.move()) == Status.UNSTABLE:
-            last = self.state()
-            first = first or last
-            if (status := self.move()) != Status.ARRESTED:
-                break
-            events.append((last, self.state()))
-        unstable = self.contact.counts[N_STACKED] > 0  # otherwise it slides stably
-        last = last if unstable else self.state()
-        rate, n = np.abs(self.contact.rate), len(self.friction.peak)
-        known = status == Status.SLIDING
-        turns = bool(rate[n:].max() > MIN_TURNING * rate[:n].max())
-        return Push(first, last, self.peak, events, known, known and unstable and turns)
-
-
 class SliderSolver:
     """Solver for samples of a slider by `Equilibrium` with given options. It is thread-safe."""
 
@@ -140,11 +60,9 @@ class SliderSolver:
         if reasons := refused_laws(problem):
             raise InputError(reasons)
         rig, machine = problem.rig, problem.specimen.machine  # type: ignore[union-attr]
-        relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
+        self.relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
         self.problem, self.options, self.rig = problem, options, rig
         self.length = problem.interface.measure
-        self.for_pressing = make_matrices(rig.K, rig.T_p)
-        self.for_push = make_matrices(rig.K, rig.T, relief)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
@@ -179,7 +97,8 @@ class SliderSolver:
         peak, residual = rows.strength[row] / pressure, rows.residual_strength[row] / pressure
         peak[node] += step
         friction = Friction(peak, residual, rows.weakening_rate[row] * spacing)
-        return SliderPath(self, friction, float(pressure.mean()) * self.length)
+        force = float(pressure.mean()) * self.length
+        return SliderPath(self.rig, self.relief, friction, force)
 
     def _values(self, rows: Sample, row: int, push: Push) -> dict[str, Any]:
         interface, first, last = self.problem.interface, push.first, push.last
@@ -208,24 +127,22 @@ class SliderSolver:
             for node in range(n if first else 0):
                 path = self.path(rows, row, node, STRENGTH_STEP)
                 path.move()
-                rise = (path.force - first.force) / self.length  # type: ignore[union-attr]
+                rise = (path.state().force - first.force) / self.length  # type: ignore[union-attr]
                 step = STRENGTH_STEP * rows.normal_pressure[row, node]
                 values["sensitivity"][node] = rise / step
         if most := self.options.events:
             values |= self.event_table(push, most)
         return values
 
-    def travels(self, state: PushState) -> dict[str, float]:
-        """Return the mean stress (Pa), and the travels of the push and of the machine (m)."""
+    def values_at(self, state: PushState) -> dict[str, Any]:
+        """Return the mean stress (Pa), both travels (m), and profiles (m, Pa) at the nodes."""
+        n, spacing = self.problem.interface.size, self.problem.interface.spacing
         stress, travel = state.force / self.length, state.force / self.rig.C
         travel += float(self.rig.T @ state.moved)
-        far = travel + elongation_of(self.problem, stress)
-        return {"mean_stress": stress, "travel": travel, "crosshead_travel": far}
-
-    def profiles(self, state: PushState) -> dict[str, Array]:
-        """Return slip and opening (m), shear stress and pressure (Pa) at the nodes."""
-        n, spacing = self.problem.interface.size, self.problem.interface.spacing
         return {
+            "mean_stress": stress,
+            "travel": travel,
+            "crosshead_travel": travel + elongation_of(self.problem, stress),
             "slip": state.moved[:n],
             "stress": state.forces[:n] / spacing,
             "pressure": on_cells(-state.forces[n:]) / spacing,
@@ -236,48 +153,39 @@ class SliderSolver:
         """Return the variables of events as arrays, padded with NaN to `most` events."""
         measured, interface = [], self.problem.interface
         for before, after in push.events[:most]:
-            added = (after.moved - before.moved)[: interface.size]
+            start, end = self.values_at(before), self.values_at(after)
             drop = (before.forces - after.forces)[: interface.size] / interface.spacing
-            stress, travel, far = self.travels(before).values()
-            values = patch_measures(self.problem, before.direction, added, drop)
-            measured.append(values | {
+            added = end["slip"] - start["slip"]
+            measured.append(patch_measures(self.problem, before.direction, added, drop) | {
                 "event_load": before.load / self.length,
-                "event_stress": stress,
-                "event_stress_drop": stress - after.force / self.length,
-                "event_travel": travel,
-                "event_crosshead_travel": far,
-                "event_travel_step": self.travels(after)["travel"] - travel,
+                "event_stress": start["mean_stress"],
+                "event_stress_drop": start["mean_stress"] - end["mean_stress"],
+                "event_travel": start["travel"],
+                "event_crosshead_travel": start["crosshead_travel"],
+                "event_travel_step": end["travel"] - start["travel"],
             })  # fmt: skip
         return tabulate(measured, push_variables(interface), most)
 
-    def at_loads(
-        self, rows: Sample, loads: Array
-    ) -> tuple[dict[str, Array], dict[str, Variable]]:
-        """Return values and further variables of `equilibrium_path` at rising loads, Pa."""
-        interface = self.problem.interface
+    def at_loads(self, rows: Sample, loads: Array) -> dict[str, Array]:
+        """Return values of `equilibrium_path` at rising loads, Pa."""
         # The path to sliding gives all events, and a second path the states at the loads.
         push, path = self.path(rows, 0).follow(), self.path(rows, 0)
+        end = push.last.load
         if not push.known:
-            warn_accuracy(
-                f"the path was not followed beyond {push.last.load / self.length:g} Pa"
-            )
-        sliding, states = loads * self.length > push.last.load, []
+            warn_accuracy(f"the path was not followed beyond {end / self.length:g} Pa")
+        sliding, state, states = loads * self.length > end, path.state(), []
         for load in loads[~sliding]:
-            while (status := path.move(load * self.length)) != Status.AT_TARGET:
-                if status > Status.ARRESTED:  # it slides at this load: `state` is about to jump
-                    break
+            while (status := path.move(load * self.length)) <= Status.ARRESTED:
                 state = path.state()
-            state = path.state() if status == Status.AT_TARGET else state
-            states.append(self.travels(state) | self.profiles(state))
-        values = self.event_table(push)
-        wide = {"slip", "stress", *ON_PATH}
-        for name in (*wide, "mean_stress", "travel", "crosshead_travel"):
-            values[name] = np.full(
-                (loads.size, *(interface.shape if name in wide else ())), np.nan
-            )
-            for i, at_load in enumerate(states):
-                values[name][i] = at_load[name]
+                if status == Status.AT_TARGET:
+                    break
+            states.append(self.values_at(state))  # if it slides at this load, just before
+        after = {name: np.nan * value for name, value in self.values_at(push.last).items()}
+        table = states + [after] * int(sliding.sum())
         starts = [before.load / self.length for before, _ in push.events]
-        values |= {"arrested_events": np.searchsorted(starts, loads), "sliding": sliding}
-        variables = {name: along(interface, variable) for name, variable in ON_PATH.items()}
-        return values, variables | push_variables(interface)
+        return {
+            **self.event_table(push),
+            **{name: np.array([values[name] for values in table]) for name in after},
+            "arrested_events": np.searchsorted(starts, loads),
+            "sliding": sliding,
+        }

@@ -16,7 +16,7 @@ The algorithm is our own (`press`, `begin_push`).
    strength are on E, edges on top. Follow the path to N.
 3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
    weakening. Edges that are open begin in S.
-4. Instabilities and arrests alternate until the slider slides (`solver.follow_push`). The first
+4. Instabilities and arrests alternate until the slider slides (`SliderPath.follow`). The first
    instability is the first of them during the push. Static friction is the largest force.
 """
 
@@ -26,19 +26,22 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.elasticity.rig import on_cells
+from stiction.elasticity.rig import Rig, on_cells
 from stiction.methods.equilibrium.contact.path import (
+    LOAD,
     N_INSIDE,
     N_STACKED,
-    NOBODY,
+    PEAK,
     Contact,
-    PathStop,
+    Motion,
     Status,
     follow,
 )
 
 FIRST_PRESSING = 1e-3
 """Fraction of the normal force at which a pressing that slips begins."""
+MIN_TURNING = 1e-6
+"""Opening over slip of a slider that topples, in the motion that does not end."""
 
 
 class Friction(NamedTuple):
@@ -49,57 +52,6 @@ class Friction(NamedTuple):
     weakening: Array
 
 
-class Matrices(NamedTuple):
-    """What the samples of a rig have in common. K may contain a machine."""
-
-    transposed: Array  # (m, m): K'
-    normal: Array  # (n, m): Q K_w
-    forces: Array  # (m,): T
-    relief: Array  # (m,): k' T
-
-
-def make_matrices(K: Array, T: Array, relief: float = 0.0) -> Matrices:
-    """Return the matrices of a rig whose force falls by `relief` T'x (Pa)."""
-    n = len(T) // 2
-    if relief > 0.0:
-        K = K + relief * np.outer(T, T)
-    return Matrices(np.ascontiguousarray(K.T), on_cells(K[n:]), T, relief * T)
-
-
-def make_contact(rig: Matrices, friction: Friction, overstress: Array, moved: Array) -> Contact:
-    """Return a slider at rest, in which open edges are in S.
-
-    `overstress` and `moved` are taken over. Where the strength is mu_r N, `friction.peak` must
-    equal `friction.residual`.
-    """
-    n, m = len(friction.peak), len(moved)
-    difference = friction.peak - friction.residual
-    weakening = np.where(difference > 0.0, friction.weakening, 0.0)
-    columns, load, normal_load = (
-        rig.transposed.copy(),
-        rig.forces.copy(),
-        on_cells(rig.forces[n:]),
-    )
-    columns[:, :n] += friction.peak * rig.normal.T
-    columns.flat[: n * (m + 1) : m + 1] -= weakening
-    load[:n] += friction.peak * normal_load
-    inside, stack = np.zeros((2, m), np.int64)
-    place, counts = np.full(m, NOBODY), np.zeros(4, np.int64)
-    state = Contact(
-        columns, load, rig.relief, rig.normal, normal_load, difference, weakening, overstress,
-        moved, np.empty((m, m)), inside, place, stack, np.zeros(m, np.bool_), counts,
-        *np.empty((4, m)),
-    )  # fmt: skip
-    opened = n + np.flatnonzero(moved[n:] > 0.0)
-    if opened.size:
-        block = columns[np.ix_(opened, opened)].T
-        state.inverse[: opened.size, : opened.size] = np.linalg.inv(block)
-        state.inside[: opened.size] = opened
-        place[opened] = np.arange(opened.size)
-        state.counts[N_INSIDE] = opened.size
-    return state
-
-
 class Pressed(NamedTuple):
     """A slider after the pressing."""
 
@@ -108,36 +60,63 @@ class Pressed(NamedTuple):
     friction: Friction  # the peak is the residual where it has been reached
 
 
-def press(rig: Matrices, friction: Friction, force: float) -> Pressed:
-    """Steps 1 and 2: return a slider under a normal force (N/m). `rig.forces` is T_p."""
-    linear, n = rig.forces * force, len(friction.peak)
+def make_contact(
+    K: Array, T: Array, friction: Friction, overstress: Array, moved: Array, relief: float = 0.0
+) -> Contact:
+    """Return a slider at rest, in which open edges are in S.
+
+    `overstress` and `moved` are taken over. Where the strength is mu_r N, `friction.peak` must
+    equal `friction.residual`. With a machine, the force falls by `relief` T'x (Pa).
+    """
+    n, m = len(friction.peak), len(moved)
+    if relief > 0.0:
+        K = K + relief * np.outer(T, T)
+    columns, load, normal, normal_load = K.T.copy(), T.copy(), on_cells(K[n:]), on_cells(T[n:])
+    difference = friction.peak - friction.residual
+    weakening = np.where(difference > 0.0, friction.weakening, 0.0)
+    columns[:, :n] += friction.peak * normal.T
+    columns.flat[: n * (m + 1) : m + 1] -= weakening
+    load[:n] += friction.peak * normal_load
+    inverse, (inside, stack, motion) = np.empty((m, m)), np.zeros((3, m), np.int64)
+    opened = n + np.flatnonzero(moved[n:] > 0.0)
+    k = opened.size
+    inverse[:k, :k] = np.linalg.inv(columns[np.ix_(opened, opened)].T)
+    inside[:k], motion[opened] = opened, Motion.STABLE
+    counts = np.zeros(4, np.int64)
+    counts[N_INSIDE] = k
+    return Contact(
+        columns, load, relief * T, normal, normal_load, difference, weakening, overstress, moved,
+        inverse, inside, stack, motion, counts, np.zeros(3), *np.empty((4, m)),
+    )  # fmt: skip
+
+
+def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
+    """Steps 1 and 2: return a slider under a normal force (N/m)."""
+    linear, n = T_p * force, len(friction.peak)
     strength = friction.peak * on_cells(-linear[n:])
     if np.all(linear[n:] < 0.0) and np.all(np.abs(linear[:n]) < strength):
         return Pressed(linear, np.zeros_like(linear), friction)
     # 1. The same with slip along the shear.
     sign = np.where(linear < 0.0, -1.0, 1.0)
     sign[n:] = 1.0
-    along = Matrices(
-        rig.transposed * sign * sign[:, None], rig.normal * sign, rig.forces * sign, rig.relief
-    )
     # 2.
     first = FIRST_PRESSING * force
-    overstress = along.forces * first
+    overstress = T_p * sign * first
     overstress[:n] -= FIRST_PRESSING * strength
-    state = make_contact(along, friction, overstress, np.zeros_like(overstress))
+    moved = np.zeros_like(overstress)
+    state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
     beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
-    state.stack[: beyond.size], state.stacked[beyond] = beyond, True
-    state.counts[N_STACKED] = beyond.size
-    stop = PathStop(first, 0.0, 0.0, Status.ARRESTED)
-    while stop.status in (Status.ARRESTED, Status.UNSTABLE):
-        stop = follow(state, stop.load, 0.0, 0.0, force)
-    if stop.status != Status.AT_TARGET:
+    state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
+    state.counts[N_STACKED], state.loads[LOAD] = beyond.size, first
+    while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
+        pass
+    if status != Status.AT_TARGET:
         raise InputError(
             "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
             " coefficients and the weakening rate"
         )
     present = friction._replace(peak=friction.residual + state.difference)
-    return Pressed(forces_of(state, friction) * sign, state.moved * sign, present)
+    return Pressed(forces_of(state, friction) * sign, moved * sign, present)
 
 
 def forces_of(state: Contact, friction: Friction) -> Array:
@@ -148,10 +127,82 @@ def forces_of(state: Contact, friction: Friction) -> Array:
     return forces
 
 
-def begin_push(rig: Matrices, start: Pressed) -> Contact:
+def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Contact:
     """Step 3: return the slider before the push. Its slip adds to the slip of the pressing."""
     peak, residual, weakening = start.friction
     moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
     overstress[:n] -= peak * on_cells(-start.forces[n:])
     overstress[:n] += np.where(peak > residual, weakening * moved[:n], 0.0)
-    return make_contact(rig, start.friction, overstress, moved)
+    return make_contact(K, T, start.friction, overstress, moved, relief)
+
+
+class PushState(NamedTuple):
+    """A slider under a load D and a force F (N/m), with arrays over cells, then edges (m,)."""
+
+    load: float
+    force: float
+    moved: Array  # slip of the push, and opening, m
+    forces: Array  # shear force, and tension of edges, N/m
+    direction: Array  # (n,): rate of slip
+    residual: bool  # whether a cell has reached its residual strength
+
+
+class Push(NamedTuple):
+    """The push of a sample until it slides. Without an instability, `first` is None.
+
+    `last` is the last equilibrium, and `peak` the largest force (N/m). `events` holds the states
+    before and after each. `known` is false if the path was not followed to its end.
+    """
+
+    first: PushState | None
+    last: PushState
+    peak: float
+    events: list[tuple[PushState, PushState]]
+    known: bool
+    topples: bool
+
+
+class SliderPath:
+    """A slider on its path, which only goes on."""
+
+    def __init__(self, rig: Rig, relief: float, friction: Friction, force: float) -> None:
+        start = press(rig.K, rig.T_p, friction, force)
+        self.contact = begin_push(rig.K, rig.T, start, relief)
+        self.friction, self.before = friction, np.abs(start.moved)
+        self.before[len(friction.peak) :] = 0.0
+
+    def move(self, target: float = np.inf) -> int:
+        """Go on to a load (N/m), an instability or an arrest. Return the `Status`."""
+        return follow(self.contact, target)
+
+    def state(self) -> PushState:
+        """Return a copy of the present state."""
+        contact, law = self.contact, self.friction
+        direction = np.maximum(contact.rate[: len(law.peak)], 0.0)
+        at_residual = bool(((contact.difference == 0.0) & (law.peak > law.residual)).any())
+        moved, forces = contact.moved - self.before, forces_of(contact, law)
+        load, force, _ = contact.loads.tolist()
+        return PushState(load, force, moved, forces, direction, at_residual)
+
+    def follow(self) -> Push:
+        """Follow the path until the slider slides."""
+        events, first = [], None
+        while (status := self.move()) == Status.UNSTABLE:
+            last = self.state()
+            first = first or last
+            if (status := self.move()) != Status.ARRESTED:
+                break
+            events.append((last, self.state()))
+        unstable = self.contact.counts[N_STACKED] > 0  # otherwise it slides stably
+        last = last if unstable else self.state()
+        rate, n = np.abs(self.contact.rate), len(self.friction.peak)
+        known = status == Status.SLIDING
+        turns = bool(rate[n:].max() > MIN_TURNING * rate[:n].max())
+        return Push(
+            first,
+            last,
+            float(self.contact.loads[PEAK]),
+            events,
+            known,
+            known and unstable and turns,
+        )
