@@ -109,13 +109,12 @@ def test_a_pressing_that_slips_at_both_ends_comes_to_rest(rate, mean):
     """Slip of one half unloads the other. A cell that stops there does not slip back."""
     n, force, rng = 48, 4e3 / 0.006, np.random.default_rng(1)
     rig = rig_problem(n).rig
-    matrices = stages.make_matrices(rig.K, rig.T_p)
     for ratio in (0.2, 0.6):
         for _ in range(10):
             peak = mean * np.exp(0.15 * rng.normal(size=n))
             weakening = np.full(n, rate * 0.14 / n)
             friction = stages.Friction(peak, ratio * peak, weakening)
-            pressed = stages.press(matrices, friction, force)
+            pressed = stages.press(rig.K, rig.T_p, friction, force)
             sign, pressure = np.sign(rig.T_p[:n]), stages.on_cells(-pressed.forces[n:])
             slip = sign * pressed.moved[:n]
             assert slip.min() >= 0.0

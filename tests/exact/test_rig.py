@@ -5,18 +5,18 @@ import pytest
 from rigs import plain_rig
 
 from stiction.elasticity.blocks import Pushes, block_response
-from stiction.elasticity.columns import Material, block, eliminated
-from stiction.elasticity.rig import Body, Rig, contact_rig, loaded, on_cells
+from stiction.elasticity.columns import Body, block, eliminated
+from stiction.elasticity.rig import Rig, contact_rig, loaded, on_cells
 
 LENGTH = 0.14
-ACRYLIC, STEEL = Material(1.11e9, 2.65 / 1.35), Material(77e9, 2.7 / 1.3)
-SLIDER, BASE = Body(0.075, ACRYLIC), Body(0.03, ACRYLIC)
+ACRYLIC, STEEL = (1.11e9, 2.65 / 1.35), (77e9, 2.7 / 1.3)
+SLIDER, BASE = Body(0.075, *ACRYLIC), Body(0.03, *ACRYLIC)
 PUSH = (0.015, 0.025)
 RIGS = {
     "acrylic": {"base": BASE, "push": PUSH, "behind": 0.06, "ahead": 0.1},
-    "steel base, tilted press": {"base": Body(0.02, STEEL), "push": PUSH, "tilt": -0.4},
+    "steel base, tilted press": {"base": Body(0.02, *STEEL), "push": PUSH, "tilt": -0.4},
     "soft base on rollers": {
-        "base": Body(0.05, Material(0.3e9, 1.7)), "push": (0.0, 0.004), "behind": 0.02,
+        "base": Body(0.05, 0.3e9, 1.7), "push": (0.0, 0.004), "behind": 0.02,
         "ahead": 0.3, "bottom": "rollers",
     },
     "sheared top": {"base": BASE, "push": None, "ahead": 0.01, "tilt": 0.7},
@@ -53,7 +53,7 @@ def test_motions_of_the_slider_and_sums_of_forces(name):
 def test_a_block_alone_moves_without_force():
     """All points of a free block, by the same columns."""
     n, height = 48, 0.6
-    matrix = block(height, 1.0 / n, n, ACRYLIC, push=(0.2, 0.25))[:-1, :-1]
+    matrix = block(Body(height, *ACRYLIC), 1.0 / n, n, push=(0.2, 0.25))[:-1, :-1]
     x = np.linspace(0.0, 1.0, n + 1)
     for u, v, u_far in ((1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -x, height)):
         parts = (np.full(n, u), np.broadcast_to(v, n + 1))
@@ -67,9 +67,9 @@ def test_energy_and_betti(pressing):
     n = 40
     rig = rig_of("acrylic", n, pressing=pressing)
     cell = LENGTH / n
-    S, g, travels = loaded(block(0.075, cell, n, ACRYLIC, push=PUSH), n, pressing, 0.0)
+    S, g, travels = loaded(block(Body(0.075, *ACRYLIC), cell, n, push=PUSH), n, pressing, 0.0)
     signs = np.repeat([1.0, -1.0], [n, n + 1])
-    below = block(0.03, cell, n, ACRYLIC, far="fixed", behind=0.06, ahead=0.1)
+    below = block(Body(0.03, *ACRYLIC), cell, n, far="fixed", behind=0.06, ahead=0.1)
     S_B = below * np.outer(signs, signs)
     j, F = 1e-6 * np.random.default_rng(1).normal(size=2 * n + 1), 2e4
     u_B = np.linalg.solve(S + S_B, g[:, 0] * F - S @ j)
@@ -108,7 +108,7 @@ def test_equal_blocks_on_rollers_and_between_platens():
     length, height, push = 0.14, 0.075, (0.0325, 0.0425)
     errors = []
     for n in (128, 256):
-        matrix = block(height, length / n, n, ACRYLIC, push=push)
+        matrix = block(Body(height, *ACRYLIC), length / n, n, push=push)
         size = 2 * n + 1
         # The interface carries no pressure. The far side moves along rollers.
         used = np.append(np.arange(2 * size) < size + n, True)
@@ -119,7 +119,7 @@ def test_equal_blocks_on_rollers_and_between_platens():
         q = abs(-on_slip[-1, :n] * n - known.shear).max()
         C = abs(-1.0 / on_slip[-1, -1] / known.drive_stiffness - 1.0)
         # A slider under a platen, on its mirror image: F moves a rigid top along x.
-        plain = block(height, length / n, n, ACRYLIC)
+        plain = block(Body(height, *ACRYLIC), length / n, n)
         top = np.zeros((2 * size, size + 1))
         top[np.arange(size), np.arange(size)] = 1.0
         top[size : size + n, size] = 1.0
@@ -128,7 +128,9 @@ def test_equal_blocks_on_rollers_and_between_platens():
         S = S - np.outer(g, g) / S_gg  # at a given force
         g = g / S_gg
         signs = np.repeat([1.0, -1.0], [n, n + 1])
-        below = block(height, length / n, n, ACRYLIC, far="fixed") * np.outer(signs, signs)
+        below = block(Body(height, *ACRYLIC), length / n, n, far="fixed") * np.outer(
+            signs, signs
+        )
         T = below @ np.linalg.solve(S + below, g)
         known = block_response(length, n, height, ACRYLIC.modulus, ACRYLIC.kappa, None)
         q_platen = abs(T[:n] * n - known.shear)[2:-2].max()
@@ -153,8 +155,8 @@ def test_all_lines_of_both_bodies_at_once(given):
     """Linear elements across, in a single sparse matrix. Finer elements quarter the difference."""
     n, (middle, width), E, nu = 16, given["push"], *given["base_solid"]
     rig = contact_rig(
-        LENGTH, n, Body(0.075, Material(3e9 / 2.7, 2.65 / 1.35)),
-        Body(0.03, Material(0.5 * E / (1.0 + nu), (3.0 - nu) / (1.0 + nu))),
+        LENGTH, n, Body(0.075, 3e9 / 2.7, 2.65 / 1.35),
+        Body(0.03, 0.5 * E / (1.0 + nu), (3.0 - nu) / (1.0 + nu)),
         push=(middle - 0.5 * width, middle + 0.5 * width), tilt=given.get("tilt", 0.0),
         pressing="plate" if given.get("plate") else "soft",
     )  # fmt: skip
@@ -174,14 +176,14 @@ def test_all_lines_of_both_bodies_at_once(given):
 # -- closed forms of contact mechanics -----------------------------------------------------------
 
 NU = 0.3
-HALF_PLANE, RIGID = Material(1.0, 3.0 - 4.0 * NU), Material(1e7, 3.0 - 4.0 * NU)
+HALF_PLANE, RIGID = (1.0, 3.0 - 4.0 * NU), (1e7, 3.0 - 4.0 * NU)
 E_STAR = 2.0 / (1.0 - NU)  # E/(1 - nu^2) of the base with G = 1
 
 
 def punch(n: int) -> Rig:
     """A rigid slider of unit length, which does not rotate, on a base twelve times as long."""
     sides = {"behind": 12.0, "ahead": 12.0, "pressing": "plate", "push": None}
-    return contact_rig(1.0, n, Body(1.0, RIGID), Body(12.0, HALF_PLANE), **sides)
+    return contact_rig(1.0, n, Body(1.0, *RIGID), Body(12.0, *HALF_PLANE), **sides)
 
 
 def sliding(rig: Rig, mu: float) -> np.ndarray:
@@ -243,7 +245,7 @@ def test_short_waves():
     packet of 40 cells leaves 3e-3.
     """
     n = 256
-    rig = contact_rig(1.0, n, Body(1.0, ACRYLIC), Body(1.0, STEEL), push=None)
+    rig = contact_rig(1.0, n, Body(1.0, *ACRYLIC), Body(1.0, *STEEL), push=None)
     (G, kappa), (G_B, kappa_B) = ACRYLIC, STEEL
     a = (kappa + 1.0) / (4.0 * G) + (kappa_B + 1.0) / (4.0 * G_B)
     beta = ((kappa - 1.0) / (4.0 * G) - (kappa_B - 1.0) / (4.0 * G_B)) / a
@@ -272,7 +274,7 @@ def test_the_corner_of_a_slider():
     known, forces = np.array([0.5444837, 0.9085292]), []
     for n in (32, 64, 128, 256):
         rig = contact_rig(
-            1.0, n, Body(0.6, HALF_PLANE), Body(0.5, HALF_PLANE),
+            1.0, n, Body(0.6, *HALF_PLANE), Body(0.5, *HALF_PLANE),
             push=(0.2, 0.3), behind=0.5, ahead=0.5,
         )  # fmt: skip
         forces.append([n * rig.T[0], n * rig.T_p[0], n * rig.T_p[n]])

@@ -15,8 +15,8 @@ from numpy.polynomial import legendre
 from scipy.sparse.linalg import splu
 
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
-from stiction.elasticity.columns import Material
-from stiction.elasticity.rig import Body, contact_rig
+from stiction.elasticity.columns import Body
+from stiction.elasticity.rig import contact_rig
 
 
 class Axis:
@@ -228,7 +228,7 @@ def test_a_slider_on_a_longer_base():
     )
     u = np.zeros(force.size)
     u[used] = factors.solve(force[used])
-    bodies = Body(height, Material(1.0, kappa)), Body(0.3, Material(stiffer, below))
+    bodies = Body(height, 1.0, kappa), Body(0.3, stiffer, below)
     rig = contact_rig(1.0, n, *bodies, push=(low, high), behind=behind, ahead=ahead)
     assert rig.C * (force @ u) == pytest.approx(1.0, rel=3e-3)
     middle = slice(n // 16, -n // 16)

@@ -65,9 +65,10 @@ Mask: TypeAlias = NDArray[np.bool_]
 Keep: TypeAlias = Callable[[Labels], Mask]
 
 
-class Material(NamedTuple):
-    """Elastic constants of the plane problem: G (Pa) and Kolosov's constant (1)."""
+class Body(NamedTuple):
+    """A rectangular body: its height (m), G (Pa) and Kolosov's constant of the plane problem."""
 
+    height: float
     modulus: float
     kappa: float
 
@@ -158,7 +159,7 @@ class Columns(NamedTuple):
     """Step 2: the terms of a body. Each is a `Piece` on a line and its neighbours."""
 
     across: Elements
-    material: Material
+    body: Body
     far: Far
 
     def _piece(self, lines: list[int], matrix: Array) -> Piece:
@@ -176,7 +177,7 @@ class Columns(NamedTuple):
 
     def cell(self, line: int, width: float) -> Piece:
         """Return the shear of a cell."""
-        (_, M, D, S), G = self.across, self.material.modulus
+        (_, M, D, S), G = self.across, self.body.modulus
         return self._coupled([line - 1, line, line + 1], M * G / width, D * G, S * G * width)
 
     def edge(self, line: int, width: float, stop: bool = False) -> Piece:
@@ -184,19 +185,19 @@ class Columns(NamedTuple):
 
         With a stop, the place of the second cell is taken by a frictionless wall.
         """
-        (_, M, D, S), P = self.across, self.material.longitudinal
+        (_, M, D, S), P = self.across, self.body.longitudinal
         lines = [line - 1, line, line + 1][: 3 - stop]
-        return self._coupled(lines, M * P / width, D * self.material.lame, S * P * width)
+        return self._coupled(lines, M * P / width, D * self.body.lame, S * P * width)
 
     def end(self, line: int, width: float) -> Piece:
         """Return the half cell at a free end."""
-        G, (lame, P) = self.material.modulus, (self.material.lame, self.material.longitudinal)
+        G, (lame, P) = self.body.modulus, (self.body.lame, self.body.longitudinal)
         return self._piece([line], 2.0 * G * (lame + G) / P * width * self.across.slope)
 
     def push(self, width: float, push: Interval) -> Piece:
         """Return minus the loads of a unit force along x on the end of the first cell."""
         points, _, mixed, slope = self.across
-        lame, P = self.material.lame, self.material.longitudinal
+        lame, P = self.body.lame, self.body.longitudinal
         extent, count = push[1] - push[0], len(points)
         ramp = np.clip(points, *push) / extent  # its derivative is the traction
         matrix = np.zeros((2 * count + 1, 2 * count + 1))
@@ -252,8 +253,8 @@ def _beyond(
 
 
 def block(
-    height: float, cell: float, n_cells: int, material: Material, *, far: Far = "free",
-    push: Interval | None = None, behind: float = 0.0, ahead: float = 0.0,
+    body: Body, cell: float, n_cells: int, *, far: Far = "free", push: Interval | None = None,
+    behind: float = 0.0, ahead: float = 0.0,
 ) -> Array:  # fmt: skip
     """Return the stiffness of a body per unit depth, Pa, on its surface and its far side.
 
@@ -262,7 +263,7 @@ def block(
     a unit force. The body is longer than the surface in contact by `behind` and `ahead`. If it
     lies on rollers, a frictionless wall holds its leading end.
     """
-    columns = Columns(elements(height, FIRST_ELEMENT * cell, push), material, far)
+    columns = Columns(elements(body.height, FIRST_ELEMENT * cell, push), body, far)
     last, last_point = 2 * n_cells, len(columns.across.points) - 1
 
     def keep(length: int, borders: bool = True) -> Keep:

@@ -29,7 +29,6 @@ Algorithm
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
@@ -37,19 +36,10 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from stiction.base.arrays import Array, one_blas_thread
-from stiction.elasticity.columns import Far, Interval, block, eliminated
-from stiction.elasticity.columns import Material as Material
+from stiction.elasticity.columns import Body, Far, Interval, block, eliminated
 
 
-class Body(NamedTuple):
-    """A rectangular body: its height (m) and its material."""
-
-    height: float
-    material: Material
-
-
-@dataclass(frozen=True, eq=False)
-class Rig:
+class Rig(NamedTuple):
     """Stiffness and loads of a slider on a base with n cells, per unit depth.
 
     The unknowns are slip at n cells and opening at n + 1 edges. Forces are
@@ -89,23 +79,21 @@ def contact_rig(
     end. If its bottom lies on rollers, a frictionless stop holds its leading end. The
     push acts along +x or -x (`towards`).
     """
-    size, cell = 2 * nodes + 1, length / nodes
+    cell, order = length / nodes, np.arange(2 * nodes + 1)
     signs = np.repeat([1.0, -1.0], [nodes, nodes + 1])
     with one_blas_thread():
         # 1.
-        bodies = block(slider.height, cell, nodes, slider.material, push=push)
-        S_B = np.outer(signs, signs) * block(
-            base.height, cell, nodes, base.material, far=bottom, behind=behind, ahead=ahead
-        )
+        whole = block(slider, cell, nodes, push=push)
+        below = block(base, cell, nodes, far=bottom, behind=behind, ahead=ahead)
+        S_B = np.outer(signs, signs) * below
         # 2. and 3.
-        S, g, S_gg = loaded(bodies, nodes, pressing, tilt)
+        S, g, S_gg = loaded(whole, nodes, pressing, tilt)
         # 4.
         factor = cholesky(S + S_B, lower=True)
         half, loads = (solve_triangular(factor, part, lower=True) for part in (S, g))
         K, T = S - half.T @ half, g - half.T @ loads
         C = 1.0 / (loads[:, 0] @ loads[:, 0] - S_gg)
     # 5.
-    order = np.arange(size)
     if towards < 0:
         order = np.concatenate([order[:nodes][::-1], order[nodes:][::-1]])
     K, T = K[np.ix_(order, order)], T[order]

@@ -328,13 +328,14 @@ class Slider(Listed):
     def rig(self, length: float, nodes: int, solid: Solid) -> Rig:
         """Return the stiffness and the loads of the rig, per unit depth."""
         from stiction.elasticity.blocks import Pushes  # scipy takes half a second
-        from stiction.elasticity.rig import Body, Material, contact_rig
+        from stiction.elasticity.columns import Body
+        from stiction.elasticity.rig import contact_rig
 
         base, drive, push = self.base, self.drive, None
         if isinstance(drive, Pusher):
             push = Pushes((), drive.height, drive.width).edges(self.height)
         slider, below = (
-            Body(height, Material(of.shear_modulus, of.kolosov))
+            Body(height, of.shear_modulus, of.kolosov)
             for height, of in ((self.height, solid), (base.height, base.solid or solid))
         )
         return contact_rig(
