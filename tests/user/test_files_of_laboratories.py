@@ -149,3 +149,22 @@ def test_every_file_is_read_right_or_refused_with_the_argument_to_add():
     assert not wrong, "\n".join(wrong)
     assert (read, read + refused) >= (50, 60)
     assert read + refused == len([*FILES.iterdir()])
+
+
+@pytest.mark.parametrize(
+    "heading", ["COF", "Reibzahl", "friction coefficient", "\N{MICRO SIGN}"]
+)
+def test_a_coefficient_is_not_read_as_a_stress(tmp_path, heading):
+    path = tmp_path / "profile.csv"
+    path.write_text(f"x (mm),{heading}\n0,0.4\n1,0.5\n2,0.6\n", encoding="utf-8")
+    assert "friction_coefficient" in refusal_of(lambda: st.read_profile(path))
+    read = st.read_profile(path, quantity="friction_coefficient")
+    np.testing.assert_allclose(read, [0.4, 0.5, 0.6])
+
+
+@pytest.mark.parametrize("mark", ["9.9E37", "-9.9e37", "9.91E37"])
+def test_marks_of_an_overload_are_no_forces(tmp_path, mark):
+    path = tmp_path / "record.csv"
+    rows = "\n".join(f"{0.1 * i:.1f},{min(i, 60)}" for i in range(100))
+    path.write_text(f"Time (s),Friction force (N)\n{rows}\n10.0,{mark}\n", encoding="utf-8")
+    assert "overload" in refusal_of(lambda: st.read_curve(path))

@@ -89,6 +89,10 @@ OF_A_PLANE = (
 """Advice for two dimensions where a line was expected."""
 
 
+OVERLOAD = 9.9e37
+"""Smallest number with which an instrument marks an overload or a missing value (SCPI)."""
+
+
 # -- values in SI --------------------------------------------------------------------------------
 
 
@@ -135,6 +139,12 @@ def column_in_si(
         raise InputError(
             f"the unit of the {quantity} is not stated. Write it into the heading of"
             f" {column.label!r}{way}"
+        )
+    if np.any(beyond := np.abs(column.values) >= OVERLOAD):
+        value = column.values[beyond][0]
+        raise InputError(
+            f"the {quantity} holds {value:g}, with which instruments mark an overload. Cut the"
+            f" record there, or pass missing={value:g} if this is a missing value"
         )
     for si in units:
         if is_in(name, si):
@@ -435,6 +445,12 @@ def _chosen(
         places = {"x": place}
     if chosen is None:
         chosen = _by_rule([c for c in columns if c not in places.values()], quantity)
+        si = QUANTITIES[quantity].units
+        if si != "1" and not chosen.unit and is_coefficient_name(chosen):
+            raise InputError(
+                f"{chosen} is a friction coefficient, but the {quantity} is in {si}. Pass"
+                " quantity='friction_coefficient', or a heading with the unit"
+            )
     if len(dims) == 1 and not places and len(columns) > 2 and value is None:
         raise InputError(unclear(columns, "position x", "x"))
     return chosen, places
