@@ -19,6 +19,7 @@ from stiction.base.units import in_words
 from stiction.base.variables import UNITS
 from stiction.cli.report import Page
 from stiction.ensemble.batches import versions
+from stiction.inference.standards import WHY
 from stiction.plot.style import PAGE, paper_style
 from stiction.problem.problem import Problem
 from stiction.reliability.answer import Answer, unseen_batch
@@ -58,6 +59,17 @@ def write_page(
     texts = {f"{type(item).__name__}: {item!r}": item for item in basis if item is not None}
     for text, item in texts.items():
         page.listing(f"Evidence: {type(item).__name__}", text.partition(": ")[2])
+    peaks = getattr(source, "peaks", None)
+    if peaks is not None and peaks.unit == "1":
+        page.table("Slip tests", *_slip_tests(peaks.loads or peaks))
+        rows = [
+            [name, f"{value:.4g}", WHY.get(name, "")] for name, value in peaks.standards.items()
+        ]
+        page.table(
+            "Slip factors by the standards", ["quantity", "value", "why it differs"], rows
+        )
+    if assumptions := getattr(source, "assumptions", ()):
+        page.table("Assumptions", ["assumption"], [[text] for text in assumptions])
     doubts = [*design.doubts, *unseen_batch(design.specimens), *design.warnings]
     for item in evidence:
         doubts += [*getattr(item, "doubts", ()), *getattr(item, "notes", ())]
@@ -67,6 +79,20 @@ def write_page(
     page.text(_repeat(design))
     write_whole(place, page.html().encode())
     return place
+
+
+def _slip_tests(peaks: Any) -> tuple[list[str], list[list[str]]]:
+    """Return the headings and rows for the table of slip loads, in the words of EN 1090-2."""
+    rows = []
+    for kind, factors in enumerate(peaks.values):
+        names = peaks.specimens[kind] if peaks.specimens else range(1, factors.size + 1)
+        forces = (
+            peaks.normal_forces[kind] if peaks.normal_forces else np.full(factors.size, np.nan)
+        )
+        for name, factor, force in zip(names, factors, forces, strict=True):
+            loads = [in_words("N", value) for value in (force, peaks.surfaces * factor * force)]
+            rows.append([str(name), *loads, f"{factor:.4g}"])
+    return ["specimen", "clamping force", "slip load", "slip factor"], rows
 
 
 def _repeat(design: Answer) -> str:
