@@ -18,7 +18,6 @@ Run: ``python validation/slip_factors.py [CAMPAIGNS [SEED]]``
 import sys
 
 import numpy as np
-import scipy.stats
 from design_force_closed import X, law, smoothed
 
 from stiction.inference.standards import fractile_factor
@@ -114,8 +113,8 @@ def main(campaigns=400, seed=1):
         for name, pairs in rows.items():
             ratio, stress = np.array(pairs).T
             error = ratio.std(ddof=1) / np.sqrt(campaigns)
-            text = f"| {truth} | {name} | {ratio.mean():.2f} ± {error:.2f} | {np.median(stress):.3f} |"
-            print(text, flush=True)
+            shown = f"{ratio.mean():.2f} ± {error:.2f} | {np.median(stress):.3f}"
+            print(f"| {truth} | {name} | {shown} |", flush=True)
         if ratios:
             print(
                 f"| {truth} | median force over a known family, 1e-3 | {np.median(ratios):.3f} | |"
