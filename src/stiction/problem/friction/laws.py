@@ -477,7 +477,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
     if not 0.0 < law.reach < np.inf:
         return [
             f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
-            f" positive and finite, got {law.reach:g}"
+            f" positive and finite, got {law.reach:g}. Its f must fall with slip, from 1 towards 0"
         ]
     try:
         u, f, slope = _examined(law)
