@@ -74,6 +74,10 @@ def of_friction_test(found):
     assert script["scan"]() == written
 
 
+def of_slip_factors(found):
+    assert found["posterior"].specimens == 5
+
+
 def of_decisions(found):
     assert found["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
     assert 30e3 < found["design"].force < 50e3
@@ -96,6 +100,7 @@ SHOWN = {
     }),
     "docs/guide/failure-probability.md": (of_reliability, {}),
     "docs/tutorials/peak-forces.md": (of_peaks, {}),
+    "docs/tutorials/slip-factors.md": (of_slip_factors, {}),
     "docs/guide/planes-and-ends.md": (len, {}),
     "docs/guide/specimens.md": (len, {}),
     "docs/evidence/laboratory-fault.md": (len, {}),
