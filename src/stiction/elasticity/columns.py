@@ -51,8 +51,9 @@ FIRST_ELEMENT, ELEMENT_GROWTH, MAX_REMAINDER = 2.0, 3.0, 1.5
 COLUMN_GROWTH, MAX_COLUMN = 1.25, 0.1
 """Ratio of the widths of neighbouring columns beyond the contact, and largest width over the
 length of these columns."""
-STRIDE = 1 << 20
-"""Distance between the labels of two lines. Lines at edges are even, and lines of cells odd."""
+STRIDE, PERIOD = 1 << 20, 2 << 20
+"""Distances between the labels of two lines and of two periods. Lines at edges are even, and
+lines of cells odd."""
 LOBATTO = np.concatenate(([-1.0], legendre.Legendre.basis(DEGREE).deriv().roots(), [1.0]))
 """Points of an element on [-1, 1]."""
 PUSH = 1 << 60
@@ -88,10 +89,6 @@ class Piece(NamedTuple):
 
     labels: Labels
     matrix: Array
-
-    def shifted(self, lines: int) -> Piece:
-        """Return the same piece further along x."""
-        return Piece(self.labels + lines * STRIDE, self.matrix)
 
 
 class Elements(NamedTuple):
@@ -169,8 +166,8 @@ class Columns(NamedTuple):
         held = (labels % STRIDE == count - 1) & (self.far != "free")
         if self.far == "rollers":
             held &= labels // STRIDE % 2 == 0
-        size = len(labels)
-        return Piece(labels[~held], matrix[:size, :size][np.ix_(~held, ~held)])
+        free = np.flatnonzero(~held)
+        return Piece(labels[free], matrix[np.ix_(free, free)])
 
     def _coupled(self, lines: list[int], M: Array, D: Array, S: Array) -> Piece:
         return self._piece(lines, np.block([[M, -D, -M], [-D.T, S, D.T], [-M, D, M]]))
@@ -213,8 +210,8 @@ def _repeated(period: Piece, count: int, keep: Callable[[int], Keep]) -> Piece:
     if count == 1:
         return period
     half = _repeated(period, count // 2, keep)
-    parts = [half, half.shifted(2 * (count // 2))]
-    parts += [period.shifted(2 * (count - 1))] * (count % 2)
+    parts = [half, Piece(half.labels + count // 2 * PERIOD, half.matrix)]
+    parts += [Piece(period.labels + (count - 1) * PERIOD, period.matrix)] * (count % 2)
     return merge(parts, keep(count))
 
 

@@ -348,37 +348,36 @@ class Slider(Listed):
 
         a = sum (kappa + 1)/(4 G), and beta is Dundurs' second constant.
         """
-        bodies = solid, self.base.solid or solid
-        (a, b), (a_base, b_base) = (
-            np.add(of.kolosov, [1.0, -1.0]) / (4.0 * of.shear_modulus) for of in bodies
+        slider, base = (
+            np.add(of.kolosov, [1.0, -1.0]) / (4.0 * of.shear_modulus)
+            for of in (solid, self.base.solid or solid)
         )
-        a, b = a + a_base, b - b_base
+        a, b = slider[0] + base[0], slider[1] - base[1]
         return float(2.0 * a / (a**2 - b**2))
 
     def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
         """Return why a slider does not fit an interface (m) and a material, or an empty list."""
-        problems = []
+        problems, base = [], self.base
         if mode != "II":
             problems.append("mode: a slider is sheared in its plane. Leave 'II'")
-        if self.base.solid is not None and self.base.solid.plane != solid.plane:
+        if base.solid is not None and base.solid.plane != solid.plane:
             text = "specimen.base.solid.plane: must be the plane state of the slider"
             problems.append(f"{text}, {solid.plane!r}")
-        sizes = {"height": 0.5 * self.height, "base.height": 0.5 * self.base.height}
+        sizes = {"height": self.height, "base.height": base.height}
+        resolved = {name: 0.5 * size for name, size in sizes.items()}
         if isinstance(self.drive, Pusher):
-            sizes["drive.width"] = self.drive.width
+            resolved["drive.width"] = self.drive.width
         problems += [
             f"specimen.{name}: is not resolved by nodes {spacing:.3g} m apart. Give"
             f" interface.nodes = {math.ceil(length / size)} or more"
-            for name, size in sizes.items()
+            for name, size in resolved.items()
             if size < (1.0 - 1e-9) * spacing
         ]
-        base = {
-            f"base.{name}": getattr(self.base, name) for name in ("height", "behind", "ahead")
-        }
+        sizes |= {"base.behind": base.behind, "base.ahead": base.ahead}
         problems += [
             f"specimen.{name}: {size:g} m is more than {MAX_SIZE_RATIO:g} times the length of the"
             f" slider, {length:g} m. Check its unit (m)"
-            for name, size in {"height": self.height, **base}.items()
+            for name, size in sizes.items()
             if size > MAX_SIZE_RATIO * length
         ]
         return problems

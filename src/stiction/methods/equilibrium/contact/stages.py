@@ -100,14 +100,13 @@ def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
     sign = np.where(linear < 0.0, -1.0, 1.0)
     sign[n:] = 1.0
     # 2.
-    first = FIRST_PRESSING * force
-    overstress = T_p * sign * first
+    overstress = T_p * sign * (FIRST_PRESSING * force)
     overstress[:n] -= FIRST_PRESSING * strength
     moved = np.zeros_like(overstress)
     state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
     beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
     state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
-    state.counts[N_STACKED], state.loads[LOAD] = beyond.size, first
+    state.counts[N_STACKED], state.loads[LOAD] = beyond.size, FIRST_PRESSING * force
     while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
         pass
     if status != Status.AT_TARGET:
