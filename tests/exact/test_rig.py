@@ -115,7 +115,7 @@ def test_equal_blocks_on_rollers_and_between_platens():
         kept = np.append(np.arange(size + n) < n, True)
         on_slip = eliminated(matrix[np.ix_(used, used)], kept)
         pushes = Pushes(("left",), np.mean(push), push[1] - push[0])
-        known = block_response(length, n, height, ACRYLIC.modulus, ACRYLIC.kappa, pushes)
+        known = block_response(length, n, height, *ACRYLIC, pushes)
         q = abs(-on_slip[-1, :n] * n - known.shear).max()
         C = abs(-1.0 / on_slip[-1, -1] / known.drive_stiffness - 1.0)
         # A slider under a platen, on its mirror image: F moves a rigid top along x.
@@ -132,7 +132,7 @@ def test_equal_blocks_on_rollers_and_between_platens():
             signs, signs
         )
         T = below @ np.linalg.solve(S + below, g)
-        known = block_response(length, n, height, ACRYLIC.modulus, ACRYLIC.kappa, None)
+        known = block_response(length, n, height, *ACRYLIC, None)
         q_platen = abs(T[:n] * n - known.shear)[2:-2].max()
         travel = g @ np.linalg.solve(S + below, g) + 1.0 / S_gg
         C_platen = abs(2.0 / travel / known.drive_stiffness - 1.0)
