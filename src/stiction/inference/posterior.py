@@ -27,6 +27,7 @@ from stiction.inference.specimens import (
     FactorGrid,
     FactorPrior,
     Prediction,
+    Profiles,
     WithFactors,
     grid_of_profiles,
     tables_of,
@@ -402,6 +403,16 @@ class SpecimenPosterior(Posterior):
         if same and self.peaks.unit != "1":
             return Prediction(tests, grid)
         return Prediction.of(grid, joint, simulation._replace(method=method))
+
+    def without_field(self, problem: Problem, method: Any) -> Prediction:
+        """Return the prediction from the same tests if specimens differ only as a whole."""
+        own, tests = self.grid.profiles, self.likelihood
+        options: dict[str, Any] = {"families": own.families, "prior": own.prior}
+        profiles = Profiles.without_field(self.problem, self.peaks, **options)
+        simulation = Simulation(tests.method, None, self.seed, None)
+        tables = tables_of(self.problem, profiles, simulation, self.peaks, tests.error)
+        _, grid = grid_of_profiles(profiles, tables)
+        return Prediction.of(grid, problem, simulation._replace(method=method))
 
     def law(self, problem: Problem, method: Any) -> Prediction | None:
         """Return the prediction if it needs no samples: specimens differ only as a whole."""

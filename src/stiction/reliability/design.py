@@ -300,6 +300,10 @@ def sensitivities_of(
         if len(families) > 1:
             least, most = (pick(families, key=families.__getitem__) for pick in (min, max))
             rows.append((FAMILY, least, most, families[least], families[most]))
+        # A field that was stated and not measured: what did it change?
+        if getattr(source, "assumed", None):
+            whole = source.without_field(problem, experiment.method).quantile(probability)
+            rows.append(("field within a specimen", "none", "as stated", whole, reference))
         # 5.
         for key, ends in ranges_of(problem, source, stated).items():
             state.meter.note = f"what moves the design: {key}"
