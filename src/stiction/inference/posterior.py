@@ -103,6 +103,11 @@ class Posterior(WithFactors, Result):
         """Keys of the parameters that measurements changed. The others were stated."""
         return self.names
 
+    @property
+    def families(self) -> dict[str, float]:
+        """Posterior probability of each family of the scatter between specimens, if inferred."""
+        return {}
+
     @cached_property
     def before(self) -> dict[str, Array]:
         """Draws from the prior."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 import tomli_w
@@ -186,6 +186,12 @@ class Question:
         return design_stress(experiment.problem, experiment.random, **options)
 
 
+if TYPE_CHECKING:  # a table becomes a question
+    QuestionTable: TypeAlias = Question | dict[str, Any]
+else:
+    QuestionTable = Question
+
+
 @model(kw_only=True)
 class _Parts(Listed):
     """The parts of a study at a point of a sweep. Each part is valid by itself."""
@@ -241,7 +247,7 @@ class Study(_Parts):
     first: First = 0
     keep: Names = ()
     sweep: Sweep = ()
-    reliability: Question | None = None
+    reliability: QuestionTable | None = None
     peaks: PeaksOfStudy | None = None
     title: Text = ""
     _internal: ClassVar[tuple[str, ...]] = (
