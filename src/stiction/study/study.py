@@ -187,7 +187,7 @@ class Question:
 
 
 if TYPE_CHECKING:  # a table becomes a question
-    QuestionTable: TypeAlias = Question | dict[str, Any]
+    QuestionTable: TypeAlias = Any
 else:
     QuestionTable = Question
 
