@@ -228,7 +228,7 @@ class Along(NamedTuple):
 
 def along(problem: st.Problem, strength: Any, kinks: Any) -> Along:
     """Return what one sample does along `stiction.equilibrium_path`, between all kinks."""
-    at = st.equilibrium_path(problem, strength, [1.0]).event_load.values
+    at = st.equilibrium_path(problem, strength, [1.0]).event_load.dropna("event").values
     loads = np.unique(np.concatenate([[1.0], kinks, at, at * (1.0 + 1e-13)]))
     path = st.equilibrium_path(problem, strength, loads)
     path = path.isel(load=~path.sliding.values)

@@ -6,7 +6,7 @@ from checks import assert_second_order
 from oracles import angle_rule
 from setups import exact_onset, make_problem
 
-from stiction.methods.criterion import eigenfunction
+from stiction.methods.criterion import windows
 
 pytestmark = pytest.mark.slow
 DEPTH = 0.4e6
@@ -21,7 +21,7 @@ def relative_error(nodes_per_patch, periods):
     offset = (interface.x - 0.5 * interface.length + 0.3 * interface.spacing) / patch
     onset = exact_onset(problem, 1e6 - DEPTH * np.exp(-((offset / 2.0) ** 2)))
     s, measure = angle_rule(4000)
-    mean = np.sum(eigenfunction.weight(s) * np.exp(-((s / 4.0) ** 2)) * measure)
+    mean = np.sum(windows.weight(s) * np.exp(-((s / 4.0) ** 2)) * measure)
     return abs(onset.first_instability.item() - (1e6 - DEPTH * mean)) / DEPTH
 
 

@@ -311,6 +311,10 @@ class Answer(Result):
             Row("coefficient of variation", self.cv or math.nan),
             Row("part of it by the list of interfaces", self.members_cv or math.nan),
             Row("90 % of interfaces are between", self.band[0], self.band),
+            Row(
+                "95 % of interfaces have at most",
+                self.band[1] if math.isnan(self.band[0]) else math.nan,
+            ),
             Row("share that survives any stress", self.survived or math.nan),
             Row("reliability index", self.reliability_index),
             Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
