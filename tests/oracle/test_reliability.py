@@ -75,7 +75,7 @@ def test_design_stress_has_the_probability_asked_for():
     back = by(SYSTEM, answer.stress, "importance", 0.07, method=EXACT)
     error = math.hypot(answer.cv, back.cv)
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
-    low, high = answer.interval["probability"]
+    low, high = answer.interval["stress"]
     assert 0.66e6 < low < answer.stress < high
 
 
@@ -113,8 +113,7 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
     assert back.members[::-1] == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
 
 
-@pytest.mark.parametrize("event", ["critical_stress", "first_instability"])
-def test_failure_probability_of_a_lap_joint_is_that_of_counting(event):
+def test_failure_probability_of_a_lap_joint_is_that_of_counting():
     """Behind a rigid machine, where nodes stop: fields of its own, some by brute force."""
     drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=math.inf)
     problem = crooked(
@@ -131,10 +130,10 @@ def test_failure_probability_of_a_lap_joint_is_that_of_counting(event):
         brute = BruteForce(problem, strength[i : i + 1]).run()
         assert counted.critical_stress[i].item() == pytest.approx(brute.peak, rel=1e-9)
         assert counted.first_instability[i].item() == pytest.approx(brute.first, rel=1e-9)
-    own, share = counted[event].values, 0.05
+    own, share = counted.critical_stress.values, 0.05
     stress = float(np.nanquantile(own, share))
     share = float((own < stress).mean())
-    options = {"method": EXACT, "algorithm": "subset", "target_cv": 0.15, "event": event}
+    options = {"method": EXACT, "algorithm": "subset", "target_cv": 0.15}
     found = st.failure_probability(problem, field, stress, progress=False, **options)
     error = np.hypot((share * len(own)) ** -0.5, found.cv)
     assert abs(np.log(found.probability / share)) < 3.5 * error
