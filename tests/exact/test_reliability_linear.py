@@ -323,9 +323,12 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     carriers = 1 + np.searchsorted(np.cumsum(np.sort(shares)[::-1]), 0.9)
     told = int(re.search(r"(\d+) of its 12.*90% of the mean", given.warnings[-1])[1])
     assert told == pytest.approx(carriers, abs=1)
-    assert f"part of it by the list of interfaces  {given.members_cv:.2g}"[:20] in str(given)
+    shown = re.search(r"part of it by the list of interfaces +([\d.]+)", str(given))
+    assert float(shown[1]) == pytest.approx(given.members_cv, rel=1e-5)  # six digits are shown
+    assert f"coefficient of variation {given.cv:.6g}" in " ".join(str(given).split())
     assert np.isnan(found.band[0])  # few members have samples so low
-    assert "95 % of interfaces have at most" in str(given)
+    shown = re.search(r"95 % of interfaces have at most +([\d.e-]+)", str(given))
+    assert float(shown[1]) == pytest.approx(given.band[1], rel=1e-5)
     alike = st.failure_probability(LINE, few[:1] * 12, 1.01e6, **options, target_cv=0.3)
     assert alike.members_cv == 0.0  # one interface, twelve times
     # Entries as a posterior holds them: the weak ones seldom, so that all fail about as often.

@@ -120,7 +120,9 @@ def test_the_example_is_a_study_that_runs_without_a_doubt(inside, runs):
     for line in ("check study.toml", "run study.toml --out run", "report run"):
         said = runs(line)
         assert "warning" not in said, said
-    assert "probability" in runs("reliability study.toml")
+    answer = runs("reliability study.toml")
+    assert re.search(r"Probability of sliding\s.*90 % interval", answer)
+    assert re.search(r"\n  probability +[\d.e-]+ +[\d.e-]+ to [\d.e-]+\n", answer)
 
 
 @pytest.mark.parametrize(
