@@ -107,15 +107,13 @@ class FrictionLaw(Listed):
         integrated (relative error about 1e-12 for a smooth f). Beyond
         the reach, f is integrated by adaptive quadrature.
         """
-        from scipy.integrate import quad  # few laws need these
-        from scipy.interpolate import CubicHermiteSpline
+        from scipy.integrate import quad  # few laws need it
 
-        slips, f, slopes = _examined(self)
-        known = CubicHermiteSpline(slips, f, -slopes).antiderivative()
-        u = np.asarray(u, dtype=np.float64)
-        tail = np.vectorize(lambda end: quad(self.fraction, self.reach, end)[0], otypes=[float])
-        inside = known(np.minimum(u, self.reach)) - known(0.0)
-        return np.asarray(inside + tail(np.maximum(u, self.reach)))
+        reach, flat = self.reach, np.ravel(np.asarray(u, dtype=np.float64))
+        area = _antiderivative(self)(np.minimum(flat, reach))
+        beyond = flat > reach
+        area[beyond] += [quad(self.fraction, reach, end)[0] for end in flat[beyond]]
+        return np.asarray(area.reshape(np.shape(u)))
 
     def slip_at(self, fraction: float) -> float:
         """Return the first slip u, in units of d_c, at which f has fallen to a fraction in [0, 1].
@@ -461,6 +459,15 @@ def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
     f, u = compiled(type(parameters)), np.linspace(0.0, law.reach, SLIPS)
     values, slopes = np.array([f(parameters, slip) for slip in u]).T
     return u, values, slopes
+
+
+@lru_cache(maxsize=64)
+def _antiderivative(law: FrictionLaw) -> Any:
+    """Return the integral of cubic Hermite pieces through f and f', up to the reach of a law."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    slips, f, slopes = _examined(law)
+    return CubicHermiteSpline(slips, f, -slopes).antiderivative()
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
