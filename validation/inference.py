@@ -16,12 +16,7 @@ import scipy.stats
 
 import stiction as st
 from stiction.inference.grid import grid_of
-from stiction.inference.likelihood import (
-    Simulation,
-    experiments_at,
-    make_likelihood,
-    simulate,
-)
+from stiction.inference.likelihood import Simulation, experiments_at, make_likelihood, simulate
 from stiction.inference.peaks import make_peaks
 from stiction.inference.prior import make_prior
 

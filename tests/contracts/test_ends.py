@@ -54,10 +54,7 @@ BODIES = {
     "line": (line(), st.Rupture(loading_rate=1e8, events=4)),
     "blocks": (blocks(None, PUSHER), st.Rupture(events=4)),
     "blocks, partly bonded": (blocks((0.03, 0.065)), st.Rupture(events=4)),
-    "pushed blocks, partly bonded": (
-        blocks((0.02, 0.08), PUSHER),
-        st.Rupture(events=4),
-    ),
+    "pushed blocks, partly bonded": (blocks((0.02, 0.08), PUSHER), st.Rupture(events=4)),
 }
 
 

@@ -162,8 +162,7 @@ def test_density_far_out_falls_and_stays_finite():
 
 
 @pytest.mark.parametrize(
-    ("shape", "error", "most"),
-    [(1.5, 0.0, 0.03), (4.0, 0.6, 0.01), (1.5, 0.2, 0.04)],
+    ("shape", "error", "most"), [(1.5, 0.0, 0.03), (4.0, 0.6, 0.01), (1.5, 0.2, 0.04)]
 )
 def test_density_above_a_bound(shape, error, most):
     """Gamma distributions, one of which begins steeply at its bound, with a load cell's error."""

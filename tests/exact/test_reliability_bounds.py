@@ -216,11 +216,7 @@ class Uniform:
 
 @pytest.mark.parametrize(
     ("chance", "target_cv", "least", "most"),
-    [
-        (0.03, 0.3, 100, 10**6),
-        (0.012, 0.3, 1000, 1500),
-        (0.5, 0.2, 10, 99),
-    ],
+    [(0.03, 0.3, 100, 10**6), (0.012, 0.3, 1000, 1500), (0.5, 0.2, 10, 99)],
 )
 def test_counting_is_unbiased_whenever_it_stops(chance, target_cv, least, most):
     repeats = 2000

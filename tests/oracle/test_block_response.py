@@ -113,8 +113,7 @@ LENGTH, SLOW = 1.0, pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    "name",
-    [*list(PUSHES)[:2], *(pytest.param(name, marks=SLOW) for name in list(PUSHES)[2:])],
+    "name", [*list(PUSHES)[:2], *(pytest.param(name, marks=SLOW) for name in list(PUSHES)[2:])]
 )
 def test_a_pusher(name):
     """From the left and from both sides."""
@@ -134,11 +133,7 @@ def test_a_pusher(name):
     shear = elements.stress(u, 0, middles(LENGTH, nodes))
     sides = (
         (("left",), shear, force @ u),
-        (
-            ("left", "right"),
-            0.5 * (shear + shear[::-1]),
-            0.5 * (force + mirrored) @ u,
-        ),
+        (("left", "right"), 0.5 * (shear + shear[::-1]), 0.5 * (force + mirrored) @ u),
     )
     for names, profile, travel in sides:
         response = block_response(

@@ -7,15 +7,7 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
-from setups import (
-    LENGTH,
-    RATE,
-    ROUND_OFF,
-    exact_onset,
-    local_onset,
-    make_problem,
-    turns,
-)
+from setups import LENGTH, RATE, ROUND_OFF, exact_onset, local_onset, make_problem, turns
 from specimens import crooked, rough
 
 import stiction as st

@@ -61,8 +61,7 @@ def test_noise_is_taken_out_of_a_marginal(name):
 
 
 @pytest.mark.parametrize(
-    "given",
-    [{"type": "beta", "low": 1e5}, {"type": "beta", "low": 1e5, "high": 4e6}, "norm"],
+    "given", [{"type": "beta", "low": 1e5}, {"type": "beta", "low": 1e5, "high": 4e6}, "norm"]
 )
 def test_a_wider_marginal_keeps_its_mean_and_what_is_fixed(given):
     family = family_of(given)

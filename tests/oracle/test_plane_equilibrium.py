@@ -24,9 +24,7 @@ from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.strength import present_pieces
 from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.plane import PlaneSearch, plane_onset
-from stiction.methods.equilibrium.transforms.relaxation import (
-    stable_equilibrium,
-)
+from stiction.methods.equilibrium.transforms.relaxation import stable_equilibrium
 
 NODES, SMALL = (24, 24), (20, 20)
 SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)

@@ -7,12 +7,7 @@ import pytest
 from rigs import LoadSteps, plain_rig
 
 import stiction as st
-from stiction.methods.equilibrium.contact.path import (
-    LOAD,
-    N_BORDERED_AGAIN,
-    Status,
-    follow,
-)
+from stiction.methods.equilibrium.contact.path import LOAD, N_BORDERED_AGAIN, Status, follow
 from stiction.methods.equilibrium.contact.stages import (
     Friction,
     begin_push,

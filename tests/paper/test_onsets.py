@@ -13,8 +13,7 @@ from stiction.methods.dynamics.summary import rupture_speed
 
 
 @pytest.mark.parametrize(
-    ("ratio", "expected", "patches"),
-    [(0.25, 4.1e3, 27.0), (1.0, 0.3e3, 2.8)],
+    ("ratio", "expected", "patches"), [(0.25, 4.1e3, 27.0), (1.0, 0.3e3, 2.8)]
 )
 def test_bias_of_the_local_criterion(ratio, expected, patches):
     """Mean of local minus exact (Pa) and slipping patches at onset; G* = G/(1-nu), n = 1024."""

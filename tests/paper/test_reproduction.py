@@ -380,11 +380,7 @@ SETS = {
         (OWN, ("L = 0.15 m, 1536 nodes", "30 MPa/s", "correlation lengths 0.5, 1, 3")),
         (
             SETS["rubber"],
-            (
-                "L = 0.2 m",
-                "G</i>* = 1.96 MPa",
-                "because an event is arrested in their samples",
-            ),
+            ("L = 0.2 m", "G</i>* = 1.96 MPa", "because an event is arrested in their samples"),
         ),
         (SETS["fault"], ("L = 100 km", "residual strength of 60 MPa", "0.67 kPa/s")),
     ],

@@ -138,8 +138,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
         (dataclasses.replace(PROBLEM, load=st.Load(initial_stress=2.5e5)), "initial_stress"),
         (
             dataclasses.replace(
-                PROBLEM,
-                friction=dataclasses.replace(PROBLEM.friction, residual_ratio=0.8),
+                PROBLEM, friction=dataclasses.replace(PROBLEM.friction, residual_ratio=0.8)
             ),
             "residual_strength",
         ),
@@ -199,10 +198,7 @@ def test_a_page_of_a_design(tmp_path):
         lambda: design.write_page(path, sources={"load.weight": "scales"}),
     )
     demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
-    refuses(
-        "design: must come from st.design_stress",
-        lambda: demand.write_page(path),
-    )
+    refuses("design: must come from st.design_stress", lambda: demand.write_page(path))
     # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
     means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))
     likely = [

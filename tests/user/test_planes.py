@@ -39,11 +39,7 @@ def test_a_path_that_is_lost_is_warned_of(monkeypatch):
         return Jump(Outcome.ARRESTED, state)
 
     for owner, name, lost in (
-        (
-            search,
-            "least_equilibrium",
-            lambda *given, **_: Relaxed(Outcome.UNDECIDED, given[3]),
-        ),
+        (search, "least_equilibrium", lambda *given, **_: Relaxed(Outcome.UNDECIDED, given[3])),
         (search.PlaneSearch, "next", path_lost),
         (search.PlaneSearch, "jump", at_rest),
     ):

@@ -259,12 +259,7 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
             {"type": "rupture", "loading_rate": 1e7},
             "method: 20,000 evaluations",
         ),
-        (
-            "problem.load",
-            {"friction_coefficient": 0.4},
-            {},
-            "needs a normal pressure",
-        ),
+        ("problem.load", {"friction_coefficient": 0.4}, {}, "needs a normal pressure"),
     ],
 )
 def test_a_question_is_refused_wherever_its_bad_point_is(key, question, bad, words, place):

@@ -252,11 +252,7 @@ def residual_of(operator: Operator, right: Array, x: Array, out: Array) -> None:
 
 @jit
 def solve_inside(
-    operator: Operator,
-    inside: Mask,
-    x: Array,
-    residual: Array,
-    tolerance: float,
+    operator: Operator, inside: Mask, x: Array, residual: Array, tolerance: float
 ) -> tuple[int, int]:
     """Solve (1) by conjugate gradients.
 

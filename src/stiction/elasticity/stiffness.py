@@ -145,12 +145,7 @@ def apply_circular(
 
 @jit
 def _apply_rows(
-    entries: DenseEntries,
-    nodes: Array,
-    count: int,
-    values: Array,
-    start: int,
-    target: Array,
+    entries: DenseEntries, nodes: Array, count: int, values: Array, start: int, target: Array
 ) -> None:
     """Write K times a field with `values` at `nodes`, from the node `start` on, to `target`."""
     n = entries.n_nodes

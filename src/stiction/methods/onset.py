@@ -83,11 +83,7 @@ def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str
 
 @checked
 def onset(
-    problem: Problem,
-    profiles: Any,
-    *,
-    method: MethodObject,
-    progress: Progress = True,
+    problem: Problem, profiles: Any, *, method: MethodObject, progress: Progress = True
 ) -> xr.Dataset:
     """Compute the load and position at which interfaces with a given strength begin to slide.
 

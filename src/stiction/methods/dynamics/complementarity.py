@@ -42,12 +42,7 @@ from typing import Any
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
 from stiction.elasticity.operator import Transform, convolve
-from stiction.methods.dynamics.state import (
-    ImplicitTables,
-    Setting,
-    node_line,
-    node_strength,
-)
+from stiction.methods.dynamics.state import ImplicitTables, Setting, node_line, node_strength
 
 _MAX_CG, _MAX_NEWTON = 400, 60  # iterations
 _MIN_CURVATURE = 1e-10  # of p (M - W) p as a share of p M p

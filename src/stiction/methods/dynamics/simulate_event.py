@@ -28,11 +28,7 @@ from stiction.methods.dynamics.save import (
     Save,
     over,
 )
-from stiction.methods.dynamics.specimens import (
-    DynamicEvent,
-    RuptureSearch,
-    refuse_overstress,
-)
+from stiction.methods.dynamics.specimens import DynamicEvent, RuptureSearch, refuse_overstress
 from stiction.methods.dynamics.summary import SPEEDS, front_speeds, rate_spectrum
 from stiction.methods.equilibrium.endings import PathStatus
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of

@@ -56,7 +56,7 @@ OF_SPECIMENS = {
     "event_travel_step": Variable("m", "travel of the drives in the event", ("event",)),
 }
 WITH_INERTIA = {
-    "event_duration": Variable("s", "time from the first to the last fast slip", ("event",)),
+    "event_duration": Variable("s", "time from the first to the last fast slip", ("event",))
 }
 BETWEEN_HALF_SPACES = {
     "event_time": Variable("s", "time from zero load to the event", ("event",)),

@@ -36,7 +36,7 @@ VARIABLES = {
     ),
 }
 OF_LINES = {
-    "critical_patch_length": Variable("m", "length of the patch that becomes unstable first"),
+    "critical_patch_length": Variable("m", "length of the patch that becomes unstable first")
 }
 OF_PLANES = {
     "critical_patch_extent": Variable("m", "extent of the patch that becomes unstable first"),

@@ -30,7 +30,7 @@ from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.sample import Sample
 
 OF_SLIDERS = {
-    "open_fraction": Variable("1", "part of the interface that is open before it slides"),
+    "open_fraction": Variable("1", "part of the interface that is open before it slides")
 }
 WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
 """Variables of events that are defined for a pressure that does not change."""
