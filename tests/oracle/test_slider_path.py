@@ -7,10 +7,18 @@ import pytest
 from rigs import LoadSteps, plain_rig
 
 import stiction as st
-from stiction.methods.equilibrium.contact.path import LOAD, N_BORDERED_AGAIN, Status, follow
+from stiction.elasticity.rig import on_cells
+from stiction.methods.equilibrium.contact.path import (
+    LOAD,
+    N_BORDERED_AGAIN,
+    N_STACKED,
+    Status,
+    follow,
+)
 from stiction.methods.equilibrium.contact.stages import (
     Friction,
     begin_push,
+    forces_of,
     make_contact,
     press,
 )
@@ -151,6 +159,28 @@ def test_pressing_that_slips_is_that_of_load_steps():
     largest = np.abs(brute.x).max()
     np.testing.assert_allclose(start.moved * sign, brute.x, rtol=0.0, atol=1e-9 * largest)
     compare(plain.K, plain.T, friction, start)
+
+
+@pytest.mark.parametrize("mean", [0.02, 0.03, 0.05, 0.1, 0.2, 0.4, 0.6])
+@pytest.mark.parametrize("name", RIGS)
+def test_no_cell_carries_more_than_its_strength(name, mean):
+    """After the pressing, and after each stop of the push, in either direction."""
+    plain, n, rng = rig(name), 24, np.random.default_rng(1)
+    for fall in (0.02, 0.1, 0.3):
+        peak = mean * np.exp(0.15 * rng.normal(size=n))
+        weakening = np.full(n, fall * plain.K[n // 2, n // 2])
+        friction = Friction(peak, 0.4 * peak, weakening)
+        pressed = press(plain.K, plain.T_p, friction, N)
+        contact, status = begin_push(plain.K, plain.T, pressed), Status.ARRESTED
+        while status in (Status.ARRESTED, Status.UNSTABLE):
+            forces = forces_of(contact, friction)
+            present = friction.residual + contact.difference
+            strength = present * on_cells(-forces[n:])
+            strength -= contact.weakening * contact.moved[:n]
+            excess = np.abs(forces[:n]) - strength * (1.0 + 1e-9)
+            excess[contact.stack[: contact.counts[N_STACKED]]] = 0.0  # these jump next
+            assert excess.max() <= 1e-9 * N / n
+            status = follow(contact, np.inf)
 
 
 def test_slip_and_weakening_of_one_cell_by_hand():

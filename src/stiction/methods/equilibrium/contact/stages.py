@@ -13,7 +13,8 @@ The algorithm is our own (`press`, `begin_push`).
    of its shear T_p. With the slip s d, K becomes s K s. If no cell exceeds its strength and each
    edge is pressed, the forces are T_p N.
 2. Otherwise begin at a small part of N. All strengths are zero without N. The nodes beyond their
-   strength are on E, edges on top. Follow the path to N.
+   strength are on E, edges on top. Follow the path to N. Slip nearby may then load a cell against
+   its sign beyond its strength. Change the sign of such cells, and press again.
 3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
    weakening. Edges that are open begin in S.
 4. Instabilities and arrests alternate until the slider slides (`SliderPath.follow`). The first
@@ -40,6 +41,8 @@ from stiction.methods.equilibrium.contact.path import (
 
 FIRST_PRESSING = 1e-3
 """Fraction of the normal force at which a pressing that slips begins."""
+REVERSE_RTOL = 1e-9
+"""Excess of shear against the sign of a cell that is round-off, in mean normal forces of a cell."""
 MIN_TURNING = 1e-6
 """Opening over slip of a slider that topples, in the motion that does not end."""
 
@@ -99,23 +102,30 @@ def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
     # 1. The same with slip along the shear.
     sign = np.where(linear < 0.0, -1.0, 1.0)
     sign[n:] = 1.0
-    # 2.
-    overstress = T_p * sign * (FIRST_PRESSING * force)
-    overstress[:n] -= FIRST_PRESSING * strength
-    moved = np.zeros_like(overstress)
-    state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
-    beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
-    state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
-    state.counts[N_STACKED], state.loads[LOAD] = beyond.size, FIRST_PRESSING * force
-    while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
-        pass
-    if status != Status.AT_TARGET:
-        raise InputError(
-            "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
-            " coefficients and the weakening rate"
-        )
-    present = friction._replace(peak=friction.residual + state.difference)
-    return Pressed(forces_of(state, friction) * sign, moved * sign, present)
+    # 2. A sign may change once for each cell.
+    for _ in range(n + 1):
+        overstress = T_p * sign * (FIRST_PRESSING * force)
+        overstress[:n] -= FIRST_PRESSING * strength
+        moved = np.zeros_like(overstress)
+        state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
+        beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
+        state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
+        state.counts[N_STACKED], state.loads[LOAD] = beyond.size, FIRST_PRESSING * force
+        while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
+            pass
+        if status != Status.AT_TARGET:
+            break
+        forces = forces_of(state, friction)
+        excess = overstress[:n] - 2.0 * forces[:n]  # of -f over the strength
+        against = excess > REVERSE_RTOL * force / n
+        if not against.any():
+            present = friction._replace(peak=friction.residual + state.difference)
+            return Pressed(forces * sign, moved * sign, present)
+        sign[:n][against] *= -1.0
+    raise InputError(
+        "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
+        " coefficients and the weakening rate"
+    )
 
 
 def forces_of(state: Contact, friction: Friction) -> Array:
