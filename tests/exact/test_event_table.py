@@ -10,11 +10,10 @@ from oracles import dense, symbol_of
 from setups import QUARTER, make_problem
 
 import stiction as st
-from stiction.base.errors import StoreError
 from stiction.methods.dynamics.summary import rate_spectrum
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.state import EquilibriumState
-from stiction.plot.ruptures import _line_film, crack_moment
+from stiction.plot.ruptures import crack_moment
 
 DROP = 2e5
 
@@ -122,36 +121,6 @@ def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):
     assert spectrum.max() > 0.5 * released
 
 
-def test_films_scale_to_what_breaks_and_files_name_their_problem(run, tmp_path):
-    stress = _line_film(run)[0].axes[0]
-    broken = np.isfinite(run.peak_strength)
-    assert stress.get_ylim()[1] < run.shear_stress.max() / 1e6
-    assert stress.get_ylim()[1] > run.shear_stress.where(broken).max() / 1e6
-    low, high = np.array(stress.get_xlim()) / 1e3
-    assert 0.008 < low < 0.01
-    assert 0.03 < high < 0.032
-    paths = st.external.write_scec(
-        run, tmp_path, origin=0.02, normal_stress=-5e6, benchmark="ends"
-    )
-    assert all(path.read_text().startswith("# problem=ends\n") for path in paths)
-    with pytest.raises(StoreError, match="none/film.gif: cannot be written"):
-        st.plot.film(run, tmp_path / "none/film.gif", frames=2, progress=False)
-
-
-def test_pictures_name_their_parts(run):
-    right = st.plot.events({"a": run, "b": run})[1]
-    texts = [text.get_text() for text in right.get_legend().get_texts()]
-    assert texts[:2] == ["a", "b"]
-    assert texts[2].startswith("cracks, area stress drop ")
-    later = np.append(run.step_time, run.step_time[-1] + 1.0)  # slip that follows the load
-    moment_rate = np.append(run.moment_rate, 0.02 * run.moment_rate.max())
-    longer = run.drop_dims("step").assign(step_time=("step", later))
-    left = st.plot.moment_rate(
-        longer.assign(moment_rate=("step", moment_rate, {"units": "N/s"}))
-    )[0]
-    assert left.lines[0].get_xdata().size < moment_rate.size
-
-
 def test_fast_loading_of_arrested_events_is_warned_of():
     problem, strength, _ = fault()
     x = problem.interface.x
@@ -160,10 +129,3 @@ def test_fast_loading_of_arrested_events_is_warned_of():
         st.onset(problem, strength, method=st.Rupture(loading_rate=2e10))
     slow = st.onset(problem, strength, method=st.Rupture(loading_rate=1e7))
     assert slow.arrested_events == 1
-
-
-def test_a_path_without_events_has_a_table_of_its_loads():
-    problem = make_problem(64, 0.0185)
-    path = st.equilibrium_path(problem, np.full(64, 1e6), [2e5, 4e5])
-    assert len(st.external.event_table(path)) == 0
-    assert path.to_dataframe()["mean_stress"].unique().size == 2

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 from checks import assert_close
-from scipy.integrate import quad
 
 import stiction as st
 from stiction.problem.friction import FrictionLaw
@@ -64,32 +63,6 @@ def test_integral_and_inverse_of_a_law_follow_from_f(law):
     assert FrictionLaw.slip_at(law, 0.0) == pytest.approx(law.slip_at(0.0), rel=1e-9) or (
         law.type == "exponential" and FrictionLaw.slip_at(law, 0.0) > 700.0
     )
-
-
-@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_energy_is_the_area_under_the_law(law):
-    critical = law.critical_slip_of(DROP, RATE)
-    for u in (0.1, 0.25, 0.6, 0.9, 3.0):
-        corners = [0.2, 0.3, 0.8, 1.0]
-        area = quad(law.fraction, 0.0, u, points=[c for c in corners if c < u], epsabs=1e-13)[0]
-        assert float(law.area(u)) == pytest.approx(area, rel=1e-11)
-        energy = law.dissipated(np.array([u * critical]), np.array([DROP]), np.array([RATE]))
-        assert energy[0] == pytest.approx(DROP * critical * area, rel=1e-11)
-    assert float(law.area(100.0)) == pytest.approx(law.integral, rel=1e-14)
-    assert float(law.fraction(law.slip_at(0.37))) == pytest.approx(0.37, rel=1e-14)
-    assert float(law.fraction(law.reach)) == pytest.approx(
-        0.01 if law.type == "exponential" else 0
-    )
-
-
-def test_each_scale_means_the_same_law():
-    critical = LAWS["dual"].critical_slip_of(DROP, RATE)
-    energy = DROP * critical * LAWS["dual"].integral
-    for scale in ({"fracture_energy": energy}, {"critical_slip": critical}):
-        law = st.PiecewiseWeakening(**TWO_PIECES, **scale)
-        assert law.weakening_rate_of(np.array([DROP]), *law.scale)[0] == pytest.approx(
-            RATE, rel=1e-14
-        )
 
 
 def test_polygon_along_a_law():

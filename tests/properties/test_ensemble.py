@@ -1,96 +1,13 @@
 """Sample i depends on (seed, i) and on nothing else: not on workers, batches or compilation."""
 
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import nullcontext
-from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
 import pytest
-from checks import assert_same, python
-from hypothesis import given, settings
-from hypothesis import strategies as some
-from ruptures import BREAKING_PLANE, BREAKING_STRENGTH
-from setups import EXACT, LENGTH, LOCAL, beta_strength, make_problem
+from checks import python
+from setups import LOCAL, make_problem
 
 import stiction as st
 from stiction.ensemble.experiment import Experiment
-
-SAMPLES = 1500  # more than one piece of the local criterion, and not a multiple of it
-SIZES = (48, 40), (6.0 * LENGTH, 4.0 * LENGTH)
-PLANE = make_problem(*SIZES)
-
-
-@pytest.fixture
-def arguments(problem, make_strength):
-    return {"problem": problem, "random": make_strength(), "method": LOCAL}
-
-
-@pytest.fixture
-def reference(arguments):
-    return st.monte_carlo(**arguments, samples=SAMPLES, seed=5, workers=1)
-
-
-def profiles(problem, samples, length=2e-3):
-    return {"strength": beta_strength(length).sample(problem.interface, samples=samples)}
-
-
-DETAILED = {"slip": True, "sensitivity": True}
-LINE, SHORT = (
-    make_problem(96, 0.03, weakening_rate=None),
-    make_problem(128, 0.05, solid=st.paper.problem().solid),
-)
-RATES = 0.5e12 * np.array([1.0, 0.83, 1.17, 1.0, 0.9, 1.1])[:, None]
-CASES = {
-    "equilibrium, line": (
-        LINE, st.Equilibrium(**DETAILED), profiles(LINE, 6) | {"weakening_rate": RATES},
-    ),
-    "equilibrium, plane": (
-        PLANE, st.Equilibrium(tolerance=1e-9, slip=True), profiles(PLANE, 4, 0.01),
-    ),
-    "rupture, line": (SHORT, st.Rupture(loading_rate=1e7), profiles(SHORT, 4)),
-    "rupture, plane": (
-        BREAKING_PLANE, st.Rupture(loading_rate=1e8),
-        {"strength": np.stack([BREAKING_STRENGTH, 1.1 * BREAKING_STRENGTH[::-1]])},
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_a_sample_does_not_depend_on_its_batch_or_thread(case):
-    problem, method, fields = CASES[case]
-    solve = method.prepare(problem)
-    together = solve(problem.sample(fields))
-    rows = [
-        problem.sample({name: values[[i]] for name, values in fields.items()})
-        for i in range(len(fields["strength"]))
-    ]
-    with ThreadPoolExecutor(2) as threads:
-        alone = list(threads.map(solve, rows))
-    assert_same(
-        {name: np.concatenate([one[name] for one in alone]) for name in together}, together
-    )
-
-
-@pytest.mark.parametrize("workers", [3, "a spawned process"])
-def test_workers_and_executors_do_not_change_a_bit(arguments, reference, workers):
-    given = {"workers": workers}
-    if workers != 3:
-        given = {"executor": ProcessPoolExecutor(1, mp_context=get_context("spawn"))}
-    with given.get("executor", nullcontext()):
-        result = st.monte_carlo(**arguments, samples=SAMPLES, seed=5, **given)
-    assert_same(result, reference)
-    assert result.attrs == reference.attrs
-
-
-@settings(max_examples=10, deadline=None)
-@given(first=some.integers(0, 900), samples=some.integers(1, 400))
-def test_any_batch_is_a_part_of_the_whole(first, samples):
-    problem = make_problem(128, weakening_rate=0.25e12)
-    experiment = Experiment(problem, beta_strength(3e-3), LOCAL, seed=3)
-    whole = experiment.results(0, 1300)
-    part = {name: values[first : first + samples] for name, values in whole.items()}
-    assert_same(experiment.results(first, samples), part)
 
 
 def test_a_batch_of_rough_planes_stays_small():
@@ -99,32 +16,6 @@ def test_a_batch_of_rough_planes_stays_small():
     experiment = Experiment(problem, rough, LOCAL)
     assert experiment.dimension > 100 * problem.interface.size
     assert experiment.batch * experiment.dimension <= 2**20
-
-
-def field(low, high):
-    marginal = st.Beta(alpha=2.0, beta=2.0, low=low, high=high)
-    return st.RandomField(marginal, st.SquaredExponentialSpectrum(correlation_length=LENGTH))
-
-
-SEVERAL = st.RandomInterface(
-    strength=field(0.7e6, 1.6e6),
-    residual_strength=field(0.0, 1e5),
-    weakening_rate=field(0.3e12, 0.5e12),
-    initial_stress=field(0.0, 2e5),
-)
-
-
-def test_an_ensemble_of_planes_may_be_continued_and_computed_again():
-    names = SEVERAL.names
-    given = {"method": EXACT, "seed": 3, "keep": tuple(names), "progress": False}
-    plane = make_problem(*SIZES, weakening_rate=None)
-    result = st.monte_carlo(plane, SEVERAL, samples=4, workers=2, **given)
-    part = st.monte_carlo(plane, SEVERAL, samples=2, first=2, workers=1, **given)
-    assert_same(part, result.isel(sample=slice(2, 4)))
-    kept = {name: result[name].isel(sample=[1]) for name in names}
-    again = st.onset(plane, kept, method=EXACT)
-    assert again["critical_load"].values[0] == result["critical_load"].values[1]
-    assert result["critical_position"].dims == ("sample", "direction")
 
 
 SOURCES = Path(__file__).parents[2] / "src"

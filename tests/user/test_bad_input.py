@@ -12,7 +12,7 @@ import stiction as st
 from stiction.methods.equilibrium.solver import follow_to_sliding
 from stiction.problem.unit_doubts import doubt_sample, doubt_strengths
 
-LINE, PLANE = st.Interface(0.1, 256), st.Interface((0.5, 0.5), (4096, 4096))
+LINE = st.Interface(0.1, 256)
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)
 ONE = np.full(256, 1e6)
 
@@ -115,17 +115,6 @@ def test_a_mistake_in_a_list_names_its_place_whatever_holds_the_list():
         st.read_profile([1.0, 2.0], missing=[1.0, [2.0]])
     with pytest.raises(st.InputError, match=r"by name \(valid: .*youngs_modulus\)"):
         st.Solid(7e10, 0.3, 2700.0, "strain", 1.0)
-
-
-def test_a_whole_number_of_any_kind_selects_a_drawn_sample():
-    problem = make_problem()
-    strength = beta_strength(2e-3).sample(problem.interface, samples=2)
-    result = st.onset(problem, strength, method=LOCAL)
-    drawn = {
-        float(st.plot.onset(result, strength, sample=sample).lines[0].get_ydata()[0])
-        for sample in (1, 1.0, np.int64(1))
-    }
-    assert len(drawn) == 1
 
 
 def test_a_model_of_others_may_hold_plain_dataclasses():

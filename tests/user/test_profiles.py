@@ -38,12 +38,6 @@ def labelled(strength=STRENGTH, x=X, x_unit=None, **attributes):
     return xr.DataArray(strength, dims="x", coords={"x": place}, attrs=attributes)
 
 
-def without(gap):
-    holes = STRENGTH.copy()
-    holes[gap] = np.nan
-    return holes
-
-
 SHUFFLED = np.random.default_rng(0).permutation(NODES)
 ROLLED = np.roll(np.arange(NODES), 50)  # from the middle of the interface on
 ORDERS = {
@@ -211,13 +205,3 @@ def test_a_scan_beyond_a_specimen_or_with_gaps_is_refused():
         lambda: st.simulate_rupture(FREE, holes, method=st.Rupture()),
     ):
         refuses("missing (NaN) at 5 of 64 nodes ... given(profile)", call)
-
-
-@pytest.mark.parametrize("heading", ["COF", "mu [-]", "Haftreibwert", "Friction coefficient"])
-@pytest.mark.parametrize("quantity", ["strength", "residual_strength", "initial_stress"])
-def test_friction_coefficients_are_no_stresses_in_pa(tmp_path, heading, quantity):
-    path = tmp_path / "scan.csv"
-    path.write_text(f"x (mm),{heading}\n0,0.41\n1,0.45\n2,0.38\n", encoding="utf-8")
-    words = "Pass quantity='friction_coefficient'"
-    refuses(words, lambda: st.read_profile(path, quantity=quantity))
-    assert st.read_profile(path, quantity="friction_coefficient").attrs["units"] == "1"

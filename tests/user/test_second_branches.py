@@ -10,7 +10,6 @@ from stand_ins import StandIn
 import stiction as st
 from stiction.base.progress import duration
 from stiction.inference import likelihood as likelihoods
-from stiction.inference.peaks import make_peaks
 
 PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), st.PowerLawSpectrum(4e-3), mean_mode=True)
@@ -71,30 +70,3 @@ def test_the_estimate_is_told_the_threads_of_the_call(workers, prior, monkeypatc
     with pytest.raises(RuntimeError):
         st.infer(PROBLEM, FIELD, PEAKS, progress=False, **options)
     assert seen == [workers]
-
-
-def test_agreement_takes_every_kind_of_peaks():
-    """In stress and in force, as numbers with a unit and as `Peaks`, with an error of the cell."""
-    options = {"method": LOCAL, "samples": 200, "progress": False}
-    predicted = st.monte_carlo(PROBLEM, FIELD, pilot=False, **options)
-    area = 0.05 * 0.013
-    error = 1e4
-    posterior = st.infer(PROBLEM, FIELD, 1.01 * PEAKS[::-1], **options)
-    in_stress = [(PEAKS, {}), (1e-3 * PEAKS, {"unit": "kPa"}), (make_peaks(PEAKS), {})]
-    found = [st.statistics.agreement(predicted, peaks, **more) for peaks, more in in_stress]
-    found += [st.statistics.agreement(predicted, 1e-3 * area * PEAKS, unit="kN")]
-    found += [st.statistics.agreement(predicted, make_peaks(area * PEAKS, "N"))]
-    for other in found[1:]:
-        assert other.p_values == found[0].p_values
-    with_error = [
-        st.statistics.agreement(predicted, peaks, load_cell_error=scale * error, **more)
-        for (peaks, more), scale in zip(in_stress, (1.0, 1e-3, 1.0), strict=True)
-    ]
-    assert with_error[0].cramer_von_mises != found[0].cramer_von_mises
-    for other in with_error[1:]:
-        assert other.cramer_von_mises == pytest.approx(with_error[0].cramer_von_mises)
-    by_posterior = [
-        st.statistics.agreement(posterior, peaks, **more) for peaks, more in in_stress
-    ]
-    for other in by_posterior[1:]:
-        assert other.p_values == by_posterior[0].p_values

@@ -1,7 +1,6 @@
 """Files from strangers and shared machines: no code, no other file, no wait, little memory."""
 
 import io
-import json
 import os
 import shutil
 import stat
@@ -18,7 +17,6 @@ import pytest
 import tomli_w
 import xarray as xr
 from checks import python
-from numpy.lib.recfunctions import rename_fields
 from refusals import refuses
 from small_study import small_study
 
@@ -26,7 +24,7 @@ import stiction as st
 from stiction.base import files, netcdf
 from stiction.base.files import private_folder
 from stiction.base.netcdf import read_netcdf
-from stiction.ensemble import batches, store
+from stiction.ensemble import batches
 from stiction.methods.dynamics.save import open_rupture
 from stiction.problem.reading.files import NETCDF, TEXT
 
@@ -203,72 +201,6 @@ def test_a_run_folder_holds_no_links(tmp_path, run, name, command):
         assert Path(words).name in errors or "pilot" in errors
     (tmp_path / "study.toml").unlink()
     assert before == {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
-
-
-def resealed(folder, **changes):
-    """Replace the chunk of a run by one with other content under a right digest."""
-    (path,) = (folder / "chunks").iterdir()
-    arrays = files.read_arrays(path) | {}
-    for name, change in changes.items():
-        arrays[name] = change(arrays[name])
-    packed = io.BytesIO()
-    np.savez(packed, **arrays)
-    path.unlink()
-    (path.parent / f"{store.digest(packed.getvalue())}.npz").write_bytes(packed.getvalue())
-
-
-def about(change):
-    def changed(text):
-        parts = json.loads(text.tobytes())
-        return np.frombuffer(json.dumps(change(parts)).encode(), np.uint8)
-
-    return changed
-
-
-def column(name, value):
-    def changed(rows):
-        rows = rows.copy()
-        rows[name] = value
-        return rows
-
-    return changed
-
-
-def retyped(name, kind):
-    return lambda rows: rows.astype(
-        [(one, kind if one == name else rows.dtype[one]) for one in rows.dtype.names]
-    )
-
-
-FORGED = {
-    "a point of -1": {"rows": column("_point", -1)},
-    "a point too many": {"rows": column("_point", 1)},
-    "a sample of -1": {"rows": column("_sample", -1)},
-    "another type of numbers": {"rows": retyped("_sample", "f8")},
-    "texts": {"rows": retyped("critical_stress", "U4")},
-    "another shape": {"rows": retyped("critical_stress", ("f8", (2**10,)))},
-    "an unknown variable": {"rows": lambda rows: rename_fields(rows, {"critical_stress": "x"})},
-    "no columns": {"rows": lambda rows: np.zeros(3)},
-    "no list": {"about": about(lambda parts: 3)},
-    "a failure of another kind": {"about": about(lambda parts: [*parts[:3], [["x"] * 5]])},
-    "a failure elsewhere": {"about": about(lambda parts: [*parts[:3], [[7, 0, 0, "", False]]])},
-    "no time": {"about": about(lambda parts: [*parts[:2], "x", []])},
-    "no json": {"about": lambda text: np.frombuffer(b"[" * 10**5, np.uint8)},
-}
-
-
-@pytest.mark.parametrize("forged", FORGED)
-def test_wrong_content_under_a_right_digest_is_damage(tmp_path, run, forged):
-    folder = tmp_path / "run"
-    shutil.copytree(run, folder)
-    whole = st.open_run(run).dataset()
-    resealed(folder, **FORGED[forged])
-    (damage,) = st.open_run(folder).status().damaged
-    assert "fit the study" in damage or "not a chunk" in damage
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        again = st.Study.from_dict(STUDY).run(out=folder, workers=1, progress=False)
-    assert again.identical(whole)
 
 
 # -- NetCDF --------------------------------------------------------------------------------------

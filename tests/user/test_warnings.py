@@ -2,14 +2,10 @@
 
 import warnings
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 
 import numpy as np
 import pytest
-import tomli_w
-from refusals import warning_texts
 from setups import beta_strength
-from small_study import altered, small_study
 from specimens import crooked
 
 import stiction as st
@@ -87,51 +83,3 @@ def test_samples_are_counted_over_those_without_the_doubt_too():
     assert merging(*some) == ["off by 0.25 in 3 of 9 samples (1, 3, 5)"]
     assert merging(some[1]) == []
     assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
-
-
-changed = partial(altered, small_study(64, correlation_length=9e-3, samples=6, seed=3))
-
-
-DOUBTED = {
-    "below the residual": changed(problem__friction__residual_strength=0.8e6),
-    "uniform": changed(random__strength__spectrum__correlation_length=0.3),
-    "other units": changed(
-        random__strength__marginal__low=0.66e3, random__strength__marginal__high=1.66e3
-    ),
-    "refused": changed(random__strength__quantity="friction_coefficient"),
-}
-
-
-@pytest.mark.parametrize("doubt", DOUBTED)
-def test_the_same_doubts_in_python_in_a_study_and_in_a_command(
-    doubt, tmp_path, monkeypatch, runs
-):
-    """Each way of the same computation warns of the same, and refuses the same."""
-    monkeypatch.chdir(tmp_path)
-    plain = DOUBTED[doubt]
-    (tmp_path / "study.toml").write_text(tomli_w.dumps(plain))
-
-    def by_function():
-        given = {"method": st.LocalCriterion()}
-        given["problem"] = st.Problem(**plain["problem"])
-        given["random"] = st.RandomInterface(**plain["random"])
-        return st.monte_carlo(**given, samples=6, seed=3, progress=False)
-
-    def by_study():
-        return st.Study.from_toml("study.toml").run(progress=False)
-
-    found = []
-    for way in (by_function, by_study):
-        try:
-            found.append({*warning_texts(way)})
-        except st.InputError as error:
-            found.append({*error.problems})
-    refused = doubt in ("uniform", "refused")
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        said = runs("run study.toml --out B", code=2 * refused).splitlines()
-    start = "error: " if refused else "warning: "
-    printed = {text.removeprefix(start) for text in said if text.startswith(start)}
-    assert found[0] == found[1]
-    assert found[0] == printed
-    assert found[0]

@@ -74,8 +74,9 @@ def specimen(
             raise InputError(
                 "strength: give it, because the pressure of a slider depends on it"
             )
-        number = int(sample)
-        return draw_slider(problem, problem.sample(strength).part(slice(number, number + 1)))
+        given = problem.sample(strength)
+        chosen_row(given.strength, {} if result is None else {"onset": result}, sample)
+        return draw_slider(problem, given.part(slice(int(sample), int(sample) + 1)))
     blocks, interface = problem.blocks, problem.interface
     rows = None if strength is None else strength_of(problem, strength)
     if result is not None:

@@ -1,0 +1,163 @@
+"""Laws of figures: each function of st.plot draws the numbers of a result in their units."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from functools import cache
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from contracts.bodies import World, world
+from contracts.test_results import CALLS, LOCAL, QUIET, SHAKEN, design
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+PEAKS = np.array([5.9e5, 6.2e5, 6.6e5])
+LENGTH = "random.strength.spectrum.correlation_length"
+
+
+@cache
+def of(call: str, w: World) -> Any:
+    """The result of a call, or of a sweep over the correlation length."""
+    if call == "sweep":
+        length = w.random.strength.spectrum.correlation_length
+        sweep = [{LENGTH: [length, 2.0 * length]}]
+        swept = dataclasses.replace(w.study, sweep=sweep, samples=20)
+        return swept.run(pilot=False, **QUIET)
+    return design(w, sensitivities=True) if call == "sensitive" else CALLS[call][1](w)
+
+
+def drawn_by(name: str, call: str, *more: str) -> Any:
+    """What draws the result of a call, with its profiles and its problem where it takes them."""
+
+    def draw(w: World, **options: Any) -> Any:
+        given = [w.profiles()] if "profiles" in more else []
+        options |= {"problem": w.problem} if "problem" in more else {}
+        return getattr(st.plot, name)(of(call, w), *given, **options)
+
+    return draw
+
+
+DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body, what draws
+    "onset": (world, "line with ends", drawn_by("onset", "onset", "profiles", "problem")),
+    "onset of a plane": (world, "plane", drawn_by("onset", "onset", "profiles", "problem")),
+    "specimen": (world, "blocks", lambda w, **options: st.plot.specimen(
+        w.problem, w.profiles(), of("onset", w), **options)),
+    "specimen on a base": (world, "slider", lambda w, **options: st.plot.specimen(
+        w.problem, w.profiles(), of("onset", w), **options)),
+    "field": (world, "line", lambda w, ax=None: st.plot.field(w.problem, w.profiles(0), ax=ax)),
+    "monte_carlo": (world, "line", drawn_by("monte_carlo", "monte_carlo")),
+    "quantiles": (LOCAL, "line", drawn_by("quantiles", "sweep")),
+    "failure_curve": (LOCAL, "line", drawn_by("failure_curve", "failure_curve")),
+    "sensitivities": (LOCAL, "line with ends", drawn_by("sensitivities", "sensitive")),
+    "agreement": (LOCAL, "line", lambda w, **options: st.plot.agreement(
+        st.statistics.agreement(of("monte_carlo", w), PEAKS * w.Pa), **options)),
+    "rupture": (SHAKEN, "line", drawn_by("rupture", "simulate_rupture", "problem")),
+    "block": (SHAKEN, "blocks", drawn_by("block", "simulate_rupture", "problem")),
+    "events": (SHAKEN, "blocks", drawn_by("events", "simulate_rupture", "problem")),
+    "moment_rate": (SHAKEN, "line", drawn_by("moment_rate", "simulate_rupture")),
+    "force_travel": (world, "blocks", drawn_by("force_travel", "equilibrium_path")),
+    "precursors": (world, "blocks", drawn_by("precursors", "equilibrium_path", "problem")),
+}  # fmt: skip
+ELSEWHERE = {"film", "fit"}
+"""A film is a file, see test_files, and a fit has no units of a world, see tests/user."""
+SAMPLES = [name for name in DRAWN if name.split()[0] in ("onset", "specimen")]
+
+
+def test_every_figure_has_a_line():
+    assert {name.split()[0] for name in DRAWN} | ELSEWHERE == {*st.plot.__all__}
+
+
+def drawn(panels: Any) -> list[Any]:
+    """All that a figure draws: pairs of numbers in SI and their unit, by axis."""
+    figure = np.ravel(panels)[0].figure
+    figure.canvas.draw()
+    parts: list[Any] = []
+    for axes in figure.axes:
+        labels = axes.get_xlabel() or np.ravel(panels)[-1].get_xlabel(), axes.get_ylabel()
+        across = axes.get_xaxis_transform(), axes.get_yaxis_transform()
+        shapes = [(line.get_xydata(), line.get_transform()) for line in axes.lines]
+        shapes += [(path.vertices, axes.transData) for lines in axes.collections
+                   for path in lines.get_paths() if lines.get_array() is None]  # fmt: skip
+        for points, transform in shapes:
+            for column, label in enumerate(labels):
+                if transform != across[1 - column]:  # else a share of the height or width
+                    parts.append(in_si(np.asarray(points, dtype=float)[:, column], label))
+        for coloured in [*axes.images, *axes.collections]:
+            if coloured.get_array() is not None and coloured.colorbar is not None:
+                bar = coloured.colorbar.ax
+                label = bar.get_xlabel() or bar.get_ylabel()
+                parts.append(in_si(np.ma.filled(coloured.get_array(), np.nan), label))
+    plt.close(figure)
+    return parts
+
+
+def in_si(values: Any, label: str) -> tuple[Any, str]:
+    """Numbers of an axis in SI, by the unit of its label."""
+    unit = (re.findall(r"\(([^()]*)\)(?:,|$)", label) or ["1"])[0].replace(
+        "\N{MICRO SIGN}", "u"
+    )
+    parts = re.fullmatch(r"([GMkmu])((?:Pa|N|m|s|Hz|J)\b.*)", unit)
+    prefix, base = parts.groups() if parts else ("", unit)
+    return values * {"G": 1e9, "M": 1e6, "k": 1e3, "m": 1e-3, "u": 1e-6, "": 1.0}[prefix], base
+
+
+def assert_drawn_alike(drawing: Any, reference: Any, close: float, factor: Any = None) -> None:
+    assert len(drawing) == len(reference) > 0
+    for (values, unit), (expected, known) in zip(drawing, reference, strict=True):
+        right = expected * (factor(known) if factor else 1.0)
+        assert unit == known
+        largest = np.abs(right[np.isfinite(right)]).max(initial=0.0)
+        np.testing.assert_allclose(values, right, rtol=close, atol=close * largest)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_draws_the_numbers_of_its_result_in_their_units(name):
+    """In other units, and of other samples: each number changes as its unit says."""
+    make, body, draw = DRAWN[name]
+    shown = drawn(draw(make(body)))
+    assert all(unit is not None for _, unit in shown)
+    other = make(body).in_units(Pa=0.25, m=2.0, s=8.0)
+    assert_drawn_alike(drawn(draw(other)), shown, 1e-3, other.factor)
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_figure_of_a_sample_is_the_figure_of_its_row_alone(name):
+    make, body, draw = DRAWN[name]
+    w = make(body)
+    alone = World(w.plain, w.strength[1:2])
+    second = drawn(draw(w, sample=1))
+    assert_drawn_alike(second, drawn(draw(alone)), 1e-9)
+    with pytest.raises(AssertionError):
+        assert_drawn_alike(second, drawn(draw(w)), 1e-9)
+    for sample in (3, -1, 0.5, "a"):
+        with pytest.raises(st.InputError, match="sample: "):
+            draw(w, sample=sample)
+    assert not plt.get_fignums()
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_figure_is_of_pyplot_once_and_on_the_axes_that_are_given(name):
+    make, body, draw = DRAWN[name]
+    panels = draw(make(body))
+    assert plt.get_fignums() == [np.ravel(panels)[0].figure.number]
+    plt.close("all")
+    if not isinstance(panels, np.ndarray):
+        _, given = plt.subplots()
+        assert draw(make(body), ax=given) is given
+        assert given.has_data()
+        assert len(plt.get_fignums()) == 1
+
+
+@pytest.mark.parametrize("wrong", [3, "result", None, [3], xr.Dataset()])
+@pytest.mark.parametrize("name", sorted({*st.plot.__all__} - {"film"}))
+def test_a_figure_refuses_what_it_cannot_draw(name, wrong):
+    more = {"field": [LOCAL("line").strength[0]], "onset": [LOCAL("line").strength]}
+    with pytest.raises(st.InputError):
+        getattr(st.plot, name)(wrong, *more.get(name, []))
+    assert not plt.get_fignums()
