@@ -25,7 +25,7 @@ from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.equilibrium.patches import line_patch
 from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
-from stiction.plot.style import ACCENT, INK, PAGE, QUIET, panel, paper_style
+from stiction.plot.style import ACCENT, INK, PAGE, QUIET, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"
 LENGTH, HEIGHT, THICKNESS = 4.0, 0.2, 0.1  # m, of each block
@@ -435,7 +435,7 @@ def draw_record(table, events, model):
     right.set(xlabel="slip [µm]", ylabel="stress drop [kPa]", xlim=(25, 46), ylim=(13, 30))
     right.legend(loc="upper left")
     for axes, letter in zip((left, right), "ab", strict=True):
-        panel(axes, letter)
+        axes.set_title(f"({letter})", loc="left", weight="bold")
     return fig
 
 
@@ -463,7 +463,7 @@ def draw_rows(rows, events):
     axes[2].set(ylabel="scatter of slip along the fault [µm]", ylim=(0, 2.6))
     for one, letter in zip(axes, "abc", strict=True):
         one.set(xlabel="critical slip [µm]", xlim=(2, 16.5))
-        panel(one, letter)
+        one.set_title(f"({letter})", loc="left", weight="bold")
     return fig
 
 

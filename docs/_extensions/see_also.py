@@ -15,7 +15,7 @@ ROWS = """
     failure_probability failure_curve design_stress external.limit_state
     failure_curve plot.failure_curve
     fit_field plot.fit
-    read_curve read_peaks statistics.agreement plot.force_travel plot.precursors
+    read_curve read_peaks statistics.agreement plot.precursors
     infer read_peaks design_of_tests external.simulator
     theory.nucleation_stress theory.nucleation_statistics
     Study open_run monte_carlo

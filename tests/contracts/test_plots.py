@@ -58,10 +58,6 @@ DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body
     "agreement": (LOCAL, "line", lambda w, **options: st.plot.agreement(
         st.statistics.agreement(of("monte_carlo", w), PEAKS * w.Pa), **options)),
     "rupture": (SHAKEN, "line", drawn_by("rupture", "simulate_rupture", "problem")),
-    "block": (SHAKEN, "blocks", drawn_by("block", "simulate_rupture", "problem")),
-    "events": (SHAKEN, "blocks", drawn_by("events", "simulate_rupture", "problem")),
-    "moment_rate": (SHAKEN, "line", drawn_by("moment_rate", "simulate_rupture")),
-    "force_travel": (world, "blocks", drawn_by("force_travel", "equilibrium_path")),
     "precursors": (world, "blocks", drawn_by("precursors", "equilibrium_path", "problem")),
 }  # fmt: skip
 ELSEWHERE = {"film", "fit"}

@@ -149,27 +149,28 @@ def test_every_panel_draws_all_paths_and_tests_in_its_unit(paths):
     """Places of events and precursors, and the ends of the band, in micrometres on every axis."""
     curves = curves_of(paths)
     precursors = 1e6 * np.concatenate([test.drops.travel for test in curves])
-    axes = st.plot.force_travel(paths, measured=curves)
-    labels = {text.get_text() for text in axes.get_legend().get_texts()}
-    assert {"6 tests", "measured precursors"} < labels
     above, below = st.plot.precursors(paths, measured=curves)
-    for panel in (axes, above, below):
+    labels = {text.get_text() for text in above.get_legend().get_texts()}
+    assert {"6 tests", "measured precursors"} < labels
+    labels = {text.get_text() for text in below.get_legend().get_texts()}
+    assert {"slips in an arrested event", "measured precursors"} == labels
+    for panel in (above, below):
         marks = [line.get_xdata() for line in panel.lines if line.get_marker() in {"v", "|"}]
         np.testing.assert_allclose(np.concatenate(marks), precursors, rtol=1e-12)
-    assert "µm" in axes.get_xlabel() == below.get_xlabel()
+    assert "µm" in below.get_xlabel()
     travels = [path.travel.values for path in paths]
     ends = [
         1e6 * np.nanmax(travel[np.isfinite(path.force)])
         for travel, path in zip(travels, paths, strict=True)
     ]
-    (band,) = axes.collections
+    (band,) = above.collections
     assert band.get_paths()[0].vertices[:, 0].max() == pytest.approx(np.median(ends))
     events = [np.concatenate([lines.get_segments() for lines in below.collections])]
     expected = 1e6 * np.concatenate([path.event_travel for path in paths])
     np.testing.assert_allclose(np.concatenate(events)[:, 0, 0], expected, rtol=1e-12)
 
     seconds = st.read_curve((TRAVEL * u.s, machine() * u.N))
-    refuses("curves are N over s", lambda: st.plot.force_travel(paths, measured=seconds))
+    refuses("curves are N over s", lambda: st.plot.precursors(paths, measured=seconds))
 
 
 def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
@@ -243,19 +244,6 @@ def test_slip_loads_over_clamping_forces(tmp_path):
     mu = tmp_path / "mu.csv"
     mu.write_text("test,COF\n1,0.3\n2,0.4\n3,0.35\n")
     refuses("coefficients already", lambda: st.read_peaks(mu, normal=1e3))
-
-
-def test_a_picture_of_peaks_has_all_tests_and_a_band(tmp_path):
-    path = tmp_path / "peaks.csv"
-    path.write_text("peak [kN];length [mm]\n0.21;31\n0.25;31\n0.2;31\n0.45;62\n0.4;62\n0.41;62")
-    (axes,) = st.plot.fit(st.read_peaks(path))
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert {"3 tests, 0.031 m", "log-normal, 0.062 m"} < {*labels}
-    steps = np.concatenate([line.get_xdata()[1:-1] for line in axes.lines[1::2]])
-    np.testing.assert_allclose(steps, [200, 210, 250, 400, 410, 450])
-    fitted = axes.lines[0]
-    middle = np.interp(0.5, fitted.get_ydata(), fitted.get_xdata())
-    assert middle == pytest.approx((200.0 * 210 * 250) ** (1 / 3), rel=1e-3)
 
 
 def test_readings_that_are_no_friction():

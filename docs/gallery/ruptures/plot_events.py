@@ -5,6 +5,9 @@ Sizes of events
 How frequent events of each size are on random faults that end, by two methods.
 """
 
+import matplotlib.pyplot as plt
+import numpy as np
+
 import stiction as st
 
 solid = st.Solid(shear_modulus=2.43e10, poisson_ratio=0.25, density=2700.0)
@@ -25,4 +28,12 @@ results = {
     method.label: st.monte_carlo(problem, strength, method=method, samples=60, seed=1)
     for method in methods
 }
-st.plot.events(results)
+figure, (left, right) = plt.subplots(1, 2, figsize=(6.75, 2.8), layout="constrained")
+for name, result in results.items():
+    moments = np.sort(result.event_moment.values[np.isfinite(result.event_moment)])[::-1]
+    number = np.arange(1, moments.size + 1) / result.sizes["sample"]
+    left.loglog(moments, number, label=name)
+    right.loglog(result.event_length.values.ravel(), result.event_moment.values.ravel(), ".")
+left.set(xlabel="moment (N)", ylabel="events per sample, at least as large")
+right.set(xlabel="length (m)", ylabel="moment (N)")
+left.legend()

@@ -21,7 +21,7 @@ from stiction.base.files import write_whole
 from stiction.base.variables import DIRECTION
 from stiction.ensemble.dataset import GridAxes
 from stiction.plot.axes import scaled, shown_quantity, with_unit
-from stiction.plot.style import PAGE, panel, paper_style
+from stiction.plot.style import PAGE, paper_style
 from stiction.statistics.estimates import mean, quantiles, standard_deviation
 from stiction.study.run import StoredRun
 
@@ -136,7 +136,7 @@ def densities(result: xr.Dataset) -> Figure:
             axes.set_xlabel(f"{axes.get_xlabel()}, {part[DIRECTION].item()}")
         if legend := axes.get_legend():
             legend.remove()
-        panel(axes, letter)
+        axes.set_title(f"({letter})", loc="left", weight="bold")
     return figure
 
 

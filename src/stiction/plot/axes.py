@@ -10,19 +10,12 @@ import pydantic
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import (
-    LogFormatterSciNotation,
-    LogLocator,
-    MaxNLocator,
-    NullFormatter,
-    NullLocator,
-)
 
 from stiction.base.errors import InputError
 from stiction.base.model import check, describe
 from stiction.base.units import unit_for
 from stiction.base.variables import DIRECTION, FRICTION_COEFFICIENT
-from stiction.plot.style import COLUMN, keep_contrast, paper_style
+from stiction.plot.style import COLUMN, paper_style
 from stiction.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -38,35 +31,6 @@ else:
 def with_unit(name: str, unit: str) -> str:
     """Return the label of a scale."""
     return f"{name} ({unit})" if unit else name
-
-
-WIDE_RATIO, NARROW_RATIO = 100.0, 4.0
-"""Ratios of the ends of a logarithmic scale from which on powers of ten, and 1, 2 and 5 times such
-powers, are enough numbers."""
-PLAIN_NUMBERS = (1e-3, 1e4)
-"""Numbers on a scale that need no power of ten."""
-
-
-class _FewNumbers(LogFormatterSciNotation):
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        if PLAIN_NUMBERS[0] <= x < PLAIN_NUMBERS[1]:
-            return f"{x:g}"
-        text: str = super().__call__(x, pos)
-        return text
-
-
-def space_numbers(axes: Axes) -> None:
-    """Leave room between the numbers on logarithmic scales that span few decades."""
-    for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        if axis.get_scale() != "log" or not 0.0 < low < high < WIDE_RATIO * low:
-            continue
-        narrow = high < NARROW_RATIO * low
-        axis.set_major_locator(MaxNLocator(3) if narrow else LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(_FewNumbers(minor_thresholds=(np.inf, np.inf)))
-        if narrow:
-            axis.set_minor_locator(NullLocator())
-        axis.set_minor_formatter(NullFormatter())
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -92,9 +56,7 @@ def on_axes(
             raise InputError(
                 f"ax: must be a matplotlib Axes, such as axes[0], got {type(ax).__name__}"
             )
-        given = set(ax.get_children())
         yield ax
-        keep_contrast(ax, given)
         return
     figure = new_figure(width, height)
     with paper_style():

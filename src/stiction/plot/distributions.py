@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from stiction.base.errors import InputError
-from stiction.base.model import Positive, Real, checked
-from stiction.base.units import in_words, unit_for
+from stiction.base.model import checked
+from stiction.base.units import unit_for
 from stiction.base.variables import DIRECTION
 from stiction.inference.peaks import make_peaks
 from stiction.plot.axes import (
@@ -25,7 +25,7 @@ from stiction.plot.axes import (
     shown_quantity,
     with_unit,
 )
-from stiction.plot.style import ACCENT, BAND, INK, PALE, QUIET, color, series
+from stiction.plot.style import BAND, INK, MARKERS, PALE, QUIET, color, series
 from stiction.reliability.answer import Answer, bounded
 from stiction.statistics.estimates import density
 from stiction.statistics.estimates import quantiles as estimate_quantiles
@@ -136,25 +136,19 @@ def _draw_values(
 
 
 def quantiles(
-    result: Any,
-    *,
-    quantity: str | None = None,
-    along: str | None = None,
-    ax: Axes | None = None,
+    result: xr.Dataset, *, quantity: str | None = None, ax: Axes | None = None
 ) -> FigureAxes:
     """Draw the median onset with its error, and the quartiles, along a sweep.
 
     Parameters
     ----------
-    result : Dataset, or list or mapping of Dataset
-        From `Study.run` with a sweep over one or two parameters. With
-        two parameters, there is a curve for each value of the second.
-        Several results, as a list or by name, are compared along the
-        same sweep over a single parameter.
+    result : Dataset
+        From `Study.run` with a sweep over one or two parameters. The
+        longer sweep is the abscissa. With two parameters, there is a
+        curve for each value of the other. `xarray.concat` joins several
+        results along a new dimension.
     quantity : str, optional
         As in `monte_carlo`.
-    along : str, optional
-        Dimension along the abscissa. By default the longest dimension.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -170,25 +164,17 @@ def quantiles(
     InputError
         If the result has no sweep, or a sweep over more than two parameters.
     """
-    if isinstance(result, xr.Dataset):
-        variable = result[shown_quantity(result, quantity)]
-        dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
-        if not 1 <= len(dims) <= 2 or (along is not None and along not in dims):
-            raise InputError(
-                f"result: quantiles need a sweep over a parameter or two, got"
-                f" {', '.join(dims) or 'no sweep'}" + (f" and along={along!r}" if along else "")
-            )
-        along = along or dims[0]
-        within = next((dim for dim in dims if dim != along), None)
-        curves: list[tuple[str | None, xr.DataArray]] = (
-            [(None, variable)] if within is None else _steps(variable, within)
+    need(result)
+    variable = result[shown_quantity(result, quantity)]
+    dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
+    if not 1 <= len(dims) <= 2:
+        raise InputError(
+            "result: quantiles need a sweep over a parameter or two, got"
+            f" {', '.join(dims) or 'no sweep'}"
         )
-        title = None if within is None else scaled(variable[within])[2]
-    else:
-        curves, title = _compared(named(result), quantity), None
-        variable = curves[0][1]
-        (along,) = _swept(variable)
-    factor, _, text = scaled(*(part for _, part in curves))
+    along, *others = dims
+    curves = _steps(variable, others[0]) if others else [(None, variable)]
+    factor, _, text = scaled(variable)
     scale, _, name = scaled(variable[along])
     place = variable[along].values
     by_name = place.dtype.kind not in "if" or np.unique(place).size < place.size
@@ -197,40 +183,22 @@ def quantiles(
         for number, (label, part) in enumerate(curves):
             values, errors = _quantiles(part, factor, along)
             band: dict[str, Any] = {"color": color(number), "linewidth": 0}
-            if label is None:
+            if not others:
                 axes.fill_between(place, values[0], values[4], alpha=0.12, **band)
-            pale = 0.12 if label else 0.25
-            axes.fill_between(place, values[1], values[3], alpha=pale, **band)
-            style = {"capsize": 2, "label": label, **series(number, marker=True)}
-            axes.errorbar(place, values[2], yerr=errors, **style)
+            axes.fill_between(
+                place, values[1], values[3], alpha=0.12 if others else 0.25, **band
+            )
+            style = {"capsize": 2, "marker": MARKERS[number % len(MARKERS)], **series(number)}
+            axes.errorbar(place, values[2], yerr=errors, label=label, **style)
         axes.set(xlabel=name, ylabel=text)
         if not by_name and place.min() > 0.0 and place.max() >= 4.0 * place.min():
             axes.set_xscale("log")
         if by_name or place.size <= 8:  # powers of ten would not name the steps
             axes.set_xticks(place, _step_texts(variable[along]))
             axes.minorticks_off()
-        if len(curves) > 1:
-            axes.legend(title=title)
+        if others:
+            axes.legend(title=scaled(variable[others[0]])[2])
     return axes
-
-
-def _compared(
-    results: dict[str, xr.Dataset], quantity: str | None
-) -> list[tuple[str | None, xr.DataArray]]:
-    """Return several results over the same sweep, by name."""
-    quantity = shown_quantity(next(iter(results.values())), quantity)
-    curves: list[tuple[str | None, xr.DataArray]] = []
-    for name, result in results.items():
-        need(result, quantity)
-        swept = _swept(result[quantity])
-        first = curves[0][1] if curves else result[quantity]
-        if len(swept) != 1 or not first[swept[0]].equals(result[swept[0]]):
-            raise InputError(
-                "result: several results need the same sweep over a single parameter, but"
-                f" {name!r} is swept over {', '.join(swept) or 'no parameter'}"
-            )
-        curves.append((name, result[quantity]))
-    return curves
 
 
 def _swept(variable: xr.DataArray) -> list[str]:
@@ -274,24 +242,13 @@ def _step_texts(coordinate: xr.DataArray) -> list[str]:
 
 
 @checked
-def failure_curve(
-    curve: xr.Dataset,
-    *,
-    stress: Real | None = None,
-    force: Positive | None = None,
-    ax: Axes | None = None,
-) -> FigureAxes:
+def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> FigureAxes:
     """Draw P(onset < s) over decades, with its interval.
 
     Parameters
     ----------
     curve : Dataset
         From `stiction.failure_curve`.
-    stress : float, optional
-        Demand, Pa: the mean shear stress to carry. The figure marks the
-        demand and its probability.
-    force : float, optional
-        Demand as a force, N, instead of `stress`.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -307,24 +264,13 @@ def failure_curve(
     Raises
     ------
     InputError
-        If the dataset is not a failure curve,
-        or the area of a force is not known.
+        If the dataset is not a failure curve.
     """
     need(curve, "stress", "probability", "probability_low", "probability_high")
     curve = curve.isel(point=np.isfinite(curve["stress"].values))
     bound, chance = float(curve.attrs["lower_bound"]), curve["probability"].values
     factor, unit = unit_for("Pa", curve["stress"].values)
     x = curve["stress"].values * factor
-    area = float(curve["force"][0] / curve["stress"][0]) if "force" in curve else None
-    if force is not None:
-        if area is None or stress is not None:
-            raise InputError(
-                "force: give force or stress. A force needs a curve of an interface whose area is"
-                " known: Blocks(thickness=...), or Interface(width=...) of a line"
-            )
-        stress, shown = force / area, in_words("N", force)
-    elif stress is not None:
-        shown = f"{stress * factor:.4g} {unit}"
     with on_axes(ax) as axes:
         if bounded(bound):
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
@@ -337,18 +283,13 @@ def failure_curve(
         low, high = curve["probability_low"].values, curve["probability_high"].values
         axes.fill_between(x, low, high, color=PALE, linewidth=0.0)
         axes.plot(x, chance, "o-", color=INK, markersize=2.5, linewidth=0.9, label=text)
-        if stress is not None:
-            text = f"demand: {shown}"
-            if x[-1] <= stress * factor <= x[0]:
-                there = np.interp(stress * factor, x[::-1], np.log(chance[::-1]))
-                text += f", P = {np.exp(there):.2g}"
-            axes.axvline(stress * factor, color=ACCENT, linewidth=0.9, label=text)
         axes.set_yscale("log")
         axes.set_ylim(0.5 * float(chance.min()), 1.0)
         axes.set(xlabel=f"stress $s$ ({unit})", ylabel=r"$P(\tau_{\mathrm{cr}} < s)$")
-        if area is not None:
-            scale, name = unit_for("N", x / factor * area)
-            add_scale(axes, "x", area * scale / factor, with_unit("shear force", name))
+        if "force" in curve:
+            scale, name = unit_for("N", curve["force"].values)
+            ratio = scale * float(curve["force"][0]) / x[0]
+            add_scale(axes, "x", ratio, with_unit("shear force", name))
         else:
             with suppress(InputError):  # a problem that exists in Python only: stresses alone
                 add_friction_scale(axes, problem_of(curve), "x", factor)
@@ -385,7 +326,6 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
             "design: has no sensitivities. Pass sensitivities=True to st.design_stress"
         )
     quantity = "force" if np.isfinite(design.area) else "stress"
-    area = design.area if quantity == "force" else 1.0
     ends = np.stack([table[f"{quantity}_at_low"].values, table[f"{quantity}_at_high"].values])
     factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())
     place = np.arange(ends.shape[1])[::-1]
@@ -393,7 +333,7 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
         axes.axvspan(
             *(end * factor for end in design.interval[quantity]), color=BAND, linewidth=0.0
         )
-        axes.axvline(design.stress * area * factor, color=INK, linewidth=0.8)
+        axes.axvline(getattr(design, quantity) * factor, color=INK, linewidth=0.8)
         low, high = np.sort(ends, axis=0) * factor
         axes.barh(place, high - low, left=low, height=0.5, color=color(1))
         axes.plot(ends[1] * factor, place, "o", color=INK, markersize=3)

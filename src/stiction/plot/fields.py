@@ -25,7 +25,7 @@ from stiction.plot.axes import (
     problem_of,
     with_unit,
 )
-from stiction.plot.style import INK, PAGE, QUIET, color, series
+from stiction.plot.style import INK, MARKERS, PAGE, QUIET, color, series
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.problem.profiles import at_nodes
@@ -291,6 +291,9 @@ def _mark(
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
         text += f" at {', '.join(f'{part:.2f}' for part in place)} {length_unit}"
         style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
-        style |= {"marker": "os^DvP"[number % 6], "markersize": max(9.0 - 3.5 * number, 2.0)}
+        style |= {
+            "marker": MARKERS[number % len(MARKERS)],
+            "markersize": max(9.0 - 3.5 * number, 2.0),
+        }
         at = place if interface.is_plane else (*place, load * factor)
         axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)

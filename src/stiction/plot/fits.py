@@ -1,4 +1,4 @@
-"""Figures that check fits: a field fitted to profiles, and measured and predicted peaks."""
+"""Figures that check a fit to profiles, and predicted peaks against measured peaks."""
 
 from typing import Any
 
@@ -6,24 +6,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.special import ndtr
 
 from stiction.base.arrays import Array
 from stiction.base.model import checked
 from stiction.base.units import unit_for
 from stiction.base.variables import QUANTITIES
 from stiction.inference.agreement import Agreement
-from stiction.inference.curves import Curves
 from stiction.inference.fit import FieldFit
-from stiction.inference.peaks import Peaks, make_peaks
 from stiction.inference.whittle import Observed, periodograms_of
 from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
-from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, panel, paper_style
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style
 
 SHOWN = 100
 """Repetitions, or simulated records, behind a band that contains 90 % of them."""
-SHOWN_FITS = 1000
-"""Fits to simulated peaks behind a band."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 PER_OCTAVE = 4
@@ -31,44 +26,26 @@ PER_OCTAVE = 4
 
 
 @checked
-def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
-    """Draw a fitted random field with the records, or the distribution of measured peaks.
+def fit(result: FieldFit) -> NDArray[Any]:
+    """Draw a fitted random field with all of its records.
 
     Parameters
     ----------
-    result : FieldFit, Peaks or Curves
-        From `stiction.fit_field`, `stiction.read_peaks` or
-        `stiction.read_curve`.
+    result : FieldFit
+        From `stiction.fit_field`.
 
     Returns
     -------
-    (4,) or (1,) array of matplotlib.axes.Axes
-        Of a field, panels for all records together: (a) values and the
-        fitted marginal, (b) quantiles of the data against quantiles of
-        the fit, (c) correlation, with the effect of the window, and (d)
+    (4,) array of matplotlib.axes.Axes
+        Panels for all records together: (a) values and the fitted
+        marginal, (b) quantiles of the data against quantiles of the
+        fit, (c) correlation, with the effect of the window, and (d)
         spectrum. The bands come from records that were simulated from
         the fitted field. In (a) and (b) they contain 90 % of the fits
         to such records. In (c) and (d) they contain 90 % of the sets of
-        such records. Of peaks, the fraction of tests up to each peak, with
-        the log-normal distribution of the same mean and standard
-        deviation of the logarithm. The band contains 90 % of the fits to
-        as many peaks that were simulated from it.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> import stiction as st
-    >>> path = Path(tempfile.mkdtemp()) / "peaks.csv"
-    >>> _ = path.write_text("test, peak [MPa]\\n1, 0.71\\n2, 0.69\\n3, 0.74\\n")
-    >>> st.plot.fit(st.read_peaks(path))[0].get_xlabel()
-    'peak (MPa)'
+        such records.
     """
     rng = np.random.default_rng(0)
-    if not isinstance(result, FieldFit):
-        with on_axes(None) as axes:
-            _peaks(axes, make_peaks(result), rng)
-        return np.array([axes])
     estimate = result._estimate
     windows = estimate.setting.windows
     observed = periodograms_of(result._rows, windows)
@@ -81,43 +58,8 @@ def fit(result: FieldFit | Peaks | Curves) -> NDArray[Any]:
         _correlation(panels[2], result, observed, simulated)
         _spectrum(panels[3], result, observed, simulated)
         for letter, axes in zip("abcd", panels, strict=True):
-            panel(axes, letter)
+            axes.set_title(f"({letter})", loc="left", weight="bold")
     return panels
-
-
-def _peaks(axes: Axes, peaks: Peaks, rng: np.random.Generator) -> None:
-    """Draw the fraction of tests up to each peak, and the log-normal fit with its band."""
-    factor, unit = unit_for(peaks.unit, np.concatenate(peaks.values))
-    for number, (length, values) in enumerate(zip(peaks.lengths, peaks.values, strict=True)):
-        of = "" if length is None else f", {length:g} m"
-        logs, paint = np.log(values), color(number + 1)
-        mean, spread = logs.mean(), max(logs.std(ddof=1) if logs.size > 1 else 0.0, 1e-6)
-        drawn = rng.normal(mean, spread, (SHOWN_FITS, logs.size))
-        at = np.linspace(mean - 4.0 * spread, mean + 4.0 * spread, 200)
-        means, spreads = drawn.mean(axis=1), np.maximum(drawn.std(axis=1, ddof=1), 1e-6)
-        band = np.quantile(ndtr((at - means[:, None]) / spreads[:, None]), (0.05, 0.95), axis=0)
-        place = np.exp(at) * factor
-        axes.fill_between(
-            place, *band, color=paint, alpha=0.2, linewidth=0.0, label=f"90 % of fits{of}"
-        )
-        axes.plot(place, ndtr((at - mean) / spread), color=paint, label=f"log-normal{of}")
-        _steps(axes, np.r_[place[0], np.sort(values) * factor, place[-1]], of, color=INK)
-    _name_scales(axes, peaks, unit)
-
-
-def _steps(axes: Axes, steps: Array, of: str, **style: Any) -> None:
-    """Draw the fraction of tests up to each peak. `steps` also holds both ends of the drawing."""
-    count = steps.size - 2
-    shares = np.minimum(np.arange(steps.size) / count, 1.0)
-    axes.step(steps, shares, where="post", label=f"{count} tests{of}", **style)
-
-
-def _name_scales(axes: Axes, peaks: Peaks, unit: str) -> None:
-    name = "coefficient of friction" if peaks.unit == "1" else "peak"
-    axes.set(
-        ylim=(0.0, 1.02), xlabel=with_unit(name, unit), ylabel="fraction of tests up to it"
-    )
-    axes.legend()
 
 
 def _histogram(axes: Axes, field_fit: FieldFit) -> None:
@@ -303,9 +245,13 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
             margin = 0.05 * (high - low)
             ends += [(low - margin) * factor, (high + margin) * factor]
             steps = np.concatenate(([low - margin], np.sort(values), [high + margin])) * factor
-            _steps(axes, steps, of, color=INK if number == 0 else paint, linewidth=1.2)
-        axes.set_xlim(min(ends), max(ends))
-        _name_scales(axes, peaks, unit)
+            shares = np.minimum(np.arange(steps.size) / values.size, 1.0)
+            style = {"color": INK if number == 0 else paint, "where": "post"}
+            axes.step(steps, shares, label=f"{values.size} tests{of}", **style)
+        axes.set(xlim=(min(ends), max(ends)), ylim=(0.0, 1.02))
+        name = "coefficient of friction" if peaks.unit == "1" else "peak"
+        axes.set(xlabel=with_unit(name, unit), ylabel="fraction of tests up to it")
+        axes.legend()
         p = result.p_values["cramer_von_mises"]
         axes.set_title(f"p = {p:.2g}", fontsize=8, loc="left", color=QUIET)
     return axes

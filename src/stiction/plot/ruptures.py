@@ -1,6 +1,5 @@
-"""Figures of ruptures: slip rate, front, film, moment rate, and sizes of many events."""
+"""Figures of ruptures: slip rate in space and time, front, and film."""
 
-from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from PIL import Image
 
 from stiction.base.arrays import Array
@@ -21,28 +19,9 @@ from stiction.base.files import write_whole
 from stiction.base.model import Count, FilePath, check
 from stiction.base.progress import Meter, Show
 from stiction.base.units import unit_for
-from stiction.plot.axes import (
-    FigureAxes,
-    named,
-    need,
-    new_figure,
-    on_axes,
-    problem_of,
-    space_numbers,
-    with_unit,
-)
+from stiction.plot.axes import FigureAxes, need, on_axes, problem_of, with_unit
 from stiction.plot.fields import draw_map, map_height, name_line
-from stiction.plot.style import (
-    ACCENT,
-    INK,
-    PAGE,
-    PALE,
-    QUIET,
-    SLIP_RATE,
-    color,
-    paper_style,
-    series,
-)
+from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, SLIP_RATE, paper_style
 from stiction.problem.problem import Problem
 
 Moving = list[tuple[Any, str, Any]]
@@ -56,9 +35,6 @@ BEFORE = 0.11
 """Drawn time before the onset, in units of L/c_s."""
 FILMED_RATE = 1e-3
 """Slip rate, over the largest of a run, from which its frames are in a film."""
-SHOWN_RATE, BESIDE_PULSE = 0.05, 0.25
-"""Moment rate from which on a rupture is drawn, relative to its largest, and the time before and
-after, as a fraction of its duration. Slip that follows the load reaches a hundredth."""
 FRONT_SHARE = 0.9
 """Fraction of the nodes that the front has reached at the last of its contours."""
 STRENGTH = LinearSegmentedColormap.from_list("strength", ["0.85", "0.25"])
@@ -105,168 +81,6 @@ def rupture(
     with on_axes(ax, width=PAGE, height=3.4) as axes:
         _draw_space_time(axes, run, problem)
     return axes
-
-
-def moment_rate(run: xr.Dataset) -> NDArray[Any]:
-    """Draw the moment rate of a rupture and its amplitude spectrum.
-
-    Parameters
-    ----------
-    run : Dataset
-        From `simulate_rupture`.
-
-    Returns
-    -------
-    (2,) array of matplotlib.axes.Axes
-        The left panel shows the moment rate, until it stays below a
-        twentieth of its largest value. The right panel shows its
-        spectrum, which tends to the moment at low frequencies.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=192)
-    >>> tau_p = st.paper.strength(problem, correlation_ratio=2.0).sample(problem.interface, seed=1)
-    >>> method = st.Rupture(loading_rate=1e8)
-    >>> run = st.simulate_rupture(problem, tau_p[0], method=method, progress=False)
-    >>> st.plot.moment_rate(run)[1].get_xlabel()
-    'frequency (Hz)'
-    """
-    need(run, "moment_rate", "moment_rate_spectrum", "onset_time")
-    since, begin = _since_onset(run, "step_time")
-    moment_rate, spectrum = run["moment_rate"], run["moment_rate_spectrum"]
-    fast = since[moment_rate.values > SHOWN_RATE * moment_rate.values.max()]
-    ends = (fast[0], fast[-1]) if fast.size else (since[0], since[-1])
-    beside = BESIDE_PULSE * (ends[1] - ends[0])
-    shown = (since >= ends[0] - beside) & (since <= ends[1] + beside)
-    factor, unit = unit_for("s", since[shown])
-    figure = new_figure(PAGE, 2.6)
-    with paper_style():
-        left, right = figure.subplots(1, 2)
-        left.plot(since[shown] * factor, moment_rate.values[shown], color=INK)
-        left.set(
-            xlabel=with_unit(f"time{begin}", unit),
-            ylabel=with_unit("moment rate", moment_rate.attrs["units"]),
-            ylim=(0.0, None),
-        )
-        if spectrum.size:
-            right.loglog(run["frequency"], spectrum, color=INK)
-        right.set(xlabel="frequency (Hz)", ylabel=f"spectrum ({spectrum.attrs['units']})")
-        space_numbers(right)
-    return np.array([left, right])
-
-
-def events(
-    result: xr.Dataset | Sequence[xr.Dataset] | Mapping[str, xr.Dataset],
-    *,
-    problem: Problem | None = None,
-) -> NDArray[Any]:
-    """Draw the frequency of events by size, and their moment against area or length.
-
-    Parameters
-    ----------
-    result : Dataset, or list or mapping of Dataset
-        From `monte_carlo`, `onset` or a study whose method has
-        ``events=``, or from `simulate_rupture` or `equilibrium_path`.
-        Give several as a list, or by name.
-    problem : Problem, optional
-        Needed only if the result does not hold it.
-
-    Returns
-    -------
-    (2,) array of matplotlib.axes.Axes
-        The left panel shows the number of events per sample with at
-        least a given moment. The right panel shows moment against area,
-        or on a line against length. Between half-spaces, a curve shows
-        cracks with the median `event_area_stress_drop`: Eshelby's
-        circular crack for planes, and Starr's crack for lines.
-
-    Raises
-    ------
-    InputError
-        If a result has no table of events, or if no event came to rest.
-
-    Examples
-    --------
-    >>> import stiction as st
-    >>> problem = st.Problem(
-    ...     solid=st.Solid(shear_modulus=2.43e10, poisson_ratio=0.25, density=2700.0),
-    ...     interface=st.Interface(length=4e3, nodes=256, extent=(1e3, 3e3)),
-    ...     friction=st.LinearWeakening(critical_slip=0.1, residual_strength=30e6),
-    ...     load=st.Load(initial_stress=27e6),
-    ...     mode="III",
-    ... )
-    >>> marginal = st.Beta(alpha=1.5, beta=2.0, low=30.2e6, high=42e6)
-    >>> strength = st.RandomField(marginal, st.PowerLawSpectrum(300.0), mean_mode=True)
-    >>> method = st.Equilibrium(events=20)
-    >>> result = st.monte_carlo(problem, strength, method=method, samples=10, seed=1)
-    >>> st.plot.events(result)[0].get_ylabel()
-    'events per sample, at least as large'
-    """
-    results = named(result)
-    system = problem_of(next(iter(results.values())), problem)
-    plane = system.interface.is_plane
-    size = "event_area" if plane else "event_length"
-    hint = "; give the method events=, such as st.Equilibrium(events=20)"
-    for dataset in results.values():
-        need(dataset, "event_moment", size, hint=hint)
-    unit = next(iter(results.values()))["event_moment"].attrs["units"]
-    sizes, moments, drops = (
-        [dataset[name].values.ravel() for dataset in results.values()]
-        for name in (size, "event_moment", "event_area_stress_drop")
-    )
-    known = np.concatenate(sizes)
-    known = known[np.isfinite(known)]
-    if not known.size:
-        raise InputError("result: has no events to draw, because none came to rest")
-    figure = new_figure(PAGE, 2.8)
-    with paper_style():
-        left, right = figure.subplots(1, 2)
-        for number, (name, dataset) in enumerate(results.items()):
-            ordered = np.sort(moments[number][np.isfinite(moments[number])])[::-1]
-            samples = moments[number].size / max(dataset.sizes["event"], 1)
-            left.plot(
-                ordered, np.arange(1, ordered.size + 1) / samples, **series(number), label=name
-            )
-            right.plot(
-                sizes[number], moments[number], ".", color=color(number), markersize=3.0,
-                label=name if len(results) > 1 else None,
-            )  # fmt: skip
-        if system.specimen is None:
-            span = np.array([known.min(), known.max()])
-            drop = float(np.nanmedian(np.concatenate(drops)))
-            factor, stress_unit = unit_for("Pa", np.array([drop]))
-            right.plot(
-                span, crack_moment(system, drop, span), color=QUIET, linewidth=0.8,
-                label=f"cracks, area stress drop {drop * factor:.2g} {stress_unit}",
-            )  # fmt: skip
-        if right.get_legend_handles_labels()[0]:
-            right.legend()
-        if len(results) > 1:
-            left.legend()
-        left.set(xlabel=f"moment ({unit})", ylabel="events per sample, at least as large")
-        text = "area (m²)" if plane else "length (m)"
-        right.set(xlabel=text, ylabel=f"moment ({unit})")
-        for axes in (left, right):
-            axes.set(xscale="log", yscale="log")
-            space_numbers(axes)
-    return np.array([left, right])
-
-
-def crack_moment(problem: Problem, drop: float, sizes: Array) -> Array:
-    """Return the moment of cracks with a uniform stress drop (Pa) between half-spaces.
-
-    For a crack of length 2a on a line, the moment is pi drop a² G/G*
-    (Starr, 1928). For a circular crack of radius a on a plane, it is 16
-    (1 - nu)/(3 (2 - nu)) drop a³ (Eshelby, 1957).
-    """
-    solid = problem.solid
-    if problem.interface.is_plane:
-        share = 16.0 * (1.0 - solid.poisson_ratio) / (3.0 * (2.0 - solid.poisson_ratio))
-        moment: Array = share * drop * (sizes / np.pi) ** 1.5
-        return moment
-    softer = solid.shear_modulus / problem.effective_modulus
-    return np.pi * drop * softer * (0.5 * sizes) ** 2
 
 
 def film(

@@ -14,20 +14,16 @@ from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.inference.curves import Curves
-from stiction.plot.axes import (
-    FigureAxes,
-    named,
-    need,
-    new_figure,
-    on_axes,
-    problem_of,
-    with_unit,
-)
+from stiction.methods.equilibrium.contact.solver import SliderSolver
+from stiction.plot.axes import named, need, new_figure, problem_of, with_unit
 from stiction.plot.fields import chosen_row, strength_of
-from stiction.plot.slider import draw as draw_slider
-from stiction.plot.style import ACCENT, COLUMN, INK, PAGE, PALE, QUIET, paper_style, series
+from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, paper_style, series
 from stiction.problem.problem import Problem
+from stiction.problem.sample import Sample
 from stiction.problem.specimen import Pusher, Slider
+
+N_ARROWS = 7
+"""Arrows of a pressure on the top of a slider."""
 
 
 def specimen(
@@ -76,7 +72,7 @@ def specimen(
             )
         given = problem.sample(strength)
         chosen_row(given.strength, {} if result is None else {"onset": result}, sample)
-        return draw_slider(problem, given.part(slice(int(sample), int(sample) + 1)))
+        return _draw_slider(problem, given.part(slice(int(sample), int(sample) + 1)))
     blocks, interface = problem.blocks, problem.interface
     rows = None if strength is None else strength_of(problem, strength)
     if result is not None:
@@ -138,13 +134,71 @@ def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
     axes.set(xlim=(-0.2 * length, 1.2 * length), ylim=(-1.3 * height, 1.3 * height))
 
 
-def force_travel(
+def _draw_slider(problem: Problem, sample: Sample) -> NDArray[Any]:
+    """Draw a rig, and stresses and slip of a sample at its first instability."""
+    solver = SliderSolver(problem)
+    push = solver.path(sample, 0).follow()
+    profiles = solver.values_at(push.first or push.last)
+    coefficient = sample.strength[0] / sample.normal_pressure[0]
+    profiles["peak strength"] = coefficient * profiles["pressure"]
+    profiles["shear stress"] = profiles["stress"]
+    rows = {"Pa": ("shear stress", "pressure", "peak strength"), "m": ("slip", "opening")}
+    scale, unit = unit_for("m", problem.interface.lengths)
+    figure = new_figure(1.35 * COLUMN, 2.0 * COLUMN)
+    with paper_style():
+        top, *below = figure.subplots(3, sharex=True)
+        _draw_slider_and_base(top, problem, scale)
+        top.set_ylabel(f"height ({unit})")
+        for axes, (si, names) in zip(below, rows.items(), strict=True):
+            factor, shown = unit_for(si, np.concatenate([profiles[name] for name in names]))
+            for number, name in enumerate(names):
+                values = factor * profiles[name]
+                axes.plot(problem.interface.x * scale, values, label=name, **series(number))
+            axes.set_ylabel(with_unit(names[0].split()[-1], shown))
+            axes.legend()
+        below[-1].set_xlabel(f"position $x$ ({unit})")
+    return np.array([top, *below])
+
+
+def _draw_slider_and_base(axes: Axes, problem: Problem, scale: float) -> None:
+    """Draw a slider, its base and arrows for the drive and the pressing, to scale."""
+    slider = problem.specimen
+    assert isinstance(slider, Slider)  # `problem.rig` has refused other specimens
+    length, height, base = problem.interface.measure * scale, slider.height * scale, slider.base
+    left, right = (scale * part for part in (base.behind, base.ahead)[:: slider.towards])
+    low, end = -scale * base.height, 0.0 if slider.towards > 0 else length
+    bodies = ((0.0, height, length, PALE), (-left, low, length + left + right, "white"))
+    for x, tall, width, colour in bodies:
+        axes.add_patch(Rectangle((x, 0.0), width, tall, facecolor=colour, edgecolor=QUIET))
+    lines = [(0.0, length, 0.0, INK)]
+    lines += [(-left, length + right, low, INK)] * (base.bottom == "fixed")
+    lines += [(0.0, length, height, QUIET)] * (slider.pressing == "plate")
+    for start, stop, y, colour in lines:
+        axes.plot([start, stop], [y, y], color=colour, linewidth=2.5)
+    arrow: dict[str, Any] = {"width": 0.006 * length, "head_width": 0.03 * length}
+    arrow["length_includes_head"] = True
+    reach, at, start = 0.2 * length * slider.towards, 1.05 * height, 0.5 * length
+    if isinstance(slider.drive, Pusher):
+        at, half = slider.drive.height * scale, 0.5 * slider.drive.width * scale
+        start = end - reach
+        axes.plot([end, end], [at - half, at + half], color=ACCENT, linewidth=3.0)
+    axes.arrow(start, at, reach, 0.0, color=ACCENT, **arrow)
+    for share in np.linspace(-1.0, 1.0, N_ARROWS):
+        x = 0.5 * length * (1.0 + slider.towards * share)
+        size = 0.05 * length * (1.5 + slider.tilt * share)
+        axes.arrow(x, 1.1 * height + size, 0.0, -size, color=QUIET, **arrow)
+    room = 0.25 * length
+    axes.set(xlim=(-max(left, room), length + max(right, room)), aspect="equal")
+    axes.set_ylim(1.1 * low, 1.1 * height + room)
+
+
+def precursors(
     result: xr.Dataset | Sequence[xr.Dataset],
     *,
+    problem: Problem | None = None,
     measured: Curves | None = None,
-    ax: Axes | None = None,
-) -> FigureAxes:
-    """Draw the curve of a machine: force against travel of the drives, with drops.
+) -> NDArray[Any]:
+    """Draw the curve of a machine, and the places that slip in arrested events.
 
     Parameters
     ----------
@@ -152,128 +206,90 @@ def force_travel(
         From `stiction.equilibrium_path` for a specimen, at many loads.
         Several paths, for samples from the same field, are drawn as a
         median, with a band that contains 90 % of them at each travel.
+    problem : Problem, optional
+        Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`. The curves are drawn over the
-        prediction, with their precursors.
-    ax : matplotlib.axes.Axes, optional
-        Axes to draw on. By default new axes are made.
+        From `stiction.read_curve`. They are drawn over the prediction,
+        with their precursors. Marks at the upper edge of the lower panel
+        show the travel at which these precursors begin.
 
     Returns
     -------
-    matplotlib.axes.Axes
-        If the thickness of the blocks is unknown, mean stresses are drawn.
+    (2,) array of matplotlib.axes.Axes
+        The upper panel shows force against travel of the drives, or mean
+        stress if the thickness of the blocks is unknown. The lower panel
+        shows the extent of each event at its travel.
 
     Examples
     --------
-    See `precursors`, which draws the events below this curve.
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
+    ...     interface=st.Interface(length=0.1, nodes=128),
+    ...     friction=st.LinearWeakening(weakening_rate=0.2e12, residual_ratio=0.5),
+    ...     specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.008, width=0.005)),
+    ... )
+    >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.02) ** 2
+    >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
+    >>> st.plot.precursors(path)[1].get_ylabel()
+    'position $x$ (mm)'
     """
     results = [*named(result).values()]
-    measured = None if measured is None else check("measured", measured, Curves)
+    tests = () if measured is None else check("measured", measured, Curves)
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
         raise InputError(
             "result: some paths contain forces and others stresses. Draw them in separate figures"
         )
-    units = str(results[0][name].attrs["units"])
-    if measured is not None and (measured.unit, measured[0].travel_unit) != (units, "m"):
+    si = str(results[0][name].attrs["units"])
+    if tests and (tests.unit, tests[0].travel_unit) != (si, "m"):
         raise InputError(
-            f"measured: curves are {measured.unit} over {measured[0].travel_unit}, the prediction"
-            f" is {units} over m. Pass speed= to st.read_curve to turn time into travel"
+            f"measured: curves are {tests.unit} over {tests[0].travel_unit}, the prediction"
+            f" is {si} over m. Pass speed= to st.read_curve to turn time into travel"
         )
+    interface = problem_of(results[0], problem).interface
+    scale, unit = unit_for("m", interface.lengths)
     length, length_unit = unit_for("m", np.concatenate([path[0] for path in paths]))
-    factor, unit = unit_for(units, np.concatenate([path[1] for path in paths]))
-    with on_axes(ax) as axes:
+    factor, force_unit = unit_for(si, np.concatenate([path[1] for path in paths]))
+    figure = new_figure(1.35 * COLUMN, 1.45 * COLUMN)
+    with paper_style():
+        above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
         if len(paths) > 1:
-            _draw_band(axes, paths, length, factor)
+            _draw_band(above, paths, length, factor)
         else:
             travel, force, _, _ = paths[0]
-            axes.plot(travel * length, force * factor, **series(0), label="predicted")
+            above.plot(travel * length, force * factor, **series(0), label="predicted")
             start, high = results[0]["event_travel"].values, results[0][event].values
-            if start.size:
-                places = start * length, high * factor
-                axes.plot(*places, "o", color=ACCENT, markersize=3.5, label="arrested events")
-        for number, test in enumerate(measured or ()):
-            labels = [f"{len(measured or ())} tests", "measured precursors"]
-            of_test, of_drops = labels if number == 0 else (None, None)
-            thin = {"color": INK, "linewidth": 0.5, "alpha": 0.7, "label": of_test}
-            axes.plot(test.travel * length, test.force * factor, **thin)
-            places = test.drops.travel * length, test.drops.force * factor
-            axes.plot(*places, "v", color=INK, markersize=3.0, label=of_drops)
-        if axes.get_legend_handles_labels()[1][1:]:
-            axes.legend()
-        text = "force" if name == "force" else "mean stress"
-        axes.set(xlabel=with_unit("travel", length_unit), ylabel=with_unit(text, unit))
-    return axes
-
-
-def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
-    """Draw a band with 90 % of several curves, up to the travel at which half have slid."""
-    known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
-    ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
-    grid = np.linspace(0.0, float(np.median(ends)), 400)
-    rows = np.stack([
-        np.interp(grid, travel[there], force[there], right=np.nan)
-        for (travel, force, *_), there in zip(paths, known, strict=True)
-    ])  # fmt: skip
-    low, middle, high = np.nanquantile(rows, [0.05, 0.5, 0.95], axis=0) * factor
-    style = series(0)
-    axes.fill_between(
-        grid * length, low, high, color=style["color"], alpha=0.25, linewidth=0.0,
-        label=f"90 % of {len(paths)} predicted",
-    )  # fmt: skip
-    axes.plot(grid * length, middle, **style, label="median of predicted")
-
-
-def block(run: xr.Dataset, *, problem: Problem | None = None) -> NDArray[Any]:
-    """Draw the velocity of both blocks at some times during an event.
-
-    Parameters
-    ----------
-    run : Dataset
-        From `stiction.simulate_rupture` with a specimen.
-    problem : Problem, optional
-        Needed only if the run does not hold it.
-
-    Returns
-    -------
-    (rows, columns) array of matplotlib.axes.Axes
-        Velocity along the interface, at times when 2 to 95 % of the
-        slip has occurred. All panels share a colour scale, and 1 % of
-        the values lie beyond its ends. Time counts from the first
-        arrival of the front.
-    """
-    need(run, "block_velocity", hint=". It is kept for specimens")
-    interface = problem_of(run, problem).interface
-    scale, unit = unit_for("m", interface.lengths)
-    velocity = run["block_velocity"].values
-    largest = max(float(np.quantile(np.abs(velocity), 0.99)), 1e-12)
-    since = run["snapshot"].values - float(run["onset_time"].fillna(0.0))
-    factor, time_unit = unit_for("s", since)
-    x, height = interface.x * scale, run["height"].values * scale
-    both = np.concatenate([-height[:0:-1], height])
-    columns = 4 if 2.0 * height[-1] > 0.6 * x[-1] else 2
-    rows = -(-len(since) // columns)
-    high = PAGE / columns * 2.0 * height[-1] / x[-1]
-    figure = new_figure(PAGE * 1.1, rows * (high + 0.3) + 0.3)
-    with paper_style():
-        panels: NDArray[Any] = figure.subplots(
-            rows, columns, sharex=True, sharey=True, squeeze=False
-        )
-        for axes, time, upper in zip(panels.flat, since, velocity, strict=False):
-            field = np.concatenate([-upper[:0:-1], upper])
-            mesh = axes.pcolormesh(
-                x, both, field, cmap="RdBu_r", vmin=-largest, vmax=largest,
-                shading="gouraud", rasterized=True,
-            )  # fmt: skip
-            axes.axhline(0.0, color="black", linewidth=0.6)
-            axes.set_title(f"{factor * time:.3g} {time_unit}")
-            axes.set_aspect("equal")
-            axes.label_outer()
-        figure.supxlabel(f"position $x$ ({unit}); times count from the onset")
-        figure.supylabel(f"height ({unit})")
-        figure.colorbar(mesh, ax=panels, extend="both", label="velocity along $x$ (m/s)")
-    return panels
+            style: dict[str, Any] = {"color": ACCENT, "markersize": 3.5}
+            above.plot(start * length, high * factor, "o", label="arrested events", **style)
+        width, edge = 2.0 / len(results) ** 0.5, interface.measure * scale
+        for path in results:
+            start = path["event_start"].values * scale
+            end = start + path["event_length"].values * scale
+            at = path["event_travel"].values * length
+            events = below.vlines(at, start, end, color=ACCENT, linewidth=width)
+        events.set_label("slips in an arrested event")
+        for test in tests:
+            at = test.drops.travel * length
+            (curve,) = above.plot(
+                test.travel * length, test.force * factor, color=INK, linewidth=0.5, alpha=0.7
+            )
+            (drops,) = above.plot(at, test.drops.force * factor, "v", color=INK, markersize=3.0)
+            (marks,) = below.plot(
+                at, np.full(at.size, edge), "|", color=INK, markersize=5.0, clip_on=False
+            )
+        if tests:
+            curve.set_label(f"{len(tests)} tests")
+            drops.set_label("measured precursors")
+            marks.set_label("measured precursors")
+        above.set_ylabel(with_unit("force" if name == "force" else "mean stress", force_unit))
+        below.set(xlabel=with_unit("travel of the drive", length_unit), ylim=(0.0, edge))
+        below.set_ylabel(f"position $x$ ({unit})")
+        above.legend()
+        below.legend(loc="upper left", bbox_to_anchor=(0.0, 0.95))
+    return np.array([above, below])
 
 
 def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
@@ -293,65 +309,19 @@ def curve_of(result: xr.Dataset) -> tuple[Array, Array, str, str]:
     return travel, force, name, event
 
 
-def precursors(
-    result: xr.Dataset | Sequence[xr.Dataset],
-    *,
-    problem: Problem | None = None,
-    measured: Curves | None = None,
-) -> NDArray[Any]:
-    """Draw the curve of a machine, and the places that slip in arrested events.
-
-    Parameters
-    ----------
-    result : Dataset, or sequence of Dataset
-        As in `force_travel`.
-    problem : Problem, optional
-        Needed only if the result does not hold it.
-    measured : Curves, optional
-        From `stiction.read_curve`. They are drawn over the prediction.
-        Marks at the upper edge of the lower panel show the travel at
-        which precursors of the tests begin.
-
-    Returns
-    -------
-    (2,) array of matplotlib.axes.Axes
-        The upper panel is the plot of `force_travel`. The lower panel
-        shows the extent of each event at its travel.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import stiction as st
-    >>> problem = st.Problem(
-    ...     solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
-    ...     interface=st.Interface(length=0.1, nodes=128),
-    ...     friction=st.LinearWeakening(weakening_rate=0.2e12, residual_ratio=0.5),
-    ...     specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.008, width=0.005)),
-    ... )
-    >>> strength = 1e6 + 3e8 * (problem.interface.x - 0.02) ** 2
-    >>> path = st.equilibrium_path(problem, strength, np.linspace(0.0, 1.3e6, 50))
-    >>> st.plot.precursors(path)[1].get_ylabel()
-    'position $x$ (mm)'
-    """
-    results = [*named(result).values()]
-    interface = problem_of(results[0], problem).interface
-    length, _ = unit_for("m", np.concatenate([curve_of(path)[0] for path in results]))
-    scale, unit = unit_for("m", interface.lengths)
-    figure = new_figure(1.35 * COLUMN, 1.35 * COLUMN)
-    with paper_style():
-        above, below = figure.subplots(2, sharex=True, height_ratios=(1.3, 1.0))
-        force_travel(results, measured=measured, ax=above)
-        for path in results:
-            start = path["event_start"].values * scale
-            end = start + path["event_length"].values * scale
-            at = path["event_travel"].values * length
-            below.vlines(at, start, end, color=ACCENT, linewidth=2.0 / len(results) ** 0.5)
-        for test in measured or ():
-            edge = np.full(test.drops.travel.size, interface.measure * scale)
-            below.plot(
-                test.drops.travel * length, edge, "|", color=INK, markersize=5.0, clip_on=False
-            )
-    below.set(xlabel=above.get_xlabel(), ylabel=f"position $x$ ({unit})")
-    below.set_ylim(0.0, interface.measure * scale)
-    above.set_xlabel("")
-    return np.array([above, below])
+def _draw_band(axes: Axes, paths: Sequence[Any], length: float, factor: float) -> None:
+    """Draw a band with 90 % of several curves, up to the travel at which half have slid."""
+    known = [np.isfinite(travel) & np.isfinite(force) for travel, force, *_ in paths]
+    ends = [travel[there].max() for (travel, *_), there in zip(paths, known, strict=True)]
+    grid = np.linspace(0.0, float(np.median(ends)), 400)
+    rows = np.stack([
+        np.interp(grid, travel[there], force[there], right=np.nan)
+        for (travel, force, *_), there in zip(paths, known, strict=True)
+    ])  # fmt: skip
+    low, middle, high = np.nanquantile(rows, [0.05, 0.5, 0.95], axis=0) * factor
+    style = series(0)
+    axes.fill_between(
+        grid * length, low, high, color=style["color"], alpha=0.25, linewidth=0.0,
+        label=f"90 % of {len(paths)} predicted",
+    )  # fmt: skip
+    axes.plot(grid * length, middle, **style, label="median of predicted")
