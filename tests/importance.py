@@ -40,7 +40,7 @@ def dips(problem: st.Problem, field: RandomField, stress: float) -> Array:
     interface = problem.interface
     (window,) = windows_of(problem, float(np.max(np.asarray(problem.friction.weakening_rate))))
     weight = window.weight
-    unit = np.eye(field.modes(interface).dimension)
+    unit = np.eye(field.modes(interface).draw_numbers.size)
     waves = field.modes(interface).gaussian(unit)  # z of each draw alone
     z, along = np.zeros(interface.shape), np.zeros(len(unit))
     for _ in range(100):

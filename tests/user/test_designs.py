@@ -12,7 +12,6 @@ from setups import EXACT, LOCAL, ensemble
 
 import stiction as st
 from stiction.cli.commands import app
-from stiction.ensemble.experiment import Experiment
 
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
@@ -130,32 +129,6 @@ def test_a_design_is_in_proportion_to_the_pressure():
     )
     plain = st.design_stress(PROBLEM, RANDOM, probability=1e-2, **GIVEN)
     refuses("has no sensitivities", lambda: st.plot.sensitivities(plain))
-
-
-@pytest.mark.parametrize(
-    ("problem", "name"),
-    [
-        (dataclasses.replace(PROBLEM, load=st.Load(initial_stress=2.5e5)), "initial_stress"),
-        (
-            dataclasses.replace(
-                PROBLEM, friction=dataclasses.replace(PROBLEM.friction, residual_ratio=0.8)
-            ),
-            "residual_strength",
-        ),
-    ],
-)
-def test_a_factor_that_leaves_no_solution_is_warned_of_at_the_start(problem, name):
-    """A wide factor is named before the first sample, and a bounded one passes."""
-
-    def check(factor):
-        random = st.RandomInterface(strength=STRENGTH, between={name: factor})
-        Experiment(problem, random, LOCAL).check_fields()
-
-    with pytest.warns(
-        st.AccuracyWarning, match=f"between.{name}: .* would stop the computation"
-    ):
-        check(st.Lognormal(mean=1.0, cv=0.3))
-    check(st.Beta(alpha=2.0, beta=2.0, low=0.9, high=1.1))
 
 
 def make(**tables):

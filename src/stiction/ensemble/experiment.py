@@ -38,7 +38,6 @@ from stiction.problem.sample import Sample, given_twice, own_sample
 from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
-    check_factors,
     check_pressure,
     check_residual,
     mean_in_stress,
@@ -161,8 +160,6 @@ class Experiment:
                         UnitWarning,
                     )
             check_residual(self.problem, member)
-            overstress = "overstress" in optional_member(self.method, "accepts")
-            check_factors(self.problem, member, overstress)
             # Stresses and slips of a solid lie in known ranges. Others
             # are in another unit.
             means = {name: mean_in_stress(self.problem, member, name) for name in member.names}

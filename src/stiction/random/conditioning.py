@@ -52,7 +52,7 @@ definite), b and p are reduced by a common factor. In step 4 each place
 keeps at least half of the precision that it has without measurements.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Annotated, Any, NamedTuple
 
@@ -71,7 +71,7 @@ from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
 from stiction.problem.reading.labels import in_si, unit_of
 from stiction.random.mapping import from_normal
-from stiction.random.synthesis import condition, layout
+from stiction.random.synthesis import layout
 
 # Limits of errors and warnings
 MAX_CHI_SQUARE = 5.0  # of suitable values, in standard deviations above its mean
@@ -98,9 +98,6 @@ MIN_VARIANCE = 1e-12
 MIN_DEVIATION = 1e-4  # of a measured z; the map is linear across less, and needs no updates
 
 N_CHECK_SAMPLES = 1024  # of step 6
-
-LogRatio = Callable[[Array], Array]
-"""Logarithm of l_k divided by its Gaussian, at every place k and values z (places, ...)."""
 
 
 class ReadPoints(np.ndarray):
@@ -141,11 +138,13 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
 
 def _values(array: Any) -> Array:
     """Return the values of a labelled array in SI. The stated unit determines the property."""
-    stated = unit_of(array)
-    for quantity in QUANTITIES.values():
-        if is_in(stated or "1", quantity.units):
-            return np.asarray(in_si(array, "values", quantity.units if stated else "1"))
-    raise ValueError(f"must be in SI or state the unit of a property, got {stated!r}")
+    stated = unit_of(array) or "1"
+    known = [
+        quantity.units for quantity in QUANTITIES.values() if is_in(stated, quantity.units)
+    ]
+    if not known:
+        raise ValueError(f"must be in SI or state the unit of a property, got {stated!r}")
+    return np.asarray(in_si(array, "values", known[0] if unit_of(array) else "1"))
 
 
 def _table(points: Array) -> dict[str, list[float]]:
@@ -201,27 +200,37 @@ class Conditions:
 
 
 class Measured(NamedTuple):
-    """Measured values of a property. At their places z is phi @ draws, phi (points, dimension)."""
+    """Values of one or several properties, measured at places where z is phi @ draws."""
 
-    conditions: Conditions
-    marginal: Any
-    phi: Array
+    properties: list[tuple[Any, int]]  # marginals, and numbers of their places in a row
+    values: Array  # (places,)
+    noise: Array  # standard deviations, (places,)
+    phi: Array  # (places, dimension)
+
+    def by_marginal(self, of_places: Array) -> Iterator[tuple[Any, Array]]:
+        """Yield the marginal of each property, with its part of an array (places, ...)."""
+        marginals, counts = zip(*self.properties, strict=True)
+        return zip(marginals, np.split(of_places, np.cumsum(counts)[:-1]), strict=True)
 
     def log_likelihood(self, z: Array) -> Array:
-        """Return log l_k at every place and z (places, ...), or -inf without a quantile."""
-        value = self.conditions.values.reshape(-1, *(1 for _ in z.shape[1:]))
-        misfit = (value - from_normal(self.marginal, z)) * (1.0 / self.conditions.noise)
+        """Return log l_k at every place and z (places, ...), also without a quantile."""
+        shape = (-1, *(1 for _ in z.shape[1:]))
+        mapped = np.concatenate([from_normal(*part) for part in self.by_marginal(z)])
+        misfit = (self.values.reshape(shape) - mapped) * (1.0 / self.noise).reshape(shape)
         # Far out in the tail scipy may have no quantile.
-        return np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
+        likely = np.where(np.isnan(misfit), -np.inf, -0.5 * misfit**2)
+        return np.maximum(likely, LOG_OF_IMPOSSIBLE)
 
     def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
-        """Step 2: return b and p (points,) from mean and variance of z given all other values."""
-        law, noise = self.marginal.distribution, self.conditions.noise
-        value = self.conditions.values
+        """Step 2: return b and p (places,) from mean and variance of z given all other values."""
         # The range of z in which likelihood and normal distribution
-        # both matter.
-        edges = value + HALF_WIDTH * noise * np.array([[-1.0], [1.0]])
-        likely = _normal_score(law.cdf(edges), law.sf(edges)).clip(-MAX_Z, MAX_Z)
+        # both matter. Of the probabilities below and above, the smaller
+        # gives z.
+        edges = self.values[:, None] + HALF_WIDTH * self.noise[:, None] * np.array([-1.0, 1.0])
+        parts = [(law.distribution, part) for law, part in self.by_marginal(edges)]
+        below = np.concatenate([law.cdf(part) for law, part in parts])
+        above = np.concatenate([law.sf(part) for law, part in parts])
+        likely = np.where(below < 0.5, ndtri(below), -ndtri(above)).clip(-MAX_Z, MAX_Z).T
         width = HALF_WIDTH * np.sqrt(variance)
         low, high = np.maximum(likely[0], mean - width), np.minimum(likely[1], mean + width)
         overlap = low < high
@@ -266,18 +275,12 @@ class Measured(NamedTuple):
         return centre / spread - mean / variance, precision
 
 
-def _normal_score(below: Array, above: Array) -> Array:
-    """Return the z with given probabilities below and above. The smaller probability is used."""
-    return np.where(below < 0.5, ndtri(below), -ndtri(above))
-
-
 class Regression(NamedTuple):
     """Step 3: the posterior (2) of the draws, given Gaussians for the measured values."""
 
-    left: Array  # U s / |p|^(1/2), (points, directions)
     power: Array  # s^2, (directions,)
     right: Array  # V, (dimension, directions)
-    data: Array  # V' sum_k b_k phi_k, (1, directions)
+    data: Array  # V' sum_k b_k phi_k, (directions,)
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
         """Return the mean and standard deviation of z = phi @ draws, with shape (points,)."""
@@ -285,38 +288,30 @@ class Regression(NamedTuple):
         # Variance in directions that no measurement changes.
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
         variance = along**2 @ (1.0 / gain) + np.where(free > MIN_VARIANCE, free, 0.0)
-        return along @ (self.data[0] / gain), np.sqrt(variance)
-
-    def apply(self, out: Array) -> Array:
-        """Turn standard normal draws a into mu + P^(1/2) a, in place."""
-        gain, transposed = 1.0 + self.power, np.ascontiguousarray(self.right.T)
-        condition(self.right, transposed, self.data / gain, gain**-0.5 - 1.0, out)
-        return out
-
-
-class ErrorEstimate(NamedTuple):
-    """Largest errors of conditioned draws, over all places."""
-
-    mean: float  # of z, in standard deviations of z
-    deviation: float  # of the standard deviation of z, as a share of it
+        return along @ (self.data / gain), np.sqrt(variance)
 
 
 class Conditioning(NamedTuple):
     """Map from standard normal draws to draws given measured values. See `conditioned`."""
 
     regression: Regression
-    error: ErrorEstimate
+    # Largest errors over all places: of the mean of z in standard
+    # deviations, and of the standard deviation as a share of it.
+    error: tuple[float, float]
     misfit: float  # squared, of values and of draws at the mean of the posterior
     points: int
 
     def draws(self, draws: Array) -> Array:
-        """Return conditioned draws with shape (samples, dimension)."""
-        return self.regression.apply(np.array(draws))
-
-    def quantile_at(self, phi: Array, probability: float) -> Array:
-        """Return the quantile of z = phi @ draws at each point."""
-        mean, deviation = self.regression.moments(phi)
-        return mean + float(ndtri(probability)) * deviation
+        """Return mu + P^(1/2) a for each row a of standard normal draws (samples, dimension)."""
+        right, gain = self.regression.right, 1.0 + self.regression.power
+        mean, factors = self.regression.data / gain, gain**-0.5 - 1.0
+        # Sample by sample and without BLAS, so that a sample does not
+        # depend on its batch and on the number of threads.
+        conditioned, across = np.array(draws), np.ascontiguousarray(right.T)
+        for row in conditioned:
+            weights = mean + factors * np.einsum("j,jk->k", row, right)
+            row += np.einsum("k,kj->j", weights, across)
+        return conditioned
 
     def warn(self) -> None:
         """Warn about measured values that do not suit the field."""
@@ -334,12 +329,12 @@ class Conditioning(NamedTuple):
             )
 
 
-def conditioned(measured: Sequence[Measured]) -> Conditioning:
+def conditioned(measured: Measured) -> Conditioning:
     """Condition draws on measured values of properties, with the algorithm in this file."""
-    phi = np.concatenate([values.phi for values in measured])
+    phi = measured.phi
     # 1. and 2. Gaussians as if each value were the only one.
     cavity = np.zeros(len(phi)), np.ones(len(phi))
-    shift, precision = _gaussians(measured, cavity)
+    shift, precision = measured.gaussian(*cavity)
     for update in range(1, MAX_UPDATES + 1):
         # 3. and 4. All values together, and z at each place given all
         # other values.
@@ -349,61 +344,27 @@ def conditioned(measured: Sequence[Measured]) -> Conditioning:
         # of the regression.
         if np.abs(cavity[0] - previous_mean).max() < SETTLED_MEAN or update == MAX_UPDATES:
             break
-        shift, precision = _gaussians(measured, cavity)
+        shift, precision = measured.gaussian(*cavity)
     # 6. The regression gives z = mean + (along / gain) w with standard normal w.
     along, gain = phi @ regression.right, np.sqrt(1.0 + regression.power)
-    mean = along @ (regression.data[0] / gain**2)
-    log_ratio = _log_ratio(measured, shift, precision, mean)
-    error = _estimate_error(log_ratio, mean, along / gain)
+    draws = regression.data / gain**2
+    mean = along @ draws
+    error = _estimate_error(measured, shift, precision, mean, along / gain)
     # 7. Squared misfits of the values and of the draws.
-    flat = np.zeros_like(mean)  # with a flat Gaussian, the ratio is the likelihood
-    log_likelihood = _log_ratio(measured, flat, flat, mean)(mean)
-    draws = regression.data[0] / (1.0 + regression.power)
-    misfit = -2.0 * float(log_likelihood.sum()) + float(draws @ draws)
+    misfit = -2.0 * float(measured.log_likelihood(mean).sum()) + float(draws @ draws)
     return Conditioning(regression, error, misfit, len(phi))
 
 
-def _gaussians(
-    measured: Sequence[Measured], cavity: tuple[Array, Array]
-) -> tuple[Array, Array]:
-    """Step 2: return b and p for all properties, from means and variances given other values."""
-    ends = np.cumsum([len(values.phi) for values in measured])[:-1]
-    moments = zip(*(np.split(moment, ends) for moment in cavity), strict=True)
-    gaussians = [
-        values.gaussian(mean, variance)
-        for values, (mean, variance) in zip(measured, moments, strict=True)
-    ]
-    shift, precision = map(np.concatenate, zip(*gaussians, strict=True))
-    return shift, precision
-
-
-def _log_ratio(
-    measured: Sequence[Measured], shift: Array, precision: Array, mean: Array
-) -> LogRatio:
-    """Return a function of z: the log ratio of l_k to its Gaussian at every place k.
-
-    The Gaussian is scaled to 1 at the `mean`, because a constant factor
-    at a place does not matter.
-    """
-
-    def log_ratio(z: Array) -> Array:
-        shape = (-1, *(1 for _ in z.shape[1:]))
-        ends = np.cumsum([len(values.phi) for values in measured])[:-1]
-        parts = zip(measured, np.split(z, ends), strict=True)
-        log_likelihood = np.concatenate([values.log_likelihood(part) for values, part in parts])
-        off = z - mean.reshape(shape)
-        slope = (shift - precision * mean).reshape(shape)
-        gaussian: Array = off * (slope - 0.5 * precision.reshape(shape) * off)
-        return np.maximum(log_likelihood, LOG_OF_IMPOSSIBLE) - gaussian
-
-    return log_ratio
-
-
-def _estimate_error(log_ratio: LogRatio, mean: Array, slopes: Array) -> ErrorEstimate:
+def _estimate_error(
+    measured: Measured, shift: Array, precision: Array, mean: Array, slopes: Array
+) -> tuple[float, float]:
     """Step 6: compare samples of z = mean + slopes w with the same samples, weighted by (1)."""
     draws = np.random.default_rng(0).standard_normal((N_CHECK_SAMPLES, slopes.shape[1]))
     z = draws @ slopes.T  # less its mean
-    log_weight = log_ratio(mean[:, None] + z.T).sum(axis=0)
+    # The Gaussians are scaled to 1 at the mean, because a constant
+    # factor at a place does not matter.
+    gaussian = z * (shift - precision * mean - 0.5 * precision * z)
+    log_weight = (measured.log_likelihood(mean[:, None] + z.T) - gaussian.T).sum(axis=0)
     weight = np.exp(log_weight - log_weight.max())
     # Truncated weights, so that a few samples do not dominate.
     weight = np.minimum(weight / weight.mean(), np.sqrt(N_CHECK_SAMPLES))
@@ -411,7 +372,7 @@ def _estimate_error(log_ratio: LogRatio, mean: Array, slopes: Array) -> ErrorEst
     plain_mean, plain_deviation = z.mean(axis=0), z.std(axis=0)
     weighted_mean = weight @ z
     weighted_deviation = np.sqrt(weight @ (z - weighted_mean) ** 2)
-    return ErrorEstimate(
+    return (
         float(np.abs((weighted_mean - plain_mean) / plain_deviation).max()),
         float(np.abs(weighted_deviation / plain_deviation - 1.0).max()),
     )
@@ -431,9 +392,8 @@ def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression,
         if power.size and power[0] < MIN_EIGENVALUE:
             share = 0.5 * MIN_EIGENVALUE / power[0]
             return _regression(phi, share * shift, share * precision)
-    left = left / scale[:, None]
-    data = (shift @ left)[None, :]
-    return Regression(left, power, np.ascontiguousarray(right), data), shift, precision
+    data = shift @ (left / scale[:, None])
+    return Regression(power, np.ascontiguousarray(right), data), shift, precision
 
 
 def _from_others(
@@ -478,22 +438,29 @@ def conditionings(
     columns = [np.r_[stream.columns] for stream in streams]
     factor, groups = lower_factor(random.matrix), []
     for group in np.unique(random.linked, axis=0):
-        members, measured = np.flatnonzero(group), []
+        members = np.flatnonzero(group)
         of_group = np.concatenate([columns[j] for j in members])
+        marginals, noises, values, rows = [], [], [], []
         for i in members:
             name, conditions = random.names[i], fields[i].conditions
             if conditions is None:
                 continue
             conditions.check(fields[i].marginal, interface)
-            size = conditions.values.size * random.dimension(interface)
-            check_memory(f"{name}.conditions.profile", 24.0 * size, "give fewer places")
+            count, dimension = conditions.values.size, random.dimension(interface)
+            check_memory(
+                f"{name}.conditions.profile", 24.0 * count * dimension, "give fewer places"
+            )
             # z combines the property's own draws with the draws of
             # earlier properties.
             basis = fields[i].modes(interface).basis(conditions.places)
-            phi = np.zeros((len(basis), random.dimension(interface)))
+            phi = np.zeros((count, dimension))
             for j in np.flatnonzero(factor[i]):
                 phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
-            measured.append(Measured(conditions, fields[i].marginal, phi[:, of_group]))
-        if measured:
-            groups.append((of_group, conditioned(measured)))
+            marginals.append((fields[i].marginal, count))
+            noises.append(np.full(count, conditions.noise))
+            values.append(conditions.values)
+            rows.append(phi[:, of_group])
+        if marginals:
+            parts = map(np.concatenate, (values, noises, rows))
+            groups.append((of_group, conditioned(Measured(marginals, *parts))))
     return groups

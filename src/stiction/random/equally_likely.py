@@ -4,7 +4,7 @@
 for failures covers all members. For several members:
 
 1. Collect the draws of all members. Members share a draw for the same
-   property and mode (`_columns`).
+   property and mode (`_shared`).
 2. A first draw, mapped to a uniform number, selects the member
    (`EquallyLikely.member`).
 3. The member maps the other draws that it uses to profiles
@@ -14,15 +14,8 @@ for failures covers all members. For several members:
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import (
-    TYPE_CHECKING,
-    Annotated,
-    Any,
-    NamedTuple,
-    Protocol,
-    TypeAlias,
-    runtime_checkable,
-)
+from itertools import chain
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +32,18 @@ from stiction.random.fields import (
     as_random_interface,
     check_draws,
 )
-from stiction.random.synthesis import SAMPLES_PER_BLOCK, Stream, layout
+from stiction.random.synthesis import (
+    FACTORS,
+    FIRST_DRAW,
+    FIRST_FACTOR_STREAM,
+    SAMPLES_PER_BLOCK,
+    Stream,
+    draws_of,
+    layout,
+)
 
-MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, np.arange(0), mean_mode=True)
+MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, FIRST_DRAW)
 """Stream of the draw that selects a member."""
-MAX_DRAWS_OF_STREAM = 1 << 40
-"""Upper bound of the number of draws in a stream."""
 
 FORM_SHARES = np.array([0.05, 0.5, 0.95])
 """Shares whose quantiles over the mean tell marginals apart."""
@@ -174,11 +173,9 @@ class EquallyLikely:
         """
         if None in self.factor_laws[0]:
             return None
-        member = self.members[0]
-        streams = layout(member, interface)[len(member.names) :]
-        stream = dict(zip(member.between or {}, streams, strict=True))["strength"]
-        column = stream.columns.start
-        return int(_columns(self, interface).of[0][column] if self.several else column)
+        number = FIRST_FACTOR_STREAM + FACTORS.index("strength")
+        streams, _ = _shared(self, interface)
+        return next(stream.columns.start for stream in streams if stream.number == number)
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
         """Change rows of draws so that they select given members."""
@@ -205,24 +202,11 @@ class EquallyLikely:
 
     def dimension(self, interface: Interface) -> int:
         """Return the number of standard normal draws in a sample."""
-        if not self.several:
-            return self.members[0].dimension(interface)
-        return _columns(self, interface).dimension
+        return int(_shared(self, interface)[0][-1].columns.stop)
 
     def draws(self, interface: Interface, samples: int, seed: int, first: int = 0) -> Array:
         """Draw samples `first`, `first` + 1, ... as an array (samples, dimension)."""
-        if not self.several:
-            return self.members[0].draws(interface, samples, seed, first)
-        # NaN shows a column that no member has drawn.
-        draws = np.full((samples, self.dimension(interface)), np.nan)
-        draws[:, :1] = MEMBER_STREAM.draw(seed, first, samples)
-        columns = _columns(self, interface)
-        # Members that cover all columns draw them. Shared columns get
-        # the same numbers twice.
-        for number in columns.covering:
-            of_member = columns.of[number]
-            draws[:, of_member] = self.members[number].draws(interface, samples, seed, first)
-        return draws
+        return draws_of(_shared(self, interface)[0], interface, samples, seed, first)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
         """Map draws (samples, dimension) to profiles (samples, *shape) by name."""
@@ -232,7 +216,7 @@ class EquallyLikely:
         profiles = {name: np.empty((len(draws), *interface.shape)) for name in self.names}
         for name in self.varying - {*self.names}:  # of members without such a factor it is 1
             profiles[FACTOR + name] = np.ones((len(draws), *interface.shape))
-        selected, columns = self.member(draws), _columns(self, interface).of
+        selected, columns = self.member(draws), _shared(self, interface)[1]
         for number in np.unique(selected).tolist():
             rows = np.flatnonzero(selected == number)
             of_member = draws[np.ix_(rows, columns[number])]
@@ -242,36 +226,32 @@ class EquallyLikely:
         return profiles
 
 
-class MemberColumns(NamedTuple):
-    """Columns that each member uses among the draws of a mixture."""
-
-    of: list[NDArray[np.int64]]
-    dimension: int
-    covering: list[int]  # members that have all draws together
-
-
 @lru_cache(maxsize=16)
-def _columns(random: EquallyLikely, interface: Interface) -> MemberColumns:
-    # A draw is identified by its stream and
-    # its number there, combined in a key.
-    keys_of_members = []
-    for member in random.members:
-        keys = []
-        for stream in layout(member, interface):
-            modes = 1 + 2 * stream.ranks[:, None] + np.arange(2)
-            numbers = np.concatenate([np.arange(int(stream.mean_mode)), modes.ravel()])
-            keys.append(stream.number * MAX_DRAWS_OF_STREAM + numbers)
-        keys_of_members.append(np.concatenate(keys))
-    # Column 0 selects the member. The other
-    # columns are in the order of their keys.
-    all_keys = np.unique(np.concatenate(keys_of_members))
-    columns = [1 + np.searchsorted(all_keys, keys) for keys in keys_of_members]
-    drawn, covering = np.zeros(1 + all_keys.size, np.bool_), []
-    for number, of_member in enumerate(columns):
-        if not drawn[of_member].all():
-            covering.append(number)
-            drawn[of_member] = True
-    return MemberColumns(columns, drawn.size, covering)
+def _shared(
+    random: EquallyLikely, interface: Interface
+) -> tuple[list[Stream], list[NDArray[np.int64]]]:
+    """Return the streams of all members together, and the columns that each member uses.
+
+    Of several members, the first stream selects the member, and a stream
+    holds the draws that any member uses.
+    """
+    layouts = [layout(member, interface) for member in random.members]
+    if not random.several:
+        return layouts[0], [np.arange(layouts[0][-1].columns.stop)]
+    joined: dict[int, Stream] = {}
+    for stream in chain.from_iterable(layouts):
+        known = joined.setdefault(stream.number, stream).numbers
+        joined[stream.number] = stream._replace(numbers=np.union1d(known, stream.numbers))
+    start = 1
+    for number in sorted(joined):
+        stop = start + joined[number].numbers.size
+        joined[number] = joined[number]._replace(columns=slice(start, stop))
+        start = stop
+    columns = [
+        np.concatenate([joined[stream.number].places_of(stream.numbers) for stream in own])
+        for own in layouts
+    ]
+    return [MEMBER_STREAM, *(joined[number] for number in sorted(joined))], columns
 
 
 def _numbered(entries: Sequence[Any]) -> tuple[list[Any], NDArray[np.int64]]:

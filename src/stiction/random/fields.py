@@ -11,7 +11,7 @@ Algorithm (`RandomInterface.from_draws`)
    (`conditioning`).
 2. Combine a property's own draws with the draws of earlier properties
    by the Cholesky factor of the correlation matrix (`lower_factor`).
-3. Synthesise the Gaussian field z from its modes (`modes`), and map it
+3. Synthesise the Gaussian field z from its modes (`synthesis`), and map it
    to the marginal (`mapping`).
 4. Multiply by the factors between specimens. Each factor takes one draw.
 """
@@ -40,7 +40,6 @@ from stiction.base.model import (
     Positive,
     Real,
     RealArray,
-    check_memory,
     checked,
     describe,
     model,
@@ -51,9 +50,8 @@ from stiction.problem.interface import Interface
 from stiction.random.conditioning import MIN_PIVOT, Conditions, conditionings, lower_factor
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
-from stiction.random.modes import Modes, make_modes
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
-from stiction.random.synthesis import FACTORS, NAMES, layout
+from stiction.random.synthesis import FACTORS, NAMES, Modes, draws_of, layout, make_modes
 
 MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
 FACTOR = "between."  # begins the name of a factor among profiles, if its property is not random
@@ -160,14 +158,13 @@ class RandomField(Listed):
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
         """Return the quantile of the field at each node, given the measured values."""
-        z = np.full(interface.size, float(ndtri(probability)))
-        if self.conditions is not None:
+        mean, deviation = np.zeros(interface.size), np.ones(interface.size)
+        for _, conditioning in conditionings(self._alone, interface):
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
-            [(_, conditioning)] = conditionings(self._alone, interface)
-            # The marginal rises, so quantiles of
-            # z become quantiles of the field.
-            z = conditioning.quantile_at(phi, probability)
+            mean, deviation = conditioning.regression.moments(phi)
+        # The marginal rises, so quantiles of z become quantiles of the field.
+        z = mean + float(ndtri(probability)) * deviation
         return from_normal(self.marginal, z).reshape(interface.shape)
 
     def sample(
@@ -442,12 +439,7 @@ class RandomInterface(Listed):
         draws for the properties in the order of `names`, and then the
         draws for `between`.
         """
-        streams = layout(self, interface)
-        # Draws, and the profiles that follow from them.
-        numbers_per_sample = streams[-1].columns.stop + len(self.names) * interface.size
-        check_memory("samples", 8.0 * min(samples, 2**62) * numbers_per_sample)
-        draws = [stream.draw(seed, first, samples) for stream in streams]
-        return draws[0] if len(draws) == 1 else np.concatenate(draws, axis=1)
+        return draws_of(layout(self, interface), interface, samples, seed, first)
 
     @checked
     def from_draws(self, interface: Interface, draws: RealArray) -> dict[str, Array]:
@@ -469,9 +461,8 @@ class RandomInterface(Listed):
             # 2. The factor is triangular: only draws of properties up
             # to this one.
             mixed = reduce(np.add, (row[j] * independent[j] for j in np.flatnonzero(row)))
-            of_property = np.ascontiguousarray(mixed[:, stream.of_property])
             # 3.
-            z = field.modes(interface).gaussian(of_property)
+            z = field.modes(interface).gaussian(mixed.take(stream.of_property, axis=1))
             profiles[name] = from_normal(field.marginal, z)
         # 4. A factor is a single number for each sample.
         factors = zip((self.between or {}).items(), independent[len(profiles) :], strict=True)

@@ -29,9 +29,6 @@ from stiction.random.fields import FACTOR, RandomInterface
 # Shares of the strength at or below the residual strength: the largest
 # without a warning, and the largest that is accepted.
 MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
-# Probability of a factor between specimens with which a sample must
-# still have a solution, or a warning says so at the start.
-MAX_STOPPED_SHARE = 1e-6
 # Numbers of equally likely values of a random residual strength, and of
 # a pressure or factor.
 RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
@@ -146,11 +143,13 @@ def _pressures(problem: Problem, random: RandomInterface) -> Array:
 
 
 def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
-    """Return the mean of a property, Pa."""
-    field = random.properties[name]
-    return field.mean * (
-        1.0 if field.quantity is None else float(_pressures(problem, random).mean())
-    )
+    """Return the mean of a property, Pa. Factors between specimens have mean 1."""
+    field, pressure = random.properties[name], problem.normal_pressure
+    if field.quantity is None:
+        return field.mean
+    if "normal_pressure" in random.properties:
+        pressure = random.properties["normal_pressure"].mean * pressing_of(problem)
+    return field.mean * float(np.mean(pressure))
 
 
 def share_below_residual(problem: Problem, random: RandomInterface) -> float:
@@ -203,35 +202,3 @@ def check_residual(problem: Problem, random: RandomInterface) -> None:
             " the residual strength, or check the unit of both (Pa)"
         )
     warn_accuracy(f"{text}, so that these nodes do not weaken. Lower it if they should")
-
-
-def check_factors(problem: Problem, random: RandomInterface, overstress: bool) -> None:
-    """Warn if factors between specimens may give a sample without a solution.
-
-    Such a sample stops the computation. With `overstress`, the initial
-    stress may exceed the strength.
-    """
-    factors = {*(random.between or {})} & {"strength", "residual_strength", "initial_stress"}
-    if not factors:
-        return
-    low, high = support_in_stress(problem, random, "strength", MAX_STOPPED_SHARE)
-    initial = support_in_stress(problem, random, "initial_stress", MAX_STOPPED_SHARE)[1]
-    texts = []
-    if not overstress and initial >= low:
-        texts.append(
-            f"initial_stress reaches {initial:.4g} Pa, and strength goes down to {low:.4g}"
-        )
-    if "residual_strength" in factors - {*random.names}:
-        law = (random.between or {})["residual_strength"].distribution
-        value = constants_of(problem, high)["residual_strength"]
-        residual = float(np.min(value) * law.isf(MAX_STOPPED_SHARE))
-        if residual >= high:
-            texts.append(
-                f"residual_strength reaches {residual:.4g} Pa, and strength {high:.4g} Pa"
-            )
-    if texts:
-        warn_accuracy(
-            f"between.{', between.'.join(sorted(factors))}: {' and '.join(texts)}, so a rare"
-            " specimen has no solution and would stop the computation. Bound the factor, for"
-            " example by st.Beta or st.TruncatedNormal, or make it narrower"
-        )

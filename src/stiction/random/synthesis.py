@@ -1,33 +1,47 @@
-"""Make standard normal draws from (seed, sample, mode), and Gaussian fields from draws.
+"""Gaussian fields on an interface: their modes, their draws, and the sum of modes.
 
 Problem
 -------
-Compute the spectral representation (M. Shinozuka and G. Deodatis, Applied
-Mechanics Reviews 44, 1991)
+On a periodic interface a field consists of waves with k = 2 pi (jx/Lx, jy/Ly). Compute the
+spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44, 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. Sample i must depend only on the seed
-and i. Within a sample, a draw must depend only on its property and
-mode, not on the batch, the number of workers, the spectrum or the grid.
+with standard normal A_j and B_j. With the spectral density g(k) and the truncation K, the
+amplitudes have the variances
+
+    sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (2)
+
+Sample i must depend only on the seed and i. Within a sample, a draw must depend only on its
+property and mode, not on the batch, the number of workers, the spectrum or the grid.
+
+Modes (`make_modes`)
+--------------------
+1. List candidate wave vectors, either k or -k, in an order that depends only on the
+   proportions of the interface. The position of a mode in this order
+   selects its draws (`_numbers`).
+2. Keep the wave vectors up to the truncation.
+3. Compute (2). The mean mode k = 0 is a single wave
+   vector, and every other mode stands for k and -k.
+   The mean mode therefore takes half of g(0).
 
 Draws (`Stream.draw`)
 ---------------------
-1. On a line, 256 samples form a block that shares a generator, because a generator
+4. On a line, 256 samples form a block that shares a generator, because a generator
    for each sample would cost more than the sample. On a plane, a sample
    has so many modes that it forms a block by itself. The generator
    depends on the seed, the property and the number of the block.
-2. Inside a block the draws follow mode after mode, with A_j before B_j,
+5. Inside a block the draws follow mode after mode, with A_j before B_j,
    so that a spectrum with more modes extends the same field. Draws of
    modes outside the spectrum are dropped.
 
 Field (`synthesise`)
 --------------------
-3. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k,
+6. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k,
    into the half of the wave vectors that a real transform holds. Fold
    unresolved modes onto resolved modes, so that values at the nodes are
    exact on any grid.
-4. Transform back, sample by sample, so that the numbers do not depend
+7. Transform back, sample by sample, so that the numbers do not depend
    on the batch.
 
 Example
@@ -42,6 +56,9 @@ The field is cos(2 pi x/L):
 [[[1.0, 0.0, -1.0, 0.0]]]
 """
 
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
@@ -49,13 +66,167 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.base.jit import jit_allocating
+from stiction.base.model import check_memory
 from stiction.base.variables import PROFILES
+from stiction.problem.interface import Interface
 
+MAX_MODES = 1 << 22
+CUTOFF_RTOL = 1e-9  # round-off keeps a mode exactly at the truncation, such as 2.5/lambda
 SAMPLES_PER_BLOCK = 256
 NAMES = tuple(PROFILES)
 FACTORS = (*NAMES, "pressing_force")  # what may have a factor, in the order of their streams
 FIRST_FACTOR_STREAM = 1000  # number of the stream of draws of the first property's factor
+FIRST_DRAW = np.zeros(1, np.int64)  # the only draw of a stream for a single number
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Modes of a field on an interface: the mean mode, followed by J modes."""
+
+    interface: Interface
+    # Standard deviations, (J + 1,), with unit sum of squares; the first
+    # is 0 without a mean mode.
+    sigma: Array
+    # Wave vectors in units of 2 pi/length,
+    # (dimensions, J + 1), either k or -k.
+    numbers: NDArray[np.int64]
+    ranks: NDArray[np.int64]  # places of modes 1..J in the order of draws, rising, (J,)
+    has_mean: bool
+
+    @property
+    def draw_numbers(self) -> NDArray[np.int64]:
+        """Numbers of the draws: 0 for the mean mode, and 2 j and 2 j + 1 for the mode of rank j."""
+        pairs = (2 * self.ranks[:, None] + np.arange(2)).ravel()
+        return np.concatenate((FIRST_DRAW, pairs)) if self.has_mean else pairs
+
+    @property
+    def unresolved(self) -> float:
+        """Fraction of the variance at wavelengths that the nodes do not resolve."""
+        limit = np.array(self.interface.embedding.shape)[:, None] // 2
+        return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
+
+    def nodes_for(self, share: float) -> list[int]:
+        """Return how many nodes leave at most a given fraction unresolved, in equal proportions."""
+        shape = np.array(self.interface.shape)
+        halves = np.array(self.interface.embedding.shape) / 2.0
+        # Refinement of the present grid that resolves each mode.
+        refinement = (np.abs(self.numbers) / halves[:, None]).max(axis=0)
+        order = np.argsort(refinement)
+        last = np.searchsorted(np.cumsum(self.sigma[order] ** 2), 1.0 - share)
+        return [2 * math.ceil(n / 2 * refinement[order][last] - 1e-9) for n in shape.tolist()]
+
+    def gaussian(self, draws: Array) -> Array:
+        """Compute z(x) = sum_m sigma_m (A_m cos k_m.x + B_m sin k_m.x) as (samples, *shape).
+
+        Each sample has its own inverse transform, so that the result
+        does not depend on the batch.
+        """
+        shape, start = self.interface.embedding.shape, int(self.has_mean)
+        numbers = np.concatenate([np.zeros_like(self.numbers), self.numbers])[-2:]
+        if self.interface.is_free:
+            # Move the origin to the first node, which lies half a spacing
+            # from the end of a specimen.
+            phase = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
+            a, b = draws[:, start::2], draws[:, start + 1 :: 2]
+            draws = draws.copy()
+            draws[:, start::2], draws[:, start + 1 :: 2] = (
+                a * np.cos(phase) + b * np.sin(phase),
+                b * np.cos(phase) - a * np.sin(phase),
+            )
+        out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
+        synthesise(draws, self.sigma, numbers, self.has_mean, out)
+        fields = out.reshape(-1, *shape)
+        return np.ascontiguousarray(fields[:, : self.interface.shape[0]])
+
+    def basis(self, places: Array) -> Array:
+        """Return phi (points, draws), with z = phi @ draws at places (dimensions, points)."""
+        lengths = np.array(self.interface.embedding.lengths)[:, None]
+        phase = 2.0 * np.pi * (places / lengths).T @ self.numbers[:, 1:]
+        start = int(self.has_mean)
+        phi = np.empty((phase.shape[0], start + 2 * self.ranks.size))
+        phi[:, :start] = self.sigma[0]
+        phi[:, start::2] = self.sigma[1:] * np.cos(phase)
+        phi[:, start + 1 :: 2] = self.sigma[1:] * np.sin(phase)
+        return phi
+
+
+@lru_cache(maxsize=2048)
+def make_modes(
+    spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
+) -> Modes:
+    """Return the modes of a spectrum. Raise an `InputError` if there are too many or no modes.
+
+    A field on a specimen is half of a periodic field that is twice as
+    long. With this period, the correlation at lags along the specimen
+    is the same as on an infinite interface.
+    """
+    placed_on, interface = interface, interface.embedding
+    dimensions = len(interface.shape)
+    cutoff = spectrum.cutoff(dimensions)
+    units = 2.0 * math.pi / np.array(interface.lengths)
+    units[1:] *= anisotropy
+    largest = cutoff / units * (1.0 + CUTOFF_RTOL)
+    if largest.max() < 1.0 and not mean_mode:
+        raise InputError(
+            f"spectrum: is truncated at {cutoff:.3g} rad/m, below the first mode of an interface of"
+            f" {max(interface.lengths):g} m at {units.min():.3g} rad/m. Check the unit of the"
+            " correlation length (m), shorten it or raise the truncation"
+        )
+    # 1. and 2. Wave vectors.
+    numbers = _numbers(interface, largest)
+    wavenumbers = reduce(np.hypot, units[:, None] * numbers, np.zeros(1))
+    kept = np.flatnonzero(wavenumbers <= cutoff * (1.0 + CUTOFF_RTOL))
+    ranks, numbers = kept[1:], numbers[:, kept]
+    # 3. Amplitudes.
+    power = np.zeros(kept.size)
+    power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
+    if mean_mode:
+        # A mode j >= 1 stands for k and -k, the mean mode for a single
+        # wave vector.
+        power[0] = 0.5 * float(np.ravel(spectrum.density(np.zeros(1), dimensions))[0])
+    total = power.sum()
+    if not (0.0 < total < np.inf and power.min() >= 0.0):
+        raise InputError(
+            "spectrum: its power in the modes of this interface must be positive and finite,"
+            f" got {total:g} in all and {power.min():g} in a mode"
+        )
+    sigma = np.sqrt(power / total)
+    for array in (sigma, numbers, ranks):
+        array.flags.writeable = False
+    return Modes(placed_on, sigma, numbers, ranks, mean_mode)
+
+
+def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
+    """Step 1: return candidate wave vectors in units of 2 pi/length, in the order of draws.
+
+    `largest` is the cutoff along each axis, in the same units. On a
+    plane the order follows growing rectangles with the proportions of
+    the interface, so that the draws of a mode depend on neither the
+    spectrum nor the grid.
+    """
+    modes, along, across = float(largest[0]), 1, 1
+    if interface.is_plane:
+        proportion = interface.lengths[0] / interface.lengths[1]
+        along, across = max(1, round(proportion)), max(1, round(1.0 / proportion))
+        shells = float(np.ceil(np.max(np.floor(largest) / [along, across])))
+        rectangle = 2.0 * along * across * shells * shells
+        modes = max(0.5 * math.pi * float(np.prod(largest)), rectangle / 8.0)
+    if not modes <= MAX_MODES:
+        raise InputError(
+            f"spectrum: has {modes:.10g} modes on this interface, at most {MAX_MODES} are"
+            " allowed. Truncate it earlier, or check the units of the lengths"
+        )
+    if not interface.is_plane:
+        return np.arange(math.floor(modes) + 1)[None, :]
+    jx = np.arange(-along * int(shells), along * int(shells) + 1)
+    jy = np.arange(across * int(shells) + 1)
+    x, y = (grid.ravel() for grid in np.meshgrid(jx, jy, indexing="ij"))
+    half = (y > 0) | (x >= 0)  # either k or -k, and the constant
+    x, y = x[half], y[half]
+    shell = np.maximum(-(-np.abs(x) // along), -(-y // across))
+    return np.stack([x, y])[:, np.lexsort((x, y, shell))]
 
 
 def block_of(dimensions: int) -> int:
@@ -68,21 +239,18 @@ class Stream(NamedTuple):
 
     number: int  # number of the stream; never changes
     block: int  # samples that share a generator
-    ranks: NDArray[np.int64]  # modes drawn, rising
-    mean_mode: bool  # whether the mean mode is drawn
+    numbers: NDArray[np.int64]  # of the draws in the stream, rising
     columns: slice = slice(None)  # of the vector of all draws
     of_property: Any = None  # those `columns` that are modes of the property itself
 
+    def places_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the columns of some draws of the stream."""
+        return self.columns.start + np.searchsorted(self.numbers, numbers)
+
     def draw(self, seed: int, first: int, samples: int) -> Array:
         """Draw samples `first`, `first` + 1, ...: A_0, then A and B of mode after mode."""
-        ranks, block = self.ranks, self.block
-        modes = int(ranks[-1]) if ranks.size else 0
-        kept: slice | NDArray[np.int64] = slice(2, None)
-        if self.mean_mode or ranks.size < modes:
-            kept = (2 * ranks[:, None] + np.arange(2)).ravel()
-            kept = np.concatenate(([0], kept)) if self.mean_mode else kept
-        draws = np.empty((samples, 2 * ranks.size + int(self.mean_mode)))
-        # 1. Block after block.
+        block, draws = self.block, np.empty((samples, self.numbers.size))
+        # 4. Block after block.
         done = 0
         while done < samples:
             number, offset = divmod(first + done, block)
@@ -90,37 +258,39 @@ class Stream(NamedTuple):
             place = (self.number, number, block)[: 2 if block == SAMPLES_PER_BLOCK else 3]
             key = np.random.SeedSequence(entropy=seed, spawn_key=place)
             generator = np.random.Generator(np.random.PCG64DXSM(key))
-            # 2. Draw A_j and B_j of all modes, and keep the modes of
+            # 5. Draw A_j and B_j of all modes, and keep the modes of
             # the spectrum.
-            rows = generator.standard_normal((2 * (modes + 1), block))
-            draws[done : done + count] = rows[kept, offset : offset + count].T
+            rows = generator.standard_normal((self.numbers[-1] + 1, block))
+            draws[done : done + count] = rows[self.numbers, offset : offset + count].T
             done += count
         return draws
+
+
+def draws_of(
+    streams: Sequence[Stream], interface: Interface, samples: int, seed: int, first: int
+) -> Array:
+    """Draw samples `first`, `first` + 1, ... of streams as an array (samples, dimension)."""
+    # Draws, and about as many numbers in the profiles that follow from them.
+    numbers = sum(stream.numbers.size + interface.size for stream in streams)
+    check_memory("samples", 8.0 * min(samples, 2**62) * numbers)
+    return np.concatenate([stream.draw(seed, first, samples) for stream in streams], axis=1)
 
 
 @lru_cache(maxsize=8192)
 def layout(random: Any, interface: Any) -> list[Stream]:
     """Return the stream of draws for each property and each factor between specimens."""
-    fields = list(random.properties.values())
+    numbers = [field.modes(interface).draw_numbers for field in random.properties.values()]
     streams, start, block = [], 0, block_of(len(interface.shape))
-    for name, field, row in zip(random.names, fields, random.linked, strict=True):
+    for name, of_field, row in zip(random.names, numbers, random.linked, strict=True):
         # Correlated properties draw the same modes: all modes of any of them.
-        group = [fields[j] for j in np.flatnonzero(row)]
-        ranks = reduce(np.union1d, [linked.modes(interface).ranks for linked in group])
-        mean_mode = any(linked.mean_mode for linked in group)
-        columns = slice(start, start + 2 * ranks.size + int(mean_mode))
-        # Columns of the group's draws that belong to modes of this field.
-        places = np.searchsorted(ranks, field.modes(interface).ranks)
-        pairs = int(mean_mode) + 2 * places[:, None] + np.arange(2)
-        numbers: Any = np.concatenate((np.arange(int(field.mean_mode)), pairs.ravel()))
-        numbers = slice(None) if numbers.size == columns.stop - start else numbers
-        streams.append(Stream(NAMES.index(name), block, ranks, mean_mode, columns, numbers))
+        group = reduce(np.union1d, [numbers[j] for j in np.flatnonzero(row)])
+        columns = slice(start, start + group.size)
+        of_property = np.searchsorted(group, of_field)
+        streams.append(Stream(NAMES.index(name), block, group, columns, of_property))
         start = columns.stop
-    no_modes = np.arange(0)
     for column, name in enumerate(random.between or (), start):
-        number = FIRST_FACTOR_STREAM + FACTORS.index(name)
-        columns = slice(column, column + 1)
-        streams.append(Stream(number, SAMPLES_PER_BLOCK, no_modes, True, columns, no_modes))
+        number, columns = FIRST_FACTOR_STREAM + FACTORS.index(name), slice(column, column + 1)
+        streams.append(Stream(number, SAMPLES_PER_BLOCK, FIRST_DRAW, columns))
     return streams
 
 
@@ -135,7 +305,7 @@ def synthesise(
     start = 1 if has_mean else 0
     spectrum = np.empty((rows, half + 1), dtype=np.complex128)
     for i in range(samples):
-        # 3. Modes of the transform.
+        # 6. Modes of the transform.
         spectrum.fill(0.0)
         if has_mean:
             spectrum[0, 0] = 2.0 * scale * (sigma[0] * draws[i, 0])
@@ -149,7 +319,7 @@ def synthesise(
                 spectrum[p, q] += complex(a, -b)
             if q == 0 or q >= half:
                 spectrum[-p % rows, -q % columns] += complex(a, b)
-        # 4. Back.
+        # 7. Back.
         if rows == 1:
             row = np.fft.irfft(spectrum[0], columns)
             for q in range(columns):  # a loop, since numba takes seconds to compile slices
@@ -159,26 +329,3 @@ def synthesise(
             for p in range(rows):
                 for q in range(columns):
                     out[i, p, q] = field[p, q]
-
-
-@jit_allocating
-def condition(
-    right: Array, transposed: Array, offsets: Array, factors: Array, out: Array
-) -> None:
-    """Replace each row a of `out` by draws given measured values, a + V (b + f V^T a).
-
-    V is `right`, b is a row of `offsets`, and f are the `factors`.
-    """
-    dimension, count = right.shape
-    weights = np.empty(count)
-    for i in range(out.shape[0]):
-        weights[:] = 0.0
-        for j in range(dimension):
-            draw = out[i, j]
-            for k in range(count):
-                weights[k] += draw * right[j, k]
-        row = min(i, offsets.shape[0] - 1)
-        for k in range(count):
-            weight = offsets[row, k] + factors[k] * weights[k]
-            for j in range(dimension):
-                out[i, j] += weight * transposed[k, j]
