@@ -47,7 +47,6 @@ extensions = [
     "sphinx.ext.intersphinx",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
-    "architecture",
     "mathml",
     "see_also",
     "sphinx_gallery.gen_gallery",

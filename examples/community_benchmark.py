@@ -6,7 +6,7 @@ of 3 km in its middle, which breaks at once. When does the rupture arrive where?
 
     python examples/community_benchmark.py                    200 m, some seconds
     python examples/community_benchmark.py --spacing 100      about a minute, 0.4 GB of memory
-    python examples/community_benchmark.py --convergence      200, 150 and 100 m beside each other
+    python examples/community_benchmark.py --convergence      200, 150 and 100 m side by side
 """
 
 import argparse
@@ -27,7 +27,7 @@ AROUND, INSIDE = 70.0e6, 81.6e6
 FAULT, SQUARE = (30 * KM, 15 * KM), 3 * KM
 PERIOD = (60 * KM, 42 * KM)  # images of the fault are 27 km away: 4.5 s for the fastest waves
 BROKEN = (
-    1e-3  # share of the strength lost, by 0.4 mm of slip: soon after a point begins to slip
+    1e-3  # fraction of the strength lost, at 0.4 mm of slip: soon after a point begins to slip
 )
 STATIONS = {"along the slip": (7.5, 0.0), "across it": (0.0, 6.0), "oblique": (7.5, 4.5)}  # km
 RECORDED = ["slip", "slip_rate", "shear_stress"]
@@ -52,7 +52,7 @@ def benchmark(spacing: float) -> tuple[st.Problem, np.ndarray]:
     plane = st.Interface(length=PERIOD, nodes=nodes, extent=ends)
     places = np.meshgrid(*plane.coordinates.values(), indexing="ij")
     x, y = (np.abs(place - side / 2) for place, side in zip(places, PERIOD, strict=True))
-    # A node stands for its cell: one on the edge of the square lies in it by half.
+    # A node represents its cell. Half of the cell of a node on the edge lies in the square.
     inside = [np.clip((SQUARE / 2 - away) / spacing + 0.5, 0.0, 1.0) for away in (x, y)]
     initial = AROUND + (INSIDE - AROUND) * inside[0] * inside[1]
     friction = st.LinearWeakening(critical_slip=CRITICAL_SLIP, residual_strength=RESIDUAL)
@@ -122,7 +122,7 @@ def report(spacing: float, out: Path) -> None:
         found.run, files, origin=origin, normal_stress=NORMAL, benchmark="TPV3"
     )
     figure = draw(found, f"rupture time, nodes {spacing:g} m apart")
-    figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=150)
+    figure.savefig(out / f"community_benchmark_{spacing:g}m.png", dpi=200)
 
 
 def main() -> None:

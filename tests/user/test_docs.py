@@ -102,6 +102,7 @@ SHOWN = {
     "docs/tutorials/peak-forces.md": (of_peaks, {}),
     "docs/tutorials/slip-factors.md": (of_slip_factors, {}),
     "docs/guide/planes-and-ends.md": (len, {}),
+    "docs/guide/reading-data.md": (len, {}),
     "docs/guide/specimens.md": (len, {}),
     "docs/evidence/laboratory-fault.md": (len, {}),
     "docs/tutorials/joint.md": (of_decisions, {
@@ -142,7 +143,7 @@ def run_blocks(text, scope, replaced=()):
                 assert float(number) == pytest.approx(float(given), abs=2.01 * unit), line
 
 
-QUICK = ("docs/guide/studies.md",)
+QUICK = ("docs/guide/studies.md", "docs/guide/reading-data.md")
 
 
 @pytest.mark.parametrize(
