@@ -96,7 +96,6 @@ SHOWN = {
         "bootstrap=60": "bootstrap=20",
         "samples=20": "samples=4",
         "samples=100": "samples=40",
-        r"moving = .*\n.*\nrun = .*\n.*\n.*": "",  # ruptures: minutes on a small machine
     }),
     "docs/guide/failure-probability.md": (of_reliability, {}),
     "docs/tutorials/peak-forces.md": (of_peaks, {}),
