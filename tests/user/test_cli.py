@@ -21,7 +21,7 @@ from small_study import lengths, small_study
 import stiction as st
 from stiction.base import files
 from stiction.base.errors import StoreError
-from stiction.cli.report import shown
+from stiction.cli.pages import shown
 from stiction.ensemble.store import Store
 from stiction.study import run as runs_on_disk
 

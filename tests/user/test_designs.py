@@ -160,7 +160,7 @@ def test_a_page_of_a_design(tmp_path):
     )  # fmt: skip
     text = path.read_text(encoding="utf-8")
     for words in (
-        "Lap joint 7", "reliability index", f"{design.partial_factor:.3g}", "drawing 12",
+        "Lap joint 7", "reliability index", f"{design.partial_factor:.6g}", "drawing 12",
         "assumed", "Evidence: Lognormal", PRESSURE, "size: A4", "data:image/png",
     ):  # fmt: skip
         assert words in text, words

@@ -1,6 +1,7 @@
 """Planes of which not all is known: what is warned of, and by how much."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from crooked import PLANE, PLANE_STRENGTH
 from setups import exact_onset
 
 import stiction as st
+from stiction.cli.pages import write_report
 from stiction.methods.equilibrium import solver
 from stiction.methods.equilibrium.endings import Outcome, PathStatus
 from stiction.methods.equilibrium.state import Jump
@@ -64,3 +66,21 @@ def test_the_sample_that_fails_is_named(monkeypatch):
     with pytest.raises(FloatingPointError) as caught:
         exact_onset(PLANE, TWO[[0, 1, 0]])
     assert caught.value.__notes__ == ["in sample 1 of the 3 that were solved together"]
+
+
+def test_a_study_of_given_profiles_and_its_report(tmp_path):
+    """The onset is that of the profiles alone, and its table has both components of the place."""
+    study = st.Study(
+        problem=PLANE, profiles={"strength": PLANE_STRENGTH}, method=st.LocalCriterion()
+    )
+    result = study.run(out=tmp_path / "run", progress=False)
+    alone = st.onset(PLANE, PLANE_STRENGTH, method=st.LocalCriterion())
+    np.testing.assert_array_equal(result.critical_position, alone.critical_position)
+    write_report(st.open_run(tmp_path / "run"), tmp_path / "page.html")
+    x, y = 1e3 * alone.critical_position.values[0]
+    text = (tmp_path / "page.html").read_text("utf-8")
+    row = re.search(
+        r"position x \(mm\).*position y \(mm\).*<td>(.*?)</td><td>(.*?)</td></tr>", text, re.S
+    )
+    assert row[1] == f"{x:.5g}"
+    assert row[2] == f"{y:.5g}"

@@ -139,18 +139,13 @@ def run(
       stiction run study.toml --out run
       stiction run study.toml --out run --part 3/100
     """
-    import pandas as pd
-
     loaded = st.Study.from_toml(study)
     with _resumable(out), _executor(scheduler) as executor:
         result = loaded.run(out=out, workers=workers, executor=executor, part=part, pilot=pilot)
-    from stiction.cli.report import Page, add_tables  # matplotlib, once the samples are stored
+    from stiction.cli.pages import shown, tables_of  # matplotlib, once the samples are stored
 
-    page = Page("")
-    add_tables(page, result, loaded.axes)
-    for table in page.parts:
-        rows = pd.DataFrame(table["rows"], columns=table["columns"])
-        echo(f"{table['title']}\n{rows.to_string(index=False, max_rows=48)}")
+    for title, frame in tables_of(result, loaded.axes):
+        echo(f"{title}\n{frame.map(shown).to_string(index=False, max_rows=48)}")
     if (state := _state_of(out, part)).failures:
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
@@ -244,7 +239,7 @@ def report(
       stiction report run --out page.html
     """
     _ignore_local_style()
-    from stiction.cli.report import write_report
+    from stiction.cli.pages import write_report
 
     path, stored = out or run / "report.html", st.open_run(run)
     with Meter("writing the report"):
@@ -420,13 +415,14 @@ def reliability(
         where = f"{point}: " if point.values else ""
         answer = question.answer(experiment, workers)
         echo(f"{where}{answer}")
-        evidence = []
+        evidence: list[Any] = []
         if loaded.peaks is not None:
             predicted = st.monte_carlo(
                 experiment.problem, experiment.random, method=experiment.method,
                 samples=COMPARED_SAMPLES, seed=experiment.seed, workers=workers,
             )  # fmt: skip
-            evidence.append(st.statistics.agreement(predicted, loaded.peaks))
+            # The peaks name their file and column.
+            evidence = [st.statistics.agreement(predicted, loaded.peaks), loaded.peaks]
             echo(f"{where}{evidence[0]}")
         if page is not None:
             path = page.with_stem(page.stem + (f"_{point.number}" if point.values else ""))

@@ -249,6 +249,11 @@ class Measured(Experiment):
         return self.random
 
     @property
+    def dimension(self) -> int:
+        """Number of draws in a sample, which needs none."""
+        return 0
+
+    @property
     def variables(self) -> dict[str, Variable]:
         """Variables of `results` by name."""
         return variables_of(self.problem, self.method, "normal_pressure" in self.random)

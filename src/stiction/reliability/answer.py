@@ -279,10 +279,14 @@ class Answer(Result):
         True
         """
         # The page is drawn by an upper layer, which is imported when it is needed.
-        pages = import_module("stiction.cli.design_page")
-        place = Path(path)
-        pages.write_page(self, place, evidence, sources or {}, title)
-        return place
+        pages = import_module("stiction.cli.pages")
+        pages.write_design(self, Path(path), evidence, sources or {}, title)
+        return Path(path)
+
+    @property
+    def _demand(self) -> tuple[str, float]:
+        """Unit of the demand, and the factor from stresses: N if the area is known, else Pa."""
+        return ("Pa", 1.0) if math.isnan(self.area) else ("N", self.area)
 
     def _summary(self) -> Summary:
         values = {
@@ -296,57 +300,62 @@ class Answer(Result):
         first = self.quantity if self.of_stress else "probability"
         order = dict.fromkeys([first, self.quantity, *values])
         names = sorted(order, key=lambda name: name == "probability" and self.of_stress)
+        interval = {} if self.algorithm == "exact" and not self.cv else self.interval
+        unit, scale = self._demand
+        characteristic, low, high = scale * self.characteristic_stress, *self.band
         rows = [
             Row(
-                name.replace("_", " "),
-                values[name][0],
-                ()
-                if self.algorithm == "exact" and not self.cv
-                else self.interval.get(name, ()),
-                values[name][1],
+                name.replace("_", " "), values[name][0], interval.get(name, ()), values[name][1]
             )
             for name in names
         ]
         rows += [
             Row("coefficient of variation", self.cv or math.nan),
             Row("part of it by the list of interfaces", self.members_cv or math.nan),
-            Row("90 % of interfaces are between", self.band[0], self.band),
-            Row(
-                "95 % of interfaces have at most",
-                self.band[1] if math.isnan(self.band[0]) else math.nan,
-            ),
+            Row("90 % of interfaces are between", low, self.band),
+            Row("95 % of interfaces have at most", high if math.isnan(low) else math.nan),
             Row("share that survives any stress", self.survived or math.nan),
             Row("reliability index", self.reliability_index),
             Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
-            Row("characteristic stress", self.characteristic_stress, (), "Pa"),
+            Row(
+                f"5 % value, confidence {100.0 * self.confidence:g} %", characteristic, (), unit
+            ),
             Row("partial factor", self.partial_factor),
         ]
         known = [row for row in rows if math.isfinite(row.value)]
         title = "Design value" if self.of_stress else "Probability of sliding"
         if math.isinf(self.stress):
             title = "No stress has this probability"
-        basis = f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"
-        notes = [*self.warnings, *self.doubts, *unseen_batch(self.specimens)]
-        return Summary(title, known, "90 % interval", [basis, *self._moves(), *notes])
+        notes = [f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"]
+        if moves := moves_of(self):
+            notes.append(
+                "the interval is the error of the computation only; the design moves by:"
+            )
+        for source, least, most, *designs in moves:
+            ends = " to ".join(filter(None, (least, most)))
+            notes.append(f"  {source}: {ends}: {' to '.join(filter(None, designs))}")
+        notes += [*self.warnings, *self.doubts, *unseen_batch(self.specimens)]
+        return Summary(title, known, "90 % interval", notes)
 
-    def _moves(self) -> list[str]:
-        """Return lines of text that show how each assumption changes the design."""
-        effects = self.sensitivities
-        if not effects.sizes.get("source"):
-            return []
-        unit, area = ("Pa", 1.0) if math.isnan(self.area) else ("N", self.area)
 
-        def words(values: Sequence[float]) -> list[str]:
-            return [in_words(unit, area * value) for value in values]
+def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
+    """Return what moves a design: each source, its ends, and the design at both ends, in words.
 
-        lines = ["the interval holds the error of the computation only; what moves the design:"]
-        for row in effects.to_dataframe().itertuples():
-            ends = " to ".join(words([row.stress_at_low, row.stress_at_high]))
-            lines.append(f"  {row.Index}: {row.low} to {row.high}: {ends}")
-        families = self.by_family
-        pairs = zip(families, words(list(families.values())), strict=True)
-        text = ", ".join(" ".join(pair) for pair in pairs)
-        return [*lines, *[f"  by family of the factor between specimens: {text}"] * bool(text)]
+    A family of the factor between specimens has a single design.
+    """
+    effects, (unit, scale) = design.sensitivities, design._demand
+    if not effects.sizes.get("source"):
+        return []
+
+    def words(stress: float) -> str:
+        return in_words(unit, scale * stress)
+
+    rows = [
+        (str(row.Index), row.low, row.high, words(row.stress_at_low), words(row.stress_at_high))
+        for row in effects.to_dataframe().itertuples()
+    ]
+    families = design.by_family.items()
+    return rows + [("family of the factor", name, "", words(v), "") for name, v in families]
 
 
 def unseen_batch(specimens: int) -> list[str]:

@@ -299,14 +299,21 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     return _frame_of(result.drop_vars(wide))
 
 
-def _frame_of(narrow: xr.Dataset) -> pd.DataFrame:
-    """Return a column for each variable or component, named ``name (unit)``."""
-    for name, values in narrow.data_vars.items():
-        if DIRECTION in values.dims:  # a column for each component
+def components(result: xr.Dataset) -> xr.Dataset:
+    """Return a result with a variable such as critical_position_x for each component."""
+    for name, values in result.data_vars.items():
+        if DIRECTION in values.dims:
             parts = {
-                f"{name}_{c.item()}": values.sel({DIRECTION: c}) for c in values[DIRECTION]
+                f"{name}_{c.item()}": values.sel({DIRECTION: c}, drop=True)
+                for c in values[DIRECTION]
             }
-            narrow = narrow.drop_vars([name]).assign(parts)
+            result = result.drop_vars([name]).assign(parts)
+    return result
+
+
+def _frame_of(result: xr.Dataset) -> pd.DataFrame:
+    """Return a column for each variable or component, named ``name (unit)``."""
+    narrow = components(result)
     rows = list(dict.fromkeys(dim for v in narrow.data_vars.values() for dim in v.dims))
     narrow = narrow.drop_dims({*narrow.dims} - {*rows})
     names = dict.fromkeys([*narrow.coords, *rows, *narrow.data_vars])
