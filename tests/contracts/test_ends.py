@@ -11,7 +11,7 @@ import pytest
 
 import stiction as st
 from stiction.methods.dynamics.method import make_run
-from stiction.problem.resolution import nodes_in_nucleation_length
+from stiction.problem.checks import nodes_in_nucleation_length
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1200.0)

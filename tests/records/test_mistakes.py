@@ -28,8 +28,8 @@ from stiction.ensemble import monte_carlo
 from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
 from stiction.inference.peaks import make_peaks
+from stiction.problem.checks import doubt_strengths
 from stiction.problem.sample import own_sample  # noqa: F401  # mistakes.json calls it
-from stiction.problem.unit_doubts import doubt_strengths
 
 LINE, PROBLEM = st.Interface(0.1, 256), make_problem()
 SCALELESS = make_problem(weakening_rate=None)

@@ -10,7 +10,7 @@ from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.methods.equilibrium.solver import follow_to_sliding
-from stiction.problem.unit_doubts import doubt_sample, doubt_strengths
+from stiction.problem.checks import doubt_sample, doubt_strengths
 
 LINE = st.Interface(0.1, 256)
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)

@@ -1,12 +1,10 @@
 """Files as instruments and spreadsheets write them: the same numbers, or a refusal that helps."""
 
-import struct
-import sys
-
 import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+import xarray as xr
 from refusals import refuses
 
 import stiction as st
@@ -165,36 +163,24 @@ def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [30_000]
 
 
-def test_binary_files_of_instruments(tmp_path, monkeypatch):
-    """ISO 25178-71 (.sdf), written byte by byte, and objects of SurfaceTopography."""
-    surfaces = pytest.importorskip("SurfaceTopography")
-    heights = (
-        np.random.default_rng(0).normal(size=(6, 4)) * 1e-6
-    )  # lines along y, points along x
-    head = struct.pack(
-        "<8s10s12s12sHHddddBBB", b"bISO-1.0", b"test", b"010120260000", b"010120260000",
-        4, 6, 5e-7, 2.5e-7, 1.0, -1.0, 0, 7, 0,
-    )  # fmt: skip
-    path = tmp_path / "scan.sdf"
-    path.write_bytes(head + heights.astype("<f8").tobytes())
-    profile = st.read_profile(path, quantity="height")
-    np.testing.assert_allclose(profile, heights.T, rtol=1e-12)
-    np.testing.assert_allclose(profile.x, 5e-7 * np.arange(4), rtol=1e-12)
-    np.testing.assert_allclose(profile.y, 2.5e-7 * np.arange(6), rtol=1e-12)
-    refuses("holds heights ... strength=", lambda: st.read_profile(path))
-    strength = st.read_profile(path, strength=lambda h: 1e6 + 1e11 * h)
-    np.testing.assert_allclose(strength, 1e6 + 1e11 * heights.T, rtol=1e-12)
-    refuses("a strength for each", lambda: st.read_profile(path, strength=lambda h: h[0]))
-    refuses("must be positive", lambda: st.read_profile(path, strength=lambda h: h))
-    line = surfaces.UniformLineScan(heights[0] * 1e6, 2.0, unit="µm")
-    read_line = st.read_profile(line, quantity="height")
-    np.testing.assert_allclose(read_line, heights[0], rtol=1e-12)
-    np.testing.assert_allclose(read_line.x, 5e-7 * np.arange(4), rtol=1e-12)
-    path.with_suffix(".sur").write_bytes(b"no surface")
-    broken = path.with_suffix(".sur")
-    refuses("SurfaceTopography", lambda: st.read_profile(broken, quantity="height"))
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    refuses("stiction[instruments]", lambda: st.read_profile(path, quantity="height"))
+def test_heights_become_strengths_by_a_map():
+    heights = np.random.default_rng(0).normal(size=(6, 4)) * 1e-6
+    places = {"x": 5e-7 * np.arange(6), "y": 2.5e-7 * np.arange(4)}
+    scan = xr.DataArray(heights * 1e6, places, ("x", "y"), attrs={"units": "um"})
+    profile = st.read_profile(scan, quantity="height")
+    np.testing.assert_allclose(profile, heights, rtol=1e-12)
+    refuses("is in um", lambda: st.read_profile(scan))
+    strength = st.read_profile(scan, strength=lambda h: 1e6 + 1e11 * h)
+    np.testing.assert_allclose(strength, 1e6 + 1e11 * heights, rtol=1e-12)
+    refuses("a strength for each", lambda: st.read_profile(scan, strength=lambda h: h[0]))
+    refuses("must be positive", lambda: st.read_profile(scan, strength=lambda h: h))
+
+
+@pytest.mark.parametrize("mark", ["9.9E37", "-9.9e37", "9.91E37"])
+def test_marks_of_an_overload_are_no_strengths(tmp_path, mark):
+    rows = "\n".join(["x (mm);strength (MPa)", *ROWS, f"4;{mark}"])
+    refuses("in line 6 ... overload ... missing=", lambda: read(tmp_path, rows))
+    assert is_read(read(tmp_path, rows, missing=float(mark))[:4])
 
 
 @pytest.mark.parametrize("separator", " _:.")

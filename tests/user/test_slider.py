@@ -111,11 +111,8 @@ REFUSED = {
         sampled(problem={"load": st.Load(normal_pressure=np.linspace(1e6, 2e6, 64))}),
     ),
     "a pressure along a sample": (
-        "normal_pressure ... mean",
-        sampled(
-            {"strength": MU, "normal_pressure": np.linspace(1e6, 2e6, 64)},
-            problem={"load": st.Load()},
-        ),
+        "load.pressing_force ... no effect ... normal_pressure: follows from the rig",
+        sampled({"strength": MU, "normal_pressure": np.linspace(1e6, 2e6, 64)}),
     ),
     "random stresses": (
         "random.strength ... friction coefficients",

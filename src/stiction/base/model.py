@@ -35,11 +35,16 @@ import pydantic_core
 from pydantic import BeforeValidator, ConfigDict, Field, InstanceOf, PlainSerializer
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 
-from stiction.base.arrays import Array
 from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
 from stiction.base.representation import brief, equal, hash_of, html_of
-from stiction.base.units import is_quantity, magnitude_in_one_of, states_unit, units_of_argument
+from stiction.base.units import (
+    as_numbers,
+    is_quantity,
+    magnitude_in_one_of,
+    states_unit,
+    units_of_argument,
+)
 
 T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -98,30 +103,6 @@ def is_finite(value: Any) -> bool:
     return False
 
 
-def real_array(value: Any) -> Array:
-    """Return `value` as a float64 array, or raise a TypeError that names its data type."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise TypeError("got a masked array; fill it, as in np.ma.filled(values, np.nan)")
-    try:
-        given = np.asarray(value)
-    except ValueError:
-        raise TypeError("got rows of unequal length") from None
-    if given.dtype.kind not in "fiu":
-        kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
-        text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
-        read = ". st.read_profile(path) reads a file" if Path(text).suffix else ""
-        raise TypeError(f"got {kind}{read}")
-    return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
-
-
-def as_numbers(value: Any) -> Array:
-    """Return `value` as a float64 array, or raise an `InputError`."""
-    try:
-        return real_array(value)
-    except (TypeError, OverflowError) as error:
-        raise InputError(f"must be numbers, {error}") from None
-
-
 def is_unplaced(value: Any) -> bool:
     """Return whether a profile has its own coordinates or units, which its problem resolves."""
     return is_quantity(value) or any(hasattr(value, name) for name in ("dims", "to_xarray"))
@@ -149,10 +130,7 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         if not is_finite(as_number(value)):
             raise ValueError("must be finite")
         return as_number(value)
-    try:
-        array = np.array(real_array(value))
-    except TypeError as error:
-        raise ValueError(f"must be a number or an array of numbers, {error}") from None
+    array = np.array(as_numbers(value))
     if array.ndim not in (1, 2) or array.size == 0:
         raise ValueError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
     if not np.all(np.isfinite(array)):

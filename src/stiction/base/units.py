@@ -1,4 +1,4 @@
-"""Units of measured data, their factors to SI, and quantities from other packages.
+"""Numbers and units of measured data, their factors to SI, and quantities from other packages.
 
 A unit is read from its text, and no unit is
 guessed. The page `docs/guide/reading-data.md`
@@ -9,12 +9,14 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.base.errors import InputError, UnitWarning, warn_user
-from stiction.base.variables import OF_THE_FIELD, UNITS
+from stiction.base.arrays import Array
+from stiction.base.errors import AccuracyWarning, InputError, UnitWarning, warn_user
+from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
 
 
 class Unit(NamedTuple):
@@ -137,19 +139,26 @@ def states_unit(text: str) -> bool:
     return False
 
 
-def factor_to(si: str, text: str) -> float:
-    """Return the factor from the unit `text` to the SI unit `si`."""
-    wanted, given = parse(si), parse(text)
-    assert wanted is not None
+def conversion(text: str, units: Sequence[str]) -> tuple[float, str]:
+    """Return the factor from a unit to the first SI unit of its dimension, and this SI unit."""
+    given = parse(text)
     if given is None:
         near = [name for name in _COMMON.split(", ") if name.lower() == text.strip().lower()]
         hint = f"; did you mean {near[0]}?" if near else ""
         raise InputError(
             f"unknown unit {text!r}{hint} (known: {_COMMON}, products and quotients such as MPa/mm)"
         )
-    if given.powers != wanted.powers:
-        raise InputError(f"is in {text}, which cannot be converted to {si}")
-    return given.factor / wanted.factor
+    for si in units:
+        wanted = parse(si)
+        assert wanted is not None
+        if given.powers == wanted.powers:
+            return given.factor / wanted.factor, si
+    raise InputError(f"is in {text}, which cannot be converted to {' or '.join(units)}")
+
+
+def factor_to(si: str, text: str) -> float:
+    """Return the factor from the unit `text` to the SI unit `si`."""
+    return conversion(text, (si,))[0]
 
 
 def unit_for(units: str, values: Any) -> tuple[float, str]:
@@ -223,15 +232,17 @@ def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     A list of quantities becomes an array. Other values are returned as given.
     """
     units = tuple(units)
-    if isinstance(value, list | tuple) and value and all(map(is_quantity, value)):
+    if isinstance(value, list | tuple) and any(map(is_quantity, value)):
+        if not all(map(is_quantity, value)):
+            raise InputError(
+                "holds quantities and numbers without a unit: give all of them a unit"
+            )
         pairs = [magnitude_in_one_of(item, units) for item in value]
         if len({unit for _, unit in pairs}) > 1:
             raise InputError(
                 "holds quantities of several kinds: give all of them in the same unit"
             )
         return np.array([number for number, _ in pairs], dtype=np.float64), pairs[0][1]
-    if isinstance(value, list | tuple) and any(map(is_quantity, value)):
-        raise InputError("holds quantities and numbers without a unit: give all of them a unit")
     number, unit = magnitude_in_one_of(value, units)
     if isinstance(number, np.ma.MaskedArray):
         if number.size and np.ma.getmaskarray(number).all():
@@ -248,7 +259,115 @@ def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     return number, unit
 
 
-# -- doubts -------------------------------------------------------------------------------------
+def as_numbers(value: Any) -> Array:
+    """Return `value` as a float64 array, or raise an `InputError` that names its type."""
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise InputError(
+            "must be numbers, got a masked array; fill it, as in np.ma.filled(values, np.nan)"
+        )
+    try:
+        given = np.asarray(value)
+    except (ValueError, OverflowError):
+        raise InputError("must be numbers, got rows of unequal length") from None
+    if given.dtype.kind not in "fiu":
+        kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
+        text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
+        read = ". st.read_profile(path) reads a file" if Path(text).suffix else ""
+        raise InputError(f"must be numbers, got {kind}{read}")
+    return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
+
+
+def stated_unit(array: Any) -> str:
+    """Return the unit that a labelled array states, '' if it states no unit."""
+    return str(array.attrs.get("units") or array.attrs.get("unit") or "").strip()
+
+
+def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[Array, str]:
+    """Return the values of a labelled array in SI, and their unit, the first that fits.
+
+    The unit is that of a quantity, of the caller, `given`, or of the source.
+    """
+    numbers, stated = array.data, stated_unit(array)
+    if type(numbers) is not np.ndarray or numbers.dtype.kind not in "fiu":
+        numbers, of_quantity = plain(numbers, units)
+        numbers, stated = as_numbers(numbers), of_quantity or stated
+    factor, si = conversion(given or stated or units[0], units)
+    if given:
+        check_agreement(given, stated)
+    values = np.ascontiguousarray(numbers, dtype=np.float64).reshape(numbers.shape)
+    return np.asarray(values * factor), si
+
+
+def check_agreement(given: str, stated: str) -> None:
+    """Refuse a unit of the caller that differs from the unit that the source states."""
+    ours, theirs = parse(given), parse(stated)
+    if (
+        ours
+        and theirs
+        and not np.allclose(ours.factor / theirs.factor, 1.0, rtol=1e-12, atol=0.0)
+    ):
+        raise InputError(
+            f"is given in {given}, but the source states {stated}. Leave the unit out, or correct"
+            " the source"
+        )
+
+
+# -- measured values ----------------------------------------------------------------------------
+
+POSITIVE = (
+    "strength", "normal_pressure", "critical_slip", "weakening_rate", "fracture_energy",
+    "friction_coefficient",
+)  # fmt: skip
+"""Quantities whose values lie above zero."""
+STRENGTHS = ("strength", "residual_strength")
+"""Quantities in Pa that may be given as friction coefficients."""
+OVERLOAD = 9.9e37
+"""Smallest number with which an instrument marks an overload or a missing value (SCPI)."""
+MARKS = np.array([-99.0, -999.0, -999.25, -9999.0, -99999.0, -32768.0, 1e20, 1e30, 9.96921e36])
+"""Further numbers that instruments and formats write for a missing value."""
+TALL = 1e-3
+"""Range of heights without a unit, m, above which they are probably in um or nm."""
+
+
+def check_measured(
+    values: Array, quantity: str, lines: Any = (), given: Any = None, doubted: bool = True
+) -> None:
+    """Refuse measured values that mark an overload, or are not positive as their quantity is.
+
+    If they are `doubted`, warn about a number that is far from all
+    others and often means that a value is missing. In messages, values
+    stand as `given`, with their line in a table or their number.
+    """
+    shown = np.ravel(values if given is None else given)
+
+    def place(wrong: Any) -> str:
+        entry = int(np.argmax(wrong))
+        return f"line {lines[entry]}" if np.size(lines) == wrong.size else f"entry {entry}"
+
+    if (beyond := np.abs(shown) >= OVERLOAD).any():
+        number = f"{shown[beyond][0]:.9g}"
+        raise InputError(
+            f"{quantity} holds {number} in {place(beyond)}, which marks an overload of the"
+            f" instrument. Cut the record there, or pass missing={number} if a value is missing"
+        )
+    if quantity in POSITIVE and (wrong := np.ravel(values) <= 0.0).any():
+        number = f"{shown[wrong][0]:.9g}"
+        raise InputError(
+            f"{quantity} must be positive, is {number} in {place(wrong)}"
+            f" ({np.count_nonzero(wrong)} such values). If it means that a value is missing, pass"
+            f" missing={number} to st.read_profile, or make it NaN"
+        )
+    known = shown[np.isfinite(shown)]
+    for end in (known.min(), known.max()) if doubted and known.size else ():
+        rest = known[known != end]
+        usual = np.isclose(end, MARKS, rtol=1e-5, atol=0.0).any()
+        if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
+            warn_user(
+                f"{quantity}: {end:.9g} occurs in {place(shown == end)}"
+                f" ({known.size - rest.size} such values), and often means that a value is missing."
+                f" Pass missing={end:.9g}, or missing=()",
+                AccuracyWarning,
+            )
 
 
 class Doubt(NamedTuple):
@@ -271,3 +390,52 @@ def doubt_units(doubts: Iterable[Doubt]) -> bool:
     if unusual:
         warn_user(unusual[0].text, UnitWarning)
     return bool(unusual)
+
+
+def profile_in_si(
+    value: Any,
+    quantity: str,
+    units: Sequence[str] = (),
+    *,
+    unit: str | None = None,
+    x_unit: str | None = None,
+    doubted: bool = True,
+) -> Any:
+    """Return a profile with its values, and its coordinates x and y, in SI and checked.
+
+    Numbers become an array. A DataArray states its unit in the
+    attribute `units`: a strength may also be a friction coefficient, 1.
+    """
+    units = units or (QUANTITIES[quantity].units, *["1"] * (quantity in STRENGTHS))
+    if not hasattr(value, "dims"):
+        return as_numbers(plain(value, units[:1])[0])
+    parts = {quantity: (value, units, unit)}
+    parts |= {dim: (value[dim], ("m",), x_unit) for dim in ("x", "y") if dim in value.coords}
+    converted, lines = {}, value.attrs.get("lines", ())
+    for name, (array, valid, given) in parts.items():
+        try:
+            converted[name] = in_si(array, valid, given)
+        except InputError as error:
+            raise InputError(f"{name} {text}" for text in error.problems) from None
+    values, si = converted.pop(quantity)
+    shown = value.values if isinstance(value.data, np.ndarray) else values
+    check_measured(values, quantity, lines, shown, doubted)
+    if quantity == "height" and not (unit or stated_unit(value)):
+        known = values[np.isfinite(values)]
+        if known.size and np.ptp(known) > TALL:
+            warn_user(
+                f"height: has no unit and is read in m. The heights span {np.ptp(known):.3g} m."
+                " Pass unit='um' or another unit, or unit='m' if metres are right",
+                UnitWarning,
+            )
+    profile = value.copy(data=values)
+    profile.attrs = {"units": si}
+    for dim, (places, _) in converted.items():
+        if not np.isfinite(places).all():
+            entry = int(np.argmin(np.isfinite(places)))
+            where = (
+                f"line {lines[entry]}" if np.size(lines) == places.size else f"entry {entry}"
+            )
+            raise InputError(f"{dim} must be finite, and {where} is not")
+        profile = profile.assign_coords({dim: (value[dim].dims, places)})
+    return profile

@@ -22,7 +22,7 @@ from typer import Argument, Option
 import stiction as st
 from stiction.base.errors import InputError, RunError, collect_warnings, printable
 from stiction.base.progress import Meter, duration, interrupted
-from stiction.problem.resolution import nodes_in_nucleation_length
+from stiction.problem.checks import nodes_in_nucleation_length
 
 MAX_SHOWN_LINES = 12
 """Points, failures or damaged chunks in a list."""

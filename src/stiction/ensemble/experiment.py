@@ -31,11 +31,11 @@ from stiction.methods.protocol import (
     seconds_per_sample,
     variables_of,
 )
+from stiction.problem.checks import doubt_strengths
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along
 from stiction.problem.sample import Sample, given_twice, own_sample
-from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import as_random
 from stiction.random.stresses import (
     check_pressure,

@@ -70,8 +70,8 @@ from stiction.inference.specimens import (
 from stiction.methods.criterion.local import LocalCriterion
 from stiction.methods.equilibrium.method import Equilibrium
 from stiction.methods.protocol import MethodObject
+from stiction.problem.checks import doubt_strengths
 from stiction.problem.problem import Problem
-from stiction.problem.unit_doubts import doubt_strengths
 from stiction.random.equally_likely import AnyRandom, Source, as_random, specimens_of_fit
 from stiction.random.stresses import mean_in_stress
 

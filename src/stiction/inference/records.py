@@ -27,11 +27,12 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
-from stiction.base.model import as_numbers
+from stiction.base.units import check_measured, profile_in_si
+from stiction.base.variables import QUANTITIES
 from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
-from stiction.problem.profiles import points_of
-from stiction.problem.reading.labels import check_positive, is_labelled, labelled, simplified
+from stiction.problem.reading.labels import named
+from stiction.problem.sample import points_of
 
 MIN_RECORD_POINTS = 64
 """Fewest measured points from which a spectrum can be estimated."""
@@ -87,10 +88,12 @@ def _is_scalar(value: Any) -> bool:
 
 
 def _records(source: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    values = simplified(source, quantity)
+    values: Any = profile_in_si(
+        named(source, quantity), quantity, (QUANTITIES[quantity].units,)
+    )
     places: dict[str, Array] = {}
-    if is_labelled(values):
-        values, places = points_of(labelled(values, quantity))
+    if hasattr(values, "dims"):
+        values, places = points_of(values)
     if not places:
         return _of_array(values, interface)
     # 1. and 2. Points in any order, and missing points, find their
@@ -111,9 +114,8 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
     return [Record(one, tuple(spacings)) for one in full]
 
 
-def _of_array(values: Any, interface: Interface | None) -> list[Record]:
+def _of_array(array: Array, interface: Interface | None) -> list[Record]:
     """Return records from values (*shape) or (samples, *shape) at the nodes of an interface."""
-    array = as_numbers(values)
     if interface is None:
         raise InputError(
             "an array has no point spacing. Give the interface, or a DataArray over 'x' (m)"
@@ -160,7 +162,7 @@ def _checked(record: Record, quantity: str) -> Record:
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
-    check_positive(record.values, quantity)
+    check_measured(record.values, quantity, doubted=False)
     # The median absolute deviation of a normal sample is its deviation
     # over 1.4826.
     aside = np.abs(values - np.median(values))

@@ -28,10 +28,10 @@ from stiction.methods.protocol import (
     prepared,
     seconds_per_sample,
 )
+from stiction.problem.checks import doubt_sample
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import study_attributes
 from stiction.problem.sample import Sample
-from stiction.problem.unit_doubts import doubt_sample
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed
-from stiction.base.model import as_numbers, check, is_whole
+from stiction.base.model import check, is_whole
 from stiction.base.units import unit_for
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.methods.criterion.local import nucleation_stress
@@ -121,9 +121,8 @@ def field(
 def rows_of(interface: Interface, profile: Any, quantity: str = "strength") -> Array:
     """Return a profile as (samples, *shape) in SI, with NaN in gaps, or raise an `InputError`."""
     shape = interface.shape
-    given = at_nodes(quantity, profile, interface, missing=True)
     with prefixed("profile"):
-        values = as_numbers(given)
+        values = at_nodes(quantity, profile, interface, missing=True)
     if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1 or values.size == 0:
         wanted = ", ".join(map(str, shape))
         raise InputError(

@@ -334,12 +334,12 @@ class Interface(Listed):
         ]
         return max(sides)
 
-    @property
+    @cached_property
     def is_free(self) -> bool:
         """Whether the interface ends, as in a specimen, instead of being periodic."""
         return self.ends == "free"
 
-    @property
+    @cached_property
     def first(self) -> float:
         """Distance of the first node from the beginning, in spacings."""
         return 0.5 if self.is_free else 0.0
@@ -351,37 +351,37 @@ class Interface(Listed):
             return self
         return Interface(2.0 * self.measure, 2 * self.size)
 
-    @property
+    @cached_property
     def lengths(self) -> tuple[float, ...]:
         """Period in each direction, m."""
         return self.length if isinstance(self.length, tuple) else (self.length,)
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Number of nodes in each direction, which is the shape of a profile."""
         return self.nodes if isinstance(self.nodes, tuple) else (self.nodes,)
 
-    @property
+    @cached_property
     def dims(self) -> tuple[str, ...]:
         """Names of the directions: ("x",) or ("x", "y")."""
         return ("x", "y")[: len(self.shape)]
 
-    @property
+    @cached_property
     def is_plane(self) -> bool:
         """Whether the interface is a plane."""
         return len(self.shape) == 2
 
-    @property
+    @cached_property
     def axes(self) -> tuple[int, ...]:
         """Axes of the nodes of profiles (..., *shape), counted from the last."""
         return tuple(range(-len(self.shape), 0))
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Total number of nodes."""
         return math.prod(self.shape)
 
-    @property
+    @cached_property
     def measure(self) -> float:
         """Length of a line (m), area of a plane (m²)."""
         return math.prod(self.lengths)
@@ -391,12 +391,12 @@ class Interface(Listed):
         """Length (m), or area on a plane (m²), that a node represents."""
         return self.measure / self.size
 
-    @property
+    @cached_property
     def spacings(self) -> tuple[float, ...]:
         """Distance between nodes in each direction, m."""
         return tuple(length / n for length, n in zip(self.lengths, self.shape, strict=True))
 
-    @property
+    @cached_property
     def spacing(self) -> float:
         """Distance between nodes, m. On a plane it is the larger distance."""
         return max(self.spacings)

@@ -16,20 +16,14 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Listed, Mode, describe, is_unplaced, model
 from stiction.base.units import Doubt, doubt_units
 from stiction.elasticity.protocol import HalfSpaces
+from stiction.problem.checks import check_resolution, warn_if_short
 from stiction.problem.friction import Friction, contradictions
 from stiction.problem.interface import Interface
 from stiction.problem.load import Load
-from stiction.problem.profiles import at_nodes, turned
-from stiction.problem.resolution import check_resolution, warn_if_short
-from stiction.problem.sample import (
-    COEFFICIENTS,
-    NO_INITIAL_STRESS,
-    Sample,
-    placed_sample,
-    pressing_of,
-)
+from stiction.problem.profiles import at_nodes, placed_sample
+from stiction.problem.sample import GIVE_PRESSURE, Sample, pressing_of, turned
 from stiction.problem.solid import Solid
-from stiction.problem.specimen import Blocks, Slider, Specimen
+from stiction.problem.specimen import UNFIT_FOR_SLIDER, Blocks, Slider, Specimen
 
 if TYPE_CHECKING:
     from stiction.elasticity.driven import Driven
@@ -156,17 +150,22 @@ class Problem(Listed):
     def _of_slider(self, slider: Slider) -> list[str]:
         """Return what does not fit a slider."""
         load, interface = self.load, self.interface
+        given = {
+            "friction.residual_strength": np.any(self.friction.residual_strength),
+            "interface.extent": interface.is_held,
+            "load.initial_stress": np.any(load.initial_stress),
+            "load.normal_pressure": np.ndim(
+                0.0 if load.normal_pressure is None else load.normal_pressure
+            ),
+        }
         problems = slider.misfits(interface.measure, interface.spacing, self.solid, self.mode)
-        if np.any(self.friction.residual_strength):
-            problems.append(f"friction.residual_strength: {COEFFICIENTS}, or residual_ratio")
-        if interface.is_held:
-            problems.append("interface.extent: all of a slider can slip. Leave it out")
-        if np.any(load.initial_stress):
-            problems.append(f"load.initial_stress: {NO_INITIAL_STRESS}")
-        if np.ndim(0.0 if load.normal_pressure is None else load.normal_pressure):
-            problems.append(
-                "load.normal_pressure: follows from the rig. Give pressing_force (N)"
-            )
+        problems += [
+            f"{key}: {UNFIT_FOR_SLIDER[key.split('.')[1]]}"
+            for key, unfit in given.items()
+            if unfit
+        ]
+        if load.normal_pressure is None and load.pressing_force is None:
+            problems.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
         return problems
 
     def _check_drive(self) -> None:
@@ -267,14 +266,14 @@ class Problem(Listed):
         relief: Array = self.released_stress(1.0 * can_break).reshape(-1) / profile
         return relief
 
-    @property
+    @cached_property
     def half_spaces(self) -> HalfSpaces:
         """The solids as half-spaces, which give K(k) and nucleation lengths."""
         lengths = self.interface.lengths
         moduli = (self.effective_modulus, self.solid.shear_modulus)
         return HalfSpaces(lengths, moduli[: len(lengths)])
 
-    @property
+    @cached_property
     def area(self) -> float | None:
         """Area that can break, m², if the width or the thickness of the specimen is known."""
         interface, specimen = self.interface, self.specimen
@@ -289,7 +288,7 @@ class Problem(Listed):
         interface = self.interface
         return self.area and self.area * interface.measure / interface.breakable_measure
 
-    @property
+    @cached_property
     def given_pressure(self) -> Any:
         """Given normal pressure, or force over area, Pa: a number or an array, if any.
 
@@ -301,13 +300,13 @@ class Problem(Listed):
             return self.load.normal_pressure
         return force / area
 
-    @property
+    @cached_property
     def normal_pressure(self) -> Any:
         """Normal pressure, Pa: a number or an array at the nodes, if any."""
         pressure = self.given_pressure
         return pressure if pressure is None else pressure * pressing_of(self)
 
-    @property
+    @cached_property
     def load_profile(self) -> Any:
         """Load profile p: a number, or an array at the nodes, (*shape)."""
         if isinstance(self.specimen, Slider):
@@ -316,7 +315,7 @@ class Problem(Listed):
             return self.blocks.shear
         return self.load.profile
 
-    @property
+    @cached_property
     def effective_modulus(self) -> float:
         """Static modulus G*, Pa, for the plane state and the mode. On a plane, G* along x."""
         if isinstance(self.specimen, Slider):

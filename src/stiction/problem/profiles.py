@@ -1,210 +1,152 @@
-"""Users' profiles: put them on the nodes of an interface, and read them from files.
+"""Users' profiles: from an argument to a sample, and from a file to a labelled array.
 
-A profile enters as an argument of a call or an object (`at_nodes`),
-through `read_profile`, or by its name in a study file
-(`profile_in_file`). Its quantity is found in the source and converted
-to SI in `reading/labels.py`.
+`placed_sample` takes labelled or plain arrays through five steps. Each
+returns a new value:
 
-The nodes are x_i = i L/n in each direction. The interface
-is periodic, so points may come in any order and begin
-anywhere. On a specimen, the nodes are x_i = (i + 1/2)
-L/n, and the profile stops at its ends. The steps of placing are:
+1. Names: of the profiles (`named_profiles`), and of their variables and
+   dimensions (`named` in `reading/labels.py`).
+2. SI units (`profile_in_si` in `base/units.py`).
+3. Nodes (`on_nodes` in `sample.py`).
+4. Checks: of values (`as_rows`), and that each is given once
+   (`given_twice`).
+5. The sample, with what the problem gives (`made`).
 
-1. Find the common offset of the points from the nodes, as a fraction of
-   the spacing. Warn about an offset. Refuse points that do not lie on
-   nodes.
-2. Number the node of each point. Refuse two different values at a node.
-3. Give each node the value of its point, or NaN.
-4. Refuse missing values, unless the caller can use them.
+`at_nodes` takes steps 1 to 3 for a profile of a load, a law or a
+picture. `read_profile` reads a file, and `profile_in_file` a profile
+that a study file names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.base.model import FilePath, Number, as_numbers, check, checked, real_array
-from stiction.base.variables import QUANTITIES
+from stiction.base.model import FilePath, Number, check, checked
+from stiction.base.units import STRENGTHS, as_numbers, check_measured, profile_in_si
+from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.problem.checks import check_resolution, steepest_weakening_rate
 from stiction.problem.interface import Interface
 from stiction.problem.reading.columns import Wanted
-from stiction.problem.reading.labels import (
-    OF_A_PLANE,
-    Missing,
-    check_positive,
-    is_labelled,
-    labelled,
-    simplified,
-)
+from stiction.problem.reading.labels import OF_A_PLANE, Missing, labelled, named
 from stiction.problem.reading.tables import Options
+from stiction.problem.sample import (
+    Sample,
+    as_rows,
+    given_again,
+    given_twice,
+    made,
+    on_nodes,
+    own_sample,
+    pressing_of,
+    refuse_missing,
+)
+from stiction.problem.specimen import UNFIT_FOR_SLIDER, Slider
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TOLERANCE = 0.02
-"""Fraction of the spacing by which rounding in a file may move a point."""
 
-
-def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
-    """Return values (..., points) and positions (m) by direction.
-
-    Values without coordinates keep their shape, and their dictionary of
-    positions is empty.
-    """
-    dims = [dim for dim in ("x", "y") if dim in array.coords]
-    if len(dims) == 2 and "row" not in array.dims:
-        array = array.stack(row=dims, create_index=False)
-    return array.values, {dim: array[dim].values for dim in dims}
-
-
-def place(array: Any, interface: Interface) -> Array:
-    """Return values at the nodes of an interface (..., *shape), with NaN at missing points."""
-    values, places = points_of(array)
-    if not places:
-        shape = values.shape[-len(interface.shape) :]
-        if shape != interface.shape:
-            hint = turned(shape, interface.shape)
-            if not interface.is_plane:
-                hint = ". Give a value for each node, or positions (x=...)"
-            raise InputError(f"must have shape {interface.shape}, got shape {shape}{hint}")
-        return values
-    if values.size == 0:
-        raise InputError("has no values")
-    # 1. Find the offset from the nodes.
-    offsets = [_offset(dim, places[dim], interface) for dim in interface.dims]
-    # 2. Number nodes.
-    steps = [
-        np.round(places[dim] / h - interface.first - offset).astype(np.int64)
-        for dim, h, offset in zip(interface.dims, interface.spacings, offsets, strict=True)
+def named_profiles(given: Any) -> dict[str, Any]:
+    """Return profiles by name, from a mapping, a dataset or the strength alone."""
+    if hasattr(given, "marginal") or hasattr(given, "members"):
+        raise InputError(
+            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
+            " or call st.monte_carlo"
+        )
+    if not isinstance(given, Mapping):  # a Dataset is one too
+        return {"strength": given}
+    known = (*PROFILES, "friction_coefficient")
+    unknown = [
+        unknown_name("profiles", str(name), known) for name in given if name not in known
     ]
-    if interface.is_free:
-        flat, at = steps[0], places["x"]
-        if not 0 <= flat.min() <= flat.max() < interface.size:
-            raise InputError(
-                f"x extends from {at.min():g} to {at.max():g} m, beyond a specimen of"
-                f" {interface.measure:g} m. Crop the record or move its coordinates, as in"
-                " profile.assign_coords(x=profile.x - profile.x.min())"
-            )
-    else:
-        flat = np.ravel_multi_index(steps, interface.shape, mode="wrap")
-    node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
-    _check_repeats(values, places, first[twins], interface)
-    # 3. Put values on the nodes.
-    full = np.full((*values.shape[:-1], interface.size), np.nan)
-    full[..., node] = values[..., first]
-    return full.reshape(*values.shape[:-1], *interface.shape)
+    if "strength" in given and "friction_coefficient" in given:
+        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
+    if unknown and not hasattr(given, "data_vars"):
+        raise InputError(unknown)
+    profiles = {name: given[name] for name in given if name in known}
+    if not {"strength", "friction_coefficient"} & {*profiles}:
+        raise InputError("strength: missing among the profiles")
+    return profiles
 
 
-def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """Return a hint for the message about the shape of a plane, if its axes are swapped."""
-    if len(shape) == 2 and given == shape[::-1]:
-        return ". x and y are swapped: the first axis of a profile is x"
-    return ""
-
-
-def _offset(dim: str, x: Array, interface: Interface) -> float:
-    """Return the offset of the points from the nodes, in spacings, in (-0.5, 0.5] (step 1)."""
-    axis = interface.dims.index(dim)
-    spacing, length = interface.spacings[axis], interface.lengths[axis]
-    formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"
-    if interface.is_free:
-        formula, cells = f"{dim}_i = (i + 1/2) L/n", ""
-    at = np.unique(x) / spacing - interface.first
-    if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
-        period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
-        raise InputError(
-            f"{dim} extends from {x.min():g} to {x.max():g} m on an interface of {length:g} m."
-            f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
-        )
-    first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
-    if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
-        first -= 1.0  # the node before would lie outside
-    deviation = at - first - np.round(at - first)
-    coarse = not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5)
-    if coarse or np.abs(deviation).max() > TOLERANCE:
-        advice = "" if interface.is_plane else ", as in profile.interp(x=problem.interface.x)"
-        raise InputError(
-            f"the {at.size} points of {dim}, from {x.min():.6g} to {x.max():.6g} m, do not coincide"
-            f" with the {interface.shape[axis]} nodes {formula}, which are {spacing:.6g} m apart."
-            f" Check the unit of {dim}, or give values at the nodes (interface.{dim}){advice}"
-        )
-    offset = float(first + deviation.mean())
-    if abs(offset) > TOLERANCE:
+def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> Sample:
+    """Return a sample made from users' data. See `Problem.sample` for the arguments."""
+    interface = problem.interface
+    if isinstance(profiles, Sample):
+        sample = own_sample(problem, given_again(problem, profiles), accept)
+        check_resolution(problem, sample.steepest_weakening_rate)
+        return sample
+    # 1. to 4. The steps for each profile.
+    given, mistakes = named_profiles(profiles), {}
+    placed, nodes = dict(given), (interface,)
+    for step, known in (
+        (named, (interface.dims,)), (profile_in_si, ()), (on_nodes, nodes), (as_rows, nodes)
+    ):  # fmt: skip
+        for name, value in [*placed.items()]:
+            try:
+                placed[name] = step(value, name, *known)
+            except InputError as error:
+                mistakes[name] = [f"{name}: {text}" for text in error.problems]
+                del placed[name]
+    coefficients = [name for name in STRENGTHS if name in placed]
+    coefficients = [n for n in coefficients if placed[n].quantity == "friction_coefficient"]
+    names = {*given, *["friction_coefficient"] * bool(coefficients)}
+    problems = given_twice(problem, names, "profiles")
+    problems += [text for name in given for text in mistakes.get(name, ())]
+    if isinstance(problem.specimen, Slider):
+        stresses = [name for name in placed if name not in coefficients]
+        problems += [f"{n}: {UNFIT_FOR_SLIDER[n]}" for n in stresses if n in UNFIT_FOR_SLIDER]
+    rows = {name: profile.values for name, profile in placed.items()}
+    samples = len(rows.get("strength", rows.get("friction_coefficient", (None,))))
+    problems += [
+        f"{name}: must have {samples} or one sample, as the strength, got {len(values)}"
+        for name, values in rows.items()
+        if values.ndim and len(values) not in (1, samples)
+    ]
+    if problems:
+        raise InputError(problems)
+    # 5. Coefficients become stresses, and profiles a sample.
+    if "normal_pressure" in rows and rows["normal_pressure"].size in (1, samples):
+        rows["normal_pressure"] = rows["normal_pressure"] * pressing_of(problem)
+    pressure = rows.get("normal_pressure", problem.normal_pressure)
+    for name in coefficients:
+        rows[name] = rows[name] * pressure
+    if "friction_coefficient" in rows:
+        rows["strength"] = rows.pop("friction_coefficient") * pressure
+    sample = made(problem, rows, accept)
+    if (constant := sample.strength <= sample.residual_strength).any():
         warn_accuracy(
-            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}, where"
-            f" values are used. Add {offset * spacing:+.4g} m to positions in the result"
+            f"strength is not above residual_strength at {100.0 * constant.mean():.2g} % of"
+            " the nodes. These do not weaken: their strength is constant"
         )
-    return offset
+    steepest = steepest_weakening_rate(
+        sample.strength, sample.residual_strength, sample.weakening_rate
+    )
+    check_resolution(problem, steepest * problem.friction.steepening)
+    return sample
 
 
-def _check_repeats(
-    values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
-) -> None:
-    """Refuse two points at the same place, unless they have the same value a period apart."""
-    rows = values.reshape(-1, twins.size)
-    for i in np.flatnonzero(twins != np.arange(twins.size)):
-        pair = [twins[i], i]
-        sides = zip(places.values(), interface.lengths, strict=True)
-        apart = max(np.ptp(x[pair]) / length for x, length in sides)
-        first, second = rows.T[pair]
-        if apart < 0.5 or not np.array_equal(first, second, equal_nan=True):
-            where = ", ".join(
-                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
-            )
-            raise InputError(
-                f"{where} are the same position on an interface of period {interface.length}"
-                f" m. Keep either value{'' if interface.is_plane else OF_A_PLANE}"
-            )
+def at_nodes(key: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
+    """Return a profile in SI at the nodes (steps 1 to 3). With `missing`, some may be NaN.
 
-
-def refuse_missing(values: Array, interface: Interface) -> Array:
-    """Return values (..., *shape). Refuse NaN among them (step 4)."""
-    missing = np.isnan(values)
-    if missing.any():
-        rows = missing.reshape(-1, *interface.shape)
-        row = int(np.argmax(rows.any(axis=interface.axes)))
-        raise InputError(
-            f"values are missing (NaN) at {rows[row].sum()} of {interface.size} nodes"
-            f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
-            f" {interface.describe_node(int(np.argmax(rows[row])))}. Make interface.length the"
-            " length of the record, or draw equally likely values there with"
-            " RandomField.given(profile)"
-        )
-    return values
-
-
-def at_nodes(name: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
-    """Return the values of a quantity at the nodes. With `missing`, some may be NaN.
-
-    `name` may be a dotted key. Numbers, and arrays with a different
-    shape, are returned unchanged, because the caller checks them.
+    `key` may be dotted. Arrays with a different shape are returned
+    unchanged, because the caller checks them.
     """
-    quantity = quantity_of(name)
-    with prefixed(name):
-        if hasattr(value, "options"):  # a `ProfileFile`
+    quantity = quantity_of(key)
+    with prefixed(key):
+        if isinstance(value, ProfileFile):
             value = value.to_xarray(interface)
-        value = simplified(value, quantity)
-        if is_labelled(value):
-            array = labelled(value, quantity, interface.dims)
-            if array.ndim == 1 and not {*array.dims} <= {"x", "row"}:  # a value for each sample
-                if quantity == "strength":
-                    raise InputError(
-                        "has no dimension along the interface. Name this dimension 'x'"
-                    )
-                return array.values[:, np.newaxis]
-            array = place(array, interface)
-            return array if missing else refuse_missing(array, interface)
-        with suppress(TypeError):  # values that are no numbers are refused with other mistakes
-            array = real_array(value)
-            if array.shape[-len(interface.shape) :] == interface.shape:
-                return array if missing else refuse_missing(array, interface)
-    return value
+        named_value = named(value, quantity, interface.dims)
+        values = on_nodes(profile_in_si(named_value, quantity), quantity, interface).values
+        at_all = values.shape[-len(interface.shape) :] == interface.shape
+        if at_all and not missing and np.isnan(values).any():
+            refuse_missing(values, interface)
+        return values
 
 
 def quantity_of(key: str) -> str:
@@ -237,12 +179,12 @@ def read_profile(
     Parameters
     ----------
     source : path, array, or table with labels
-        Labels of xarray and pandas are used, and units of pint and astropy. A
+        Labels of xarray and headings of pandas are used, and units of pint and astropy. A
         ``.csv``, ``.txt``, ``.dat``, ``.tsv`` or ``.xlsx`` file has columns, with
         or without a line of names such as ``x (mm), strength (MPa)``. An ``.npy``
         file has the shape (nodes,) or (nx, ny), a ``.nc`` file variables with
         `units`, and x as a coordinate. A map over 'x' and 'y' is a table with both
-        as columns, or a binary file or object that SurfaceTopography reads.
+        as columns.
     x, value : str or int, optional
         Heading, name or number (from 0) of the column, coordinate or variable. By
         default `value` is the column called as the quantity, tau_p, shear strength,
@@ -315,24 +257,23 @@ def read_profile(
     options = Options(skip, sheet, missing, decimal)
     dims = None if interface is None else interface.dims
     with prefixed(str(source) if isinstance(source, str | Path) else "source"):
-        # 1. Find the quantity.
         array = labelled(
             source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
             x_unit=x_unit, options=options,
         )  # fmt: skip
         read = array.attrs
-        # 2. Map heights.
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
         single = [dim for dim in {*array.dims} - {"x", "y", "row"} if array.sizes[dim] == 1]
         array = array.squeeze(single)
         if not {*array.dims} <= {"x", "y", "row"}:
             raise InputError(f"must hold a single profile, got shape {array.shape}")
-        # 3. Place or sort the values.
         if interface is None:
             array = _in_order(array)
         else:
-            values = refuse_missing(place(array, interface), interface)
+            (values,) = as_rows(
+                on_nodes(array, quantity, interface), "strength", interface
+            ).values
             array = xr.DataArray(values, interface.coordinates, interface.dims)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
@@ -342,18 +283,18 @@ def read_profile(
 
 
 def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
-    """Return strengths, Pa, from heights, m. Missing heights give NaN (step 2)."""
+    """Return strengths, Pa, from heights, m. Missing heights give NaN."""
     values = as_numbers(strength(heights.copy()))
     if values.shape != heights.shape:
         shapes = f"got shape {values.shape} for {heights.shape}"
         raise InputError(f"strength: must return a strength for each height, {shapes}")
     values = np.where(np.isnan(heights), np.nan, values)
-    check_positive(values, "strength")
+    check_measured(values, "strength", doubted=False)
     return values
 
 
 def _in_order(array: Any) -> Any:
-    """Return a profile with rising coordinates, and points on a plane as a map (step 3)."""
+    """Return a profile with rising coordinates, and points on a plane as a map."""
     if "row" in array.dims:
         array = array.set_index(row=["x", "y"])
     for index in array.indexes.values():

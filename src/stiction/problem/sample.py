@@ -1,16 +1,20 @@
-"""The profiles of samples, and the way of users' data to a sample.
+"""The profiles of samples, and the steps from values in SI to a sample.
 
-`placed_sample` takes labelled or plain arrays. `own_sample` takes
-arrays that the package made, which need steps 4 and 5 only.
+The nodes are x_i = i L/n in each direction. The interface
+is periodic, so points may come in any order and begin
+anywhere. On a specimen, the nodes are x_i = (i + 1/2)
+L/n, and the profile stops at its ends. The steps are:
 
-1. Name the profiles (`named_profiles`).
-2. Convert labelled values to SI (`reading/labels.py`).
-3. Put the values on the nodes (`profiles.py`), as rows
-   (samples, *shape).
-4. Check the values, and that each is given once (`check_values`,
-   `given_twice`).
-5. Fill in what the problem gives, check that the profiles fit together,
-   and return a `Sample` (`_made`).
+1. Put the values on the nodes (`on_nodes`). Find the common offset of
+   the points from the nodes, as a fraction of the spacing, and warn
+   about it. Number the node of each point. Refuse points that do not
+   lie on nodes, and two different values at a node.
+2. Check shape and values (`as_rows`): (samples, *shape), none missing.
+3. Check that each value is given once (`given_twice`).
+4. Fill in what the problem gives, check that the profiles fit together,
+   and return a `Sample` (`made`).
+
+`own_sample` makes a sample from arrays that the package made itself.
 """
 
 from __future__ import annotations
@@ -20,32 +24,23 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
-from stiction.base.model import as_numbers
+from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.representation import Result, Row, Summary
+from stiction.base.units import STRENGTHS
 from stiction.base.variables import PROFILES, QUANTITIES
+from stiction.problem.checks import FRICTION, contradictions_of, steepest_weakening_rate
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.problem.profiles import at_nodes, turned
-from stiction.problem.reading.labels import is_coefficient
-from stiction.problem.resolution import check_resolution
+from stiction.problem.reading.labels import OF_A_PLANE
 from stiction.problem.specimen import Slider
 
-MAX_STRENGTH_RATIO = 1e8
-"""Strength of a node over the median beyond which others are lost in round-off."""
-BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, by rank, of
-nodes that weaken."""
-
-STRENGTHS = ("strength", "residual_strength")
-"""Profiles that a slider takes as friction coefficients only."""
-COEFFICIENTS = (
-    "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1"
-)
-"""Advice for strengths of a slider."""
-NO_INITIAL_STRESS = "follows from the pressing of a slider. Leave it out"
+TOLERANCE = 0.02
+"""Fraction of the spacing by which rounding in a file may move a point."""
+LARGEST = 1e100
+"""Of a profile, in SI units; sums and products of larger numbers overflow."""
 GIVE_PRESSURE = "Give load.normal_pressure (Pa) or load.pressing_force (N)"
 REPLACED = {
     "residual_strength": ("friction.residual_strength", "friction.residual_ratio"),
@@ -54,30 +49,6 @@ REPLACED = {
     **dict.fromkeys(SCALES, tuple(f"friction.{name}" for name in SCALES)),
 }
 """Parameters that a profile, or a random property, of each name would replace."""
-
-
-FRICTION = (1e-3, 10.0), (1e-4, 100.0)
-"""Usual and possible mean strengths over normal pressure, from superlubricity to adhesive gels."""
-LARGEST = 1e100
-"""Of a profile, in SI units; sums and products of larger numbers overflow."""
-
-
-def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
-    """Return the largest of some weakening rates, Pa/m, among nodes that may break.
-
-    Arrays have shape (samples, *shape). Barriers do not count: with a
-    uniform critical slip they weaken steeply but never slip.
-    """
-    drop = strength - residual
-    if drop.max() <= BARRIER * drop.min() or weakening_rate.max() == weakening_rate.min():
-        return float(weakening_rate.max())
-    drop = drop.reshape(drop.shape[0], -1)
-    weakens = np.isfinite(drop) & (drop > 0.0)
-    count = weakens.sum(axis=1, keepdims=True)
-    # numpy's quantile takes 20 times as long.
-    ordered = np.sort(np.where(weakens, drop, -np.inf), axis=1)
-    typical = np.take_along_axis(ordered, drop.shape[1] - count + (count - 1) // 4, axis=1)
-    return float(weakening_rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
 
 
 class _Profiles(NamedTuple):
@@ -175,152 +146,226 @@ class Sample(Result, _Profiles):
         return self.mean(self.initial_stress) + load * self.mean(self.load_profile)
 
 
-def contradictions_of(
-    interface: Interface, strength: Array, residual: Array, initial: Array, overstress: bool
-) -> list[str]:
-    """Return why profiles (samples, *shape), Pa, with valid values do not fit together.
+class Placed(NamedTuple):
+    """Values of a profile at the nodes. The quantity tells coefficients from stresses."""
 
-    With `overstress`, the initial stress may exceed the strength.
+    quantity: str
+    values: Array
+
+
+# -- 1. nodes --------------------------------------------------------------------------------------
+
+
+def on_nodes(value: Any, quantity: str, interface: Interface) -> Placed:
+    """Return a profile in SI at the nodes (..., *shape), with NaN at missing points.
+
+    Values without coordinates keep their shape, and a value for each
+    sample becomes a column.
     """
-    along, problems = interface.axes, []
-    over = (strength <= initial).reshape(len(strength), -1)
-    if not overstress and over.any():
-        number = int(over.any(axis=1).argmax())
-        node = int(over[number].argmax())
-        most, least = initial[number].flat[node], strength[number].flat[node]
-        further = int(over.any(axis=1).sum()) - 1
-        problems.append(
-            f"strength: must be above initial_stress. It is not at {over[number].sum()} nodes of"
-            f" sample {number}, such as {interface.describe_node(node)}: {least:g} and {most:g} Pa"
-            f"{f', and in {further} more samples' * (further > 0)}. st.Rupture() accepts this"
-        )
-    if (
-        np.max(strength, where=np.isfinite(strength), initial=0.0)
-        > MAX_STRENGTH_RATIO * strength.min()
-    ):
-        middle = np.median(strength, axis=along, keepdims=True)
-        huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
-        if middle.min() <= 0.0:
-            problems.append(
-                f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
-                f" {middle.min():g} Pa: check its sign"
-            )
-        elif huge.any():
-            number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
-            problems.append(
-                f"strength: {strength[number].flat[node]:g} Pa at {interface.describe_node(node)}"
-                f" of sample {number} is more than {MAX_STRENGTH_RATIO:g} times the median,"
-                f" {middle[number].item():g} Pa. Where nothing breaks, give a smaller strength"
-            )
-    nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
-    if nowhere.any():
-        number = int(np.argmax(nowhere))
-        known = strength[number][np.isfinite(strength[number])]
-        problems.append(
-            "strength: must be above residual_strength at one node or more. In sample"
-            f" {number} strength is {known.min():g} to {known.max():g} Pa, and residual_strength is"
-            f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
-        )
-    return problems
-
-
-def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name, from a mapping, a dataset or the strength alone.
-
-    The strength may consist of friction coefficients. Their name or
-    their unit shows this.
-    """
-    if hasattr(given, "marginal") or hasattr(given, "members"):
-        raise InputError(
-            f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
-            " or call st.monte_carlo"
-        )
-    if not isinstance(given, Mapping):  # a Dataset is one too
-        return {"friction_coefficient" if is_coefficient(given) else "strength": given}
-    known = (*PROFILES, "friction_coefficient")
-    unknown = [
-        unknown_name("profiles", str(name), known) for name in given if name not in known
+    if not hasattr(value, "dims"):
+        return Placed(quantity, value)
+    if quantity in STRENGTHS and value.attrs.get("units") == "1":
+        quantity = "friction_coefficient"
+    if value.ndim == 1 and not {*value.dims} <= {"x", "row"}:
+        return Placed(quantity, value.values[:, np.newaxis])
+    values, places = points_of(value)
+    if not places:
+        return Placed(quantity, values)
+    if values.size == 0:
+        raise InputError("has no values")
+    offsets = [_offset(dim, places[dim], interface) for dim in interface.dims]
+    steps = [
+        np.round(places[dim] / h - interface.first - offset).astype(np.int64)
+        for dim, h, offset in zip(interface.dims, interface.spacings, offsets, strict=True)
     ]
-    if "strength" in given and "friction_coefficient" in given:
-        unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
-    if unknown and not hasattr(given, "data_vars"):
-        raise InputError(unknown)
-    profiles = {name: given[name] for name in given if name in known}
-    if is_coefficient(profiles.get("strength")):
-        profiles["friction_coefficient"] = profiles.pop("strength")
-    return profiles
-
-
-def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> Sample:
-    """Return a sample made from users' data. See `Problem.sample` for the arguments.
-
-    Each of the steps 1 to 5 of this file returns a new value.
-    """
-    if isinstance(profiles, Sample):
-        sample = own_sample(problem, _given_again(problem, profiles), accept)
-    else:
-        # 1. Names.
-        given = named_profiles(profiles)
-        coefficients = [name for name in STRENGTHS if is_coefficient(given.get(name))]
-        # 2. and 3. SI, and nodes.
-        rows, mistakes = _at_nodes_by_name(given, problem.interface, pressing_of(problem))
-        # 4. Checks.
-        mistakes = given_twice(problem, given, "profiles") + mistakes
-        if isinstance(problem.specimen, Slider):
-            stresses = {*STRENGTHS} & {*given} - {*coefficients}
-            mistakes += [f"{name}: {COEFFICIENTS}" for name in sorted(stresses)]
-            if "initial_stress" in given:
-                mistakes.append(f"initial_stress: {NO_INITIAL_STRESS}")
-        if mistakes:
-            raise InputError(mistakes)
-        # 5. Coefficients become stresses, and profiles a sample.
-        pressure = rows.get("normal_pressure", problem.normal_pressure)
-        for name in coefficients:
-            rows[name] = rows[name] * pressure
-        if "friction_coefficient" in rows:
-            rows["strength"] = rows.pop("friction_coefficient") * pressure
-        sample = _made(problem, rows, accept)
-        if (constant := sample.strength <= sample.residual_strength).any():
-            warn_accuracy(
-                f"strength is not above residual_strength at {100.0 * constant.mean():.2g} % of"
-                " the nodes. These do not weaken: their strength is constant"
+    if interface.is_free:
+        flat, at = steps[0], places["x"]
+        if not 0 <= flat.min() <= flat.max() < interface.size:
+            raise InputError(
+                f"x extends from {at.min():g} to {at.max():g} m, beyond a specimen of"
+                f" {interface.measure:g} m. Crop the record or move its coordinates, as in"
+                " profile.assign_coords(x=profile.x - profile.x.min())"
             )
-    check_resolution(problem, sample.steepest_weakening_rate)
-    return sample
+    else:
+        flat = np.ravel_multi_index(steps, interface.shape, mode="wrap")
+    node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
+    if node.size < flat.size:
+        _check_repeats(values, places, first[twins], interface)
+    full = np.full((*values.shape[:-1], interface.size), np.nan)
+    full[..., node] = values[..., first]
+    return Placed(quantity, full.reshape(*values.shape[:-1], *interface.shape))
 
 
-def _at_nodes_by_name(
-    given: Mapping[str, Any], interface: Interface, pressing: Any
-) -> tuple[dict[str, Array], list[str]]:
-    """Return users' profiles by name as (samples, *shape), and the mistakes in them.
+def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
+    """Return values (..., points) and positions (m) by direction.
 
-    A profile with a mistake is missing in the result. A pressure
-    without values along the interface is a mean, which is multiplied by
-    `pressing`.
+    Values without coordinates keep their shape, and their dictionary of
+    positions is empty.
     """
-    first = "strength" if "strength" in given else "friction_coefficient"
-    if first not in given:
-        raise InputError("strength: missing among the profiles")
-    rows: dict[str, Array] = {}
-    scales = [name for name in SCALES if name in given]
-    problems = [f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}"] * (
-        len(scales) > 1
+    dims = [dim for dim in ("x", "y") if dim in array.coords]
+    if len(dims) == 2 and "row" not in array.dims:
+        array = array.stack(row=dims, create_index=False)
+    return array.values, {dim: array[dim].values for dim in dims}
+
+
+def _offset(dim: str, x: Array, interface: Interface) -> float:
+    """Return the offset of the points from the nodes, in spacings, in (-0.5, 0.5]."""
+    axis = interface.dims.index(dim)
+    spacing, length = interface.spacings[axis], interface.lengths[axis]
+    formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"
+    if interface.is_free:
+        formula, cells = f"{dim}_i = (i + 1/2) L/n", ""
+    at = np.unique(x) / spacing - interface.first
+    if at[-1] - at[0] > interface.shape[axis] + TOLERANCE:
+        period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
+        raise InputError(
+            f"{dim} extends from {x.min():g} to {x.max():g} m on an interface of {length:g} m."
+            f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
+        )
+    first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
+    if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
+        first -= 1.0  # the node before would lie outside
+    deviation = at - first - np.round(at - first)
+    coarse = not interface.is_plane and (at.size < 2 or np.median(np.diff(at)) > 1.5)
+    if coarse or np.abs(deviation).max() > TOLERANCE:
+        advice = "" if interface.is_plane else ", as in profile.interp(x=problem.interface.x)"
+        raise InputError(
+            f"the {at.size} points of {dim}, from {x.min():.6g} to {x.max():.6g} m, do not coincide"
+            f" with the {interface.shape[axis]} nodes {formula}, which are {spacing:.6g} m apart."
+            f" Check the unit of {dim}, or give values at the nodes (interface.{dim}){advice}"
+        )
+    offset = float(first + deviation.mean())
+    if abs(offset) > TOLERANCE:
+        warn_accuracy(
+            f"{dim} is offset by {offset:.2g} of a spacing from the nodes {formula}{cells}, where"
+            f" values are used. Add {offset * spacing:+.4g} m to positions in the result"
+        )
+    return offset
+
+
+def _check_repeats(
+    values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
+) -> None:
+    """Refuse two points at the same place, unless they have the same value a period apart."""
+    rows = values.reshape(-1, twins.size)
+    for i in np.flatnonzero(twins != np.arange(twins.size)):
+        pair = [twins[i], i]
+        sides = zip(places.values(), interface.lengths, strict=True)
+        apart = max(np.ptp(x[pair]) / length for x, length in sides)
+        first, second = rows.T[pair]
+        if apart < 0.5 or not np.array_equal(first, second, equal_nan=True):
+            where = ", ".join(
+                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
+            )
+            raise InputError(
+                f"{where} are the same position on an interface of period {interface.length}"
+                f" m. Keep either value{'' if interface.is_plane else OF_A_PLANE}"
+            )
+
+
+# -- 2. values -------------------------------------------------------------------------------------
+
+
+def as_rows(placed: Placed, name: str, interface: Interface) -> Placed:
+    """Return valid values of a profile as (1 or samples, *shape), (samples, 1) or a number."""
+    shape, values = interface.shape, placed.values
+    first = name in ("strength", "friction_coefficient")
+    column = values.ndim == 2 and values.shape[1] == 1
+    if values.size and shape in (values.shape, values.shape[1:]):
+        values = values.reshape(-1, *shape)
+        if np.isnan(values).any():
+            refuse_missing(values, interface)
+    elif first or not values.size or not (column or values.ndim == 0):
+        rows = f"(samples, {', '.join(map(str, shape))})"
+        valid = f"{shape} or {rows}" if first else f"{shape}, {rows}, (samples, 1) or a number"
+        hint = turned(values.shape[-2:], shape)
+        if first and column:
+            hint = ". If it runs along the interface, name its dimension 'x'"
+        raise InputError(f"must have shape {valid}, got shape {values.shape}{hint}")
+    elif column:
+        values = values.reshape(-1, *(1 for _ in shape))
+    check_values(placed.quantity, values, interface)
+    return Placed(placed.quantity, values)
+
+
+def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
+    """Return a hint for the message about the shape of a plane, if its axes are swapped."""
+    if len(shape) == 2 and given == shape[::-1]:
+        return ". x and y are swapped: the first axis of a profile is x"
+    return ""
+
+
+def refuse_missing(values: Array, interface: Interface) -> None:
+    """Raise an `InputError` that names the first NaN among values (..., *shape)."""
+    rows = np.isnan(values).reshape(-1, *interface.shape)
+    row = int(np.argmax(rows.any(axis=interface.axes)))
+    raise InputError(
+        f"values are missing (NaN) at {rows[row].sum()} of {interface.size} nodes"
+        f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
+        f" {interface.describe_node(int(np.argmax(rows[row])))}. Make interface.length the"
+        " length of the record, or draw equally likely values there with"
+        " RandomField.given(profile)"
     )
-    samples = None
-    for name in (first, *(name for name in given if name != first)):
-        try:
-            of_friction = name == "residual_strength" and is_coefficient(given[name])
-            quantity = "friction_coefficient" if of_friction else name
-            value = at_nodes(quantity, given[name], interface)
-            with prefixed(name):
-                rows[name] = _rows_of(quantity, value, interface, samples)
-            if name == "normal_pressure" and np.shape(value) in ((), (samples, 1)):
-                rows[name] = rows[name] * pressing
-        except InputError as error:
-            problems += error.problems
-        if name == first:
-            samples = len(rows[first]) if first in rows else 1
-    return rows, problems
+
+
+def check_values(name: str, array: Array, interface: Interface) -> None:
+    """Raise an `InputError` if a value is impossible for the profile with this name.
+
+    `array` is a number, a profile or rows of profiles.
+    """
+    least, greatest = array.min(), array.max()
+    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
+        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
+        given = f"{array[entry]:g} (at most {LARGEST:g})"
+        if name == "strength" and array[entry] == np.inf:
+            given += ". Give interface.extent, beyond which nothing breaks, instead"
+        raise InputError(f"must be finite. Entry {entry} is {given}")
+    given = f"{least:g} {QUANTITIES[name].units}"
+    if name in SCALES and least <= 0.0:
+        raise InputError(f"must be positive, got {given}")
+    if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
+        raise InputError(
+            f"its mean is {array.mean():.3g}; if that is a strength, state its unit, as"
+            " .assign_attrs(units='Pa') does"
+        )
+    if name == "residual_strength" and least < 0.0:
+        raise InputError(f"must not be negative, got {given}")
+    if name == "normal_pressure":
+        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
+        if means.min() <= 0.0:
+            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
+            raise InputError(f"must be positive on average, but {worst}")
+
+
+# -- 3. and 4. a sample ----------------------------------------------------------------------------
+
+
+def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
+    """Return messages about values that profiles or random properties would replace.
+
+    There are also messages about values that are given in neither
+    place. In the messages, `owner` stands before the names.
+    """
+    twice = [
+        f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"
+        for name in names
+        for key in REPLACED.get(name, ())
+        if (value := attrgetter(key)(problem)) is not None and np.any(value)
+    ]
+    if problem.friction.scale is None and not {*SCALES} & {*names}:
+        twice.append(
+            f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
+            " on where it varies from sample to sample. Got none"
+        )
+    pressed = problem.given_pressure is not None or "normal_pressure" in names
+    if "friction_coefficient" in names and not pressed:
+        twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
+    if isinstance(problem.specimen, Slider) and not pressed:
+        twice.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
+    if problem.specimen is not None and problem.specimen.pressing == "glued" and not pressed:
+        text = "'glued' has no effect without a normal pressure"
+        twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")
+    return twice
 
 
 def pressing_of(problem: Any) -> Any:
@@ -357,10 +402,10 @@ def own_sample(
             problems += error.problems
     if problems:
         raise InputError(problems)
-    return _made(problem, profiles, accept)
+    return made(problem, profiles, accept)
 
 
-def _made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -> Sample:
+def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -> Sample:
     """Return a sample from arrays with valid values, if they fit together.
 
     Profiles that are not given come from the problem.
@@ -381,16 +426,10 @@ def _made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) 
     barriers = ~interface.breakable
     if interface.is_held:
         strength = np.where(barriers, np.inf, strength)
-    overstress = "overstress" in accept
-    if problems := contradictions_of(interface, strength, residual, initial, overstress):
-        raise InputError(problems)
     drop = strength - residual
     if isinstance(problem.specimen, Slider):
-        if np.ptp(pressure, axis=-1).any():
-            raise InputError("normal_pressure: follows from the rig. Give its mean")
-        mu, mu_r = strength / pressure, residual / pressure
         drop = drop * problem.specimen.checked_pressing(
-            problem.rig, interface.measure, mu, mu_r
+            problem.rig, interface.measure, strength / pressure, residual / pressure
         )
     W = problem.friction.weakening_rate_of(drop, scale, value)
     if interface.is_held and scale != "weakening_rate":
@@ -398,6 +437,9 @@ def _made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) 
         # it is the fastest.
         fastest = np.where(barriers, 0.0, W).max(interface.axes, keepdims=True)
         W = np.where(barriers, fastest, W)
+    overstress = "overstress" in accept
+    if problems := contradictions_of(interface, strength, residual, initial, overstress):
+        raise InputError(problems)
     constant = strength <= residual
     if constant.any():
         # Residual from the start, tau_r = tau_p: then d_c = 0, and
@@ -414,35 +456,7 @@ def _made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) 
     return Sample(strength, residual, W, initial, load_profile, pressure, problem)
 
 
-def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
-    """Return messages about values that profiles or random properties would replace.
-
-    There are also messages about values that are given in neither
-    place. In the messages, `owner` stands before the names.
-    """
-    twice = [
-        f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"
-        for name in names
-        for key in REPLACED.get(name, ())
-        if (value := attrgetter(key)(problem)) is not None and np.any(value)
-    ]
-    if problem.friction.scale is None and not {*SCALES} & {*names}:
-        twice.append(
-            f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
-            " on where it varies from sample to sample. Got none"
-        )
-    pressed = problem.given_pressure is not None or "normal_pressure" in names
-    if "friction_coefficient" in names and not pressed:
-        twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
-    if isinstance(problem.specimen, Slider) and not pressed:
-        twice.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
-    if problem.specimen is not None and problem.specimen.pressing == "glued" and not pressed:
-        text = "'glued' has no effect without a normal pressure"
-        twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")
-    return twice
-
-
-def _given_again(problem: Any, sample: Sample) -> dict[str, Array]:
+def given_again(problem: Any, sample: Sample) -> dict[str, Array]:
     """Return the profiles of a given `Sample` by name, or refuse a foreign sample."""
     if sample.shape != problem.interface.shape:
         shapes = f"shape {sample.shape}, the interface {problem.interface.shape}"
@@ -455,57 +469,3 @@ def _given_again(problem: Any, sample: Sample) -> dict[str, Array]:
     if np.isnan(sample.normal_pressure).all():
         del given["normal_pressure"]
     return given
-
-
-def _rows_of(name: str, value: Any, interface: Interface, samples: int | None) -> Array:
-    """Return `value` as a (samples, *shape) float64 array, or raise an `InputError`.
-
-    A single profile (*shape) counts as one sample. If `samples` is
-    given, a number, a profile, or one number per sample with shape
-    (samples, 1) is broadcast to (samples, *shape).
-    """
-    shape, array = interface.shape, as_numbers(value)
-    valid = f"{shape} or ({samples or 'samples'}, {', '.join(map(str, shape))})"
-    if samples is None:
-        fits = array.size > 0 and shape in (array.shape, array.shape[1:])
-    else:
-        valid += f", ({samples}, 1) or a number"
-        column = (samples, *(1 for _ in shape))
-        array = array.reshape(column) if array.shape == (samples, 1) else array
-        fits = array.shape in ((), shape, column, (samples, *shape))
-    if not fits:
-        hint = turned(array.shape[-2:], shape)
-        raise InputError(f"must have shape {valid}, got shape {array.shape}{hint}")
-    check_values(name, array, interface)
-    if samples is None:
-        return array.reshape(-1, *shape)
-    return np.broadcast_to(array, (samples, *shape))
-
-
-def check_values(name: str, array: Array, interface: Interface) -> None:
-    """Raise an `InputError` if a value is impossible for the profile with this name.
-
-    `array` is a number, a profile or rows of profiles.
-    """
-    least, greatest = array.min(), array.max()
-    if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
-        entry = tuple(np.argwhere(~(np.abs(array) <= LARGEST))[0].tolist())
-        given = f"{array[entry]:g} (at most {LARGEST:g})"
-        if name == "strength" and array[entry] == np.inf:
-            given += ". Give interface.extent, beyond which nothing breaks, instead"
-        raise InputError(f"must be finite. Entry {entry} is {given}")
-    given = f"{least:g} {QUANTITIES[name].units}"
-    if name in SCALES and least <= 0.0:
-        raise InputError(f"must be positive, got {given}")
-    if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
-        raise InputError(
-            f"its mean is {array.mean():.3g}; if that is a strength, state its unit, as"
-            " .assign_attrs(units='Pa') does"
-        )
-    if name == "residual_strength" and least < 0.0:
-        raise InputError(f"must not be negative, got {given}")
-    if name == "normal_pressure":
-        means = np.atleast_1d(interface.mean(array) if array.ndim else array)
-        if means.min() <= 0.0:
-            worst = f"the mean of sample {int(np.argmin(means))} is {means.min():g} Pa"
-            raise InputError(f"must be positive on average, but {worst}")

@@ -45,6 +45,20 @@ MAX_POSITIVE = 1e-2
 defined. It counts how much the slip of a cell loads another cell forwards."""
 
 
+_COEFFICIENTS = (
+    "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1, a"
+    " random field of coefficients, or friction.residual_ratio"
+)
+UNFIT_FOR_SLIDER = {
+    "strength": _COEFFICIENTS,
+    "residual_strength": _COEFFICIENTS,
+    "initial_stress": "follows from the pressing of a slider. Leave it out",
+    "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
+    "extent": "all of a slider can slip. Leave it out",
+}
+"""What a slider does not take, by the last part of a key: as stresses, profiles or at all."""
+
+
 @model(kw_only=True)
 class Platen(Listed):
     """A rigid platen that is glued to the top face and moves along the interface only.

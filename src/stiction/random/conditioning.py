@@ -66,10 +66,9 @@ from scipy.special import ndtri
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Positive, check_memory, model
-from stiction.base.units import is_in
+from stiction.base.units import in_si, is_in, stated_unit
 from stiction.base.variables import QUANTITIES
 from stiction.problem.interface import Interface
-from stiction.problem.reading.labels import in_si, unit_of
 from stiction.random.mapping import from_normal
 from stiction.random.synthesis import layout
 
@@ -121,7 +120,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
                 "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
                 " st.read_profile(path) returns it"
             )
-        axes = (in_si(value[name], name, "m") for name in names)
+        axes = (in_si(value[name], ("m",))[0] for name in names)
         rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
@@ -138,13 +137,13 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
 
 def _values(array: Any) -> Array:
     """Return the values of a labelled array in SI. The stated unit determines the property."""
-    stated = unit_of(array) or "1"
+    stated = stated_unit(array) or "1"
     known = [
         quantity.units for quantity in QUANTITIES.values() if is_in(stated, quantity.units)
     ]
     if not known:
         raise ValueError(f"must be in SI or state the unit of a property, got {stated!r}")
-    return np.asarray(in_si(array, "values", known[0] if unit_of(array) else "1"))
+    return in_si(array, (known[0] if stated_unit(array) else "1",))[0]
 
 
 def _table(points: Array) -> dict[str, list[float]]:

@@ -22,8 +22,8 @@ from scipy.special import ndtr, ndtri
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.problem.problem import Problem
-from stiction.problem.sample import COEFFICIENTS, constants_of, pressing_of
-from stiction.problem.specimen import Slider
+from stiction.problem.sample import constants_of, pressing_of
+from stiction.problem.specimen import UNFIT_FOR_SLIDER, Slider
 from stiction.random.fields import FACTOR, RandomInterface
 
 # Shares of the strength at or below the residual strength: the largest
@@ -50,11 +50,9 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
                 f"between.{name}: is a factor on the {name} of the problem, which is not given."
                 " Give it there, make it random, or leave the factor out"
             )
-    for name in {*random.names} & {"strength", "residual_strength", "initial_stress"} - {
-        *names
-    }:
+    for name in sorted({*random.names} & {*UNFIT_FOR_SLIDER} - {*names}):
         if isinstance(problem.specimen, Slider):
-            raise InputError(f"random.{name}: {COEFFICIENTS}, or a random field of them")
+            raise InputError(f"random.{name}: {UNFIT_FOR_SLIDER[name]}")
     if names and problem.given_pressure is None and "normal_pressure" not in random.names:
         raise InputError(
             f"{names[0]}: is given as friction coefficients, which need a normal pressure"

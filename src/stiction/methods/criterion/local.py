@@ -35,11 +35,12 @@ from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
 from stiction.methods.criterion.onset_bracket import rms_difference
 from stiction.methods.criterion.windows import windows_of
+from stiction.problem.checks import warn_if_coarse
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, refusals, refuse_specimen
-from stiction.problem.resolution import warn_if_coarse
+from stiction.problem.profiles import named_profiles
 from stiction.problem.results import onset_variables, position
-from stiction.problem.sample import Sample, named_profiles
+from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 MAX_RMS_DIFFERENCE = 0.01

@@ -8,12 +8,12 @@ import numpy as np
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import Reason, RuptureState, value_at
-from stiction.problem.problem import Problem
-from stiction.problem.resolution import (
+from stiction.problem.checks import (
     MIN_NODES_IN_NUCLEATION,
     nodes_in_nucleation_length,
     warn_if_coarse,
 )
+from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 FAST_RISE = 1e-3

@@ -20,8 +20,8 @@ from stiction.base.model import (
     Positive,
     Real,
     model,
-    real_array,
 )
+from stiction.base.units import as_numbers
 from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks, specimens
 from stiction.methods.dynamics.diagnostics import stress_scale
@@ -61,7 +61,7 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
     if load is None:
         return None
     try:
-        times, values = (real_array(part) for part in load)
+        times, values = (as_numbers(part) for part in load)
     except (TypeError, ValueError):
         raise InputError("must be two arrays of numbers, (times, values)") from None
     finite = np.isfinite(times).all() and np.isfinite(values).all()

@@ -19,10 +19,10 @@ from stiction.methods.dynamics.simulate_event import simulate_event
 from stiction.methods.dynamics.state import RuptureState
 from stiction.methods.dynamics.summary import arrested_events, rate_spectrum, summary
 from stiction.methods.equilibrium.events import event_table, event_variables
+from stiction.problem.checks import doubt_sample
 from stiction.problem.problem import Problem, refusals
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
-from stiction.problem.unit_doubts import doubt_sample
 
 if TYPE_CHECKING:
     import xarray as xr

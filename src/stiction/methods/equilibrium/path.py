@@ -43,11 +43,11 @@ from stiction.methods.equilibrium.solver import (
 )
 from stiction.methods.equilibrium.state import EquilibriumSearch, EquilibriumState, at_rest
 from stiction.methods.equilibrium.strength import StaticSample
+from stiction.problem.checks import doubt_sample
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset
 from stiction.problem.sample import Sample
 from stiction.problem.specimen import Blocks, Slider
-from stiction.problem.unit_doubts import doubt_sample
 
 LOAD = Variable("Pa", "load factor tau_0", ("load",))
 VARIABLES = {

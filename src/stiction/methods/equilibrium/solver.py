@@ -52,8 +52,8 @@ from stiction.methods.equilibrium.strength import (
     row_of,
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneSearch
+from stiction.problem.checks import warn_if_coarse
 from stiction.problem.problem import Problem
-from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.sample import Sample
 
 MIN_NODES_IN_NUCLEATION_LENGTH = 8.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -142,7 +142,7 @@ class FrictionLaw(Listed):
         """-f' where f first falls: at zero slip, or after a plateau."""
         return float(self.parameters.initial_slope)
 
-    @property
+    @cached_property
     def steepening(self) -> float:
         """Ratio of the steepest slope to the initial slope, at least 1. It governs stability."""
         if isinstance(self.parameters, Linear | Exponential):
@@ -172,7 +172,7 @@ class FrictionLaw(Listed):
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
-    @property
+    @cached_property
     def scale(self) -> tuple[str, Any] | None:
         """Name and value of the given scale (W, d_c or Gamma), or None if it is in the profiles."""
         return next(
@@ -371,7 +371,7 @@ class PiecewiseWeakening(FrictionLaw):
         """The u up to which strength does not fall."""
         return self.slip[0] if self.strength[0] == 1.0 else 0.0
 
-    @property
+    @cached_property
     def steepening(self) -> float:
         """Ratio of the slope of the steepest piece to the slope of the first that falls."""
         return float(self._pieces[0].max()) / self.initial_slope

@@ -34,7 +34,6 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.files import check_unpacked, content_of, refuse_damage
 from stiction.base.netcdf import read_netcdf
-from stiction.base.units import parse
 from stiction.problem.reading.columns import Table
 from stiction.problem.reading.tables import (
     GROUPS,
@@ -83,23 +82,14 @@ ABOUT_BYTES = 2**20
 SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 NETCDF = (".nc", ".nc4")
-INSTRUMENTS = (
-    ".sur", ".al3d", ".plu", ".plux", ".opd", ".opdx", ".x3p", ".sdf", ".vk3", ".vk4", ".vk6",
-    ".vk7", ".gwy", ".os3d", ".lext", ".nms", ".zon", ".datx", ".mnt", ".oir", ".frt", ".spm",
-    ".ibw", ".nid",
-)  # fmt: skip
-"""Binary files of profilometers and microscopes, which SurfaceTopography reads."""
-HEIGHT = "height"
-"""Name of the array of a surface, which holds no strengths."""
 
 
-def load(path: Path, options: Options) -> Table | xr.Dataset | xr.DataArray | Array:
-    """Read a file as variables, as a surface over 'x' and 'y', or as an .npy array."""
+def load(path: Path, options: Options) -> Table | xr.Dataset | Array:
+    """Read a file as a table, as variables, or as an .npy array."""
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
         return read_table(path, options)
     readers: dict[str, Any] = {".npy": _read_npy} | dict.fromkeys(NETCDF, _read_netcdf)
-    readers |= dict.fromkeys(INSTRUMENTS, _read_instrument)
     if ending not in readers:
         endings = ", ".join((*TEXT, EXCEL, *readers))
         raise InputError(
@@ -324,7 +314,7 @@ def _cells_of(sheet: Any, size: int) -> list[Row]:
     return [Row(row.number, row.cells + [""] * (width - len(row.cells))) for row in rows]
 
 
-# -- arrays and surfaces -------------------------------------------------------------------------
+# -- arrays --------------------------------------------------------------------------------------
 
 
 def _read_npy(content: bytes) -> Array:
@@ -344,32 +334,3 @@ def _read_netcdf(content: bytes) -> xr.Dataset:
         given = variable.attrs
         variable.attrs = {key: given[key] for key in ("unit", "units") if key in given}
     return data
-
-
-def _read_instrument(content: bytes) -> xr.DataArray:
-    """Return the heights in a binary file that an instrument wrote."""
-    try:
-        from SurfaceTopography import read_topography
-    except ImportError:
-        raise InputError(
-            "needs SurfaceTopography (pip install 'stiction[instruments]'), or export text"
-        ) from None
-    with refuse_damage("a file that SurfaceTopography can read, or is damaged"):
-        surface = read_topography(io.BytesIO(content))
-    return heights_of(surface)
-
-
-def heights_of(surface: Any) -> xr.DataArray:
-    """Return the heights in an object of SurfaceTopography over x, and over y if it is a map."""
-    import xarray as xr
-
-    *places, heights = surface.positions_and_heights()
-    unit = surface.unit or ""
-    if unit and parse(unit) is None:
-        with suppress(UnicodeError):  # the library reads UTF-8 as Latin-1
-            unit = unit.encode("latin-1").decode("utf-8")
-    attributes = {"units": unit} if unit else {}
-    values = np.ma.filled(np.ma.asarray(heights, dtype=np.float64), np.nan)
-    axes = places if values.ndim == 1 else [places[0][:, 0], places[1][0]]
-    coords = {dim: (dim, np.asarray(x), attributes) for dim, x in zip("xy", axes, strict=False)}
-    return xr.DataArray(values, coords, [*coords], HEIGHT, attributes)

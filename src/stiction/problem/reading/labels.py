@@ -1,16 +1,17 @@
 """Take a profile from labelled data: choose the variable and its coordinates, convert to SI.
 
-A source is a file, an xarray object, a table of pandas, a surface, a
-quantity with a unit or an array. It may hold many variables, and their
-names and units follow no standard. A wrong choice would give a wrong
-number, so an ambiguous choice is refused. `labelled` takes these steps:
+A source is a file, an xarray object, a table of pandas, a quantity with
+a unit or an array. It may hold many variables, and their names and
+units follow no standard. A wrong choice would give a wrong number, so
+an ambiguous choice is refused. `labelled` takes these steps:
 
-1. Make the source a DataArray or a Dataset.
-2. Choose the variable and its coordinates by the argument. Without an
-   argument, choose by the name, and then by the unit.
-3. Name the dimensions 'x' and 'y', or 'row' for a list of points. The
-   sample comes first.
-4. Convert values and coordinates to SI, and check them.
+1. Make the source a table, a DataArray or a Dataset.
+2. Names (`named`): choose the variable and its coordinates by the
+   argument. Without an argument, choose by the name, and then by the
+   unit. Call the dimensions 'x' and 'y', or 'row' for a list of points.
+   The sample comes first.
+3. Convert values and coordinates to SI, and check them
+   (`profile_in_si`).
 """
 
 from __future__ import annotations
@@ -22,16 +23,18 @@ from typing import Annotated, Any
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import (
-    AccuracyWarning,
-    InputError,
-    UnitWarning,
-    prefixed,
-    unknown_name,
-    warn_user,
+from stiction.base.errors import InputError, prefixed, unknown_name
+from stiction.base.model import describe
+from stiction.base.units import (
+    as_numbers,
+    check_agreement,
+    check_measured,
+    conversion,
+    is_in,
+    plain,
+    profile_in_si,
+    stated_unit,
 )
-from stiction.base.model import as_numbers, describe, real_array
-from stiction.base.units import factor_to, is_in, magnitude_in_one_of, parse, plain
 from stiction.base.variables import QUANTITIES
 from stiction.problem.reading.columns import (
     MAX_LISTED,
@@ -46,7 +49,7 @@ from stiction.problem.reading.columns import (
     stated_column,
     unclear,
 )
-from stiction.problem.reading.files import HEIGHT, heights_of, load
+from stiction.problem.reading.files import load
 from stiction.problem.reading.tables import Options, name_and_unit, table_of_frame
 
 NAMES = {
@@ -62,16 +65,6 @@ NAMES = {
 """Other names of a quantity."""
 PLACES = ("x", "position", "pos", "distance", "coordinate", "lateral")
 SAMPLE_NAMES = ("sample", "samples")
-POSITIVE = (
-    "strength", "normal_pressure", "critical_slip", "weakening_rate", "fracture_energy",
-    "friction_coefficient",
-)  # fmt: skip
-"""Quantities whose values lie above zero."""
-SENTINELS = np.array(
-    [-99.0, -999.0, -999.25, -9999.0, -99999.0, -32768.0, 1e20, 1e30, 1e38, 9.96921e36, 1.70141e38,
-     3.40282e38, -3.40282e38]
-)  # fmt: skip
-"""Numbers that instruments and formats write for a missing value."""
 SAID_BY_ROLE = {
     "strength": "friction", "friction_coefficient": "friction", "normal_pressure": "pressing force"
 }  # fmt: skip
@@ -79,9 +72,6 @@ SAID_BY_ROLE = {
 Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
 ]
-TALL = 1e-3
-"""Range of heights without a unit, m, above which they are probably in um or nm."""
-
 OF_A_PLANE = (
     ". A map has columns or coordinates x and y, or is an array (nx, ny), as np.loadtxt(path).T"
     " reads a matrix, and needs an interface of two lengths and two numbers of nodes"
@@ -89,44 +79,7 @@ OF_A_PLANE = (
 """Advice for two dimensions where a line was expected."""
 
 
-OVERLOAD = 9.9e37
-"""Smallest number with which an instrument marks an overload or a missing value (SCPI)."""
-
-
-# -- values in SI --------------------------------------------------------------------------------
-
-
-def is_labelled(value: Any) -> bool:
-    """Return whether a value has labels: a table or an xarray object."""
-    return isinstance(value, Table) or (hasattr(value, "dims") and hasattr(value, "coords"))
-
-
-def is_coefficient(value: Any) -> bool:
-    """Return whether a labelled array states that it holds friction coefficients, unit 1."""
-    return hasattr(value, "dims") and is_in(unit_of(value), "1")
-
-
-def unit_of(array: Any) -> str:
-    """Return the unit that a labelled array states, '' if it states no unit."""
-    return str(array.attrs.get("units") or array.attrs.get("unit") or "").strip()
-
-
-def in_si(array: Any, what: str, si: str, given: str | None = None) -> Any:
-    """Return the values of a DataArray in SI, converted from its unit or the unit of the caller."""
-    with prefixed(what, " "):
-        values = as_numbers(magnitude_in_one_of(array.data, [si])[0])
-        return values * _factor(si, unit_of(array), given)
-
-
-def _factor(si: str, stated: str, given: str | None) -> float:
-    """Return the factor to SI from the unit of the caller or of the source, which must agree."""
-    factor = factor_to(si, given or stated or si)
-    if given and parse(stated) and not np.isclose(factor_to(si, stated), factor, rtol=1e-12):
-        raise InputError(
-            f"is given in {given}, but the source states {stated}. Leave the unit out, or correct"
-            " the source"
-        )
-    return factor
+# -- columns of numbers ---------------------------------------------------------------------------
 
 
 def column_in_si(
@@ -140,34 +93,12 @@ def column_in_si(
             f"the unit of the {quantity} is not stated. Write it into the heading of"
             f" {column.label!r}{way}"
         )
-    if np.any(beyond := np.abs(column.values) >= OVERLOAD):
-        value = column.values[beyond][0]
-        raise InputError(
-            f"the {quantity} holds {value:g}, with which instruments mark an overload. Cut the"
-            f" record there, or pass missing={value:g} if this is a missing value"
-        )
-    for si in units:
-        if is_in(name, si):
-            with prefixed(quantity, " "):
-                return column.values * _factor(si, column.unit or name, given), si
-    raise InputError(
-        f"the {quantity} is in {name}. Its unit must be a multiple of {' or '.join(units)}"
-    )
-
-
-def simplified(value: Any, quantity: str) -> Any:
-    """Return a labelled array if the source has labels. Otherwise return numbers in SI."""
-    si = QUANTITIES[quantity].units
-    if isinstance(value, Table):
-        return value
-    if is_labelled(value):
-        whole = value.dims or hasattr(value, "data_vars")
-        return value if whole else in_si(value, quantity, si)
-    if hasattr(value, "to_xarray") and hasattr(value, "index"):
-        return of_pandas(value)
-    if hasattr(value, "positions_and_heights"):
-        return heights_of(value)
-    return plain(value, (si,))[0]
+    check_measured(column.values, quantity, doubted=False)
+    with prefixed(quantity, " "):
+        if given:
+            check_agreement(given, column.unit)
+        factor, si = conversion(name, tuple(units))
+    return column.values * factor, si
 
 
 def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
@@ -178,7 +109,7 @@ def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]
     """
     stated = ""
     if is_labelled(value) and not hasattr(value, "data_vars"):
-        stated, value = unit_of(value), value.data
+        stated, value = stated_unit(value), value.data
     elif hasattr(value, "to_xarray") and hasattr(value, "name"):
         stated, value = name_and_unit(str(value.name or ""))[1], value.to_numpy()
     numbers, si = plain(value, units)
@@ -192,51 +123,17 @@ def without_missing(values: Array, options: Options) -> Array:
     return np.where(np.any(absent, axis=0), np.nan, values) if absent else values
 
 
-def of_pandas(value: Any) -> Any:
-    """Return a Series or DataFrame with labels, or an array if its labels are 0, 1, 2, ...
-
-    Labels of type float are positions, m. A DataFrame with headings is
-    read like a file.
-    """
-    import xarray as xr
-
-    if value.ndim == 1:
-        if value.dtype == object:
-            value = value.astype(np.float64)
-        name, unit = name_and_unit(str(value.name or ""))
-        attributes = {"units": unit} if unit else {}
-        coords = _positions(value.index, "index of the Series")
-        if not coords and not unit:
-            return value.to_numpy()
-        return xr.DataArray(value.to_numpy(), coords, ("x",), name or None, attributes)
-    if all(isinstance(name, str) for name in value.columns):
-        return table_of_frame(value)
-    values, columns, index = value.to_numpy(), value.columns, value.index
-    if values.dtype.kind not in "fiu":
-        raise InputError("must hold numbers only. The DataFrame has columns of another type")
-    if index.dtype.kind == "f" and _is_range(columns):
-        return xr.DataArray(values.T, {"x": index.to_numpy()}, ("sample", "x"))
-    coords = _positions(columns, "columns of the DataFrame")
-    return xr.DataArray(values, coords, ("sample", "x"))
-
-
-def _is_range(index: Any) -> bool:
-    return index.dtype.kind in "iu" and bool(np.all(index == np.arange(index.size)))
-
-
-def _positions(index: Any, what: str) -> dict[str, Array]:
-    """Return positions, m, or an empty dictionary if the labels are only numbers of rows."""
-    if _is_range(index):
-        return {}
-    if index.dtype.kind != "f" or not np.all(np.isfinite(index)):
-        raise InputError(
-            f"has labels that are not positions in m: the {what} holds {index.dtype} such as"
-            f" {index[0]!r}. Give positions as floats, or only values by .to_numpy()"
-        )
-    return {"x": index.to_numpy()}
-
-
 # -- from a source to a profile ------------------------------------------------------------------
+
+
+def is_labelled(value: Any) -> bool:
+    """Return whether a value has labels: a table or an xarray object."""
+    return isinstance(value, Table) or (hasattr(value, "dims") and hasattr(value, "coords"))
+
+
+def is_coefficient(value: Any) -> bool:
+    """Return whether a labelled array states that it holds friction coefficients, unit 1."""
+    return hasattr(value, "dims") and is_in(stated_unit(value), "1")
 
 
 def labelled(
@@ -256,82 +153,88 @@ def labelled(
     It is the only dimension if each sample has a single value. The
     attributes state what was read.
     """
-    # 1. Make the source a table or labelled data.
     is_file = isinstance(source, str | Path)
-    data: Any = load(Path(source), options) if is_file else simplified(source, quantity)
-    if not is_labelled(data):
-        data = _of_array(data, source)
-    if getattr(data, "name", None) == HEIGHT and quantity != "height":
-        raise InputError(
-            "holds heights. Pass strength=, a function that maps them to strengths (Pa), or keep"
-            " them with quantity='height'"
-        )
-    # 2. Choose the column and its coordinates by the rule.
-    lines: Any = ()
-    read: Reading | None = None
-    if isinstance(data, Table):
-        array, read = _of_table(data, quantity, dims, x, value)
-        lines = data.lines
-    elif hasattr(data, "data_vars"):
-        array, read = _of_dataset(data, quantity, dims, value)
-    elif value not in (None, data.name):
-        raise InputError(
-            f"value: {value!r} is not the name of the only variable, {data.name!r}"
-        )
-    else:
-        array = data
-    if not isinstance(data, Table):
-        dims = dims or (("x", "y") if {"x", "y"} <= {*array.dims} else ("x",))
-        array = _with_places(array, dims, x)
-    dims = dims or (("x", "y") if "y" in array.coords else ("x",))
-    # 3. Name the dimensions.
-    array = _directed(array, dims)
-    if len({*dims} & {*array.coords}) == 1 < len(dims):
-        raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
-    # 4. Convert to SI, and check.
+    data: Any = load(Path(source), options) if is_file else source
+    array = named(data, quantity, dims, x=x, value=value)
+    if not getattr(array, "dims", ()):
+        array = named(_of_array(array, quantity), quantity, dims, x=x, value=value)
     if options.missing is not None:
         array = array.copy(data=without_missing(array.values, options))
-    values = in_si(array, quantity, QUANTITIES[quantity].units, unit)
-    raw = array.values if isinstance(array.data, np.ndarray) else values
-    check_positive(values, quantity, lines, raw)
-    if options.missing is None:
-        _doubt_sentinels(raw, quantity, lines)
-    if quantity == "height" and not (unit or unit_of(array) or hasattr(array.data, "units")):
-        _doubt_metres(values[np.isfinite(values)])
-    for dim in {*dims} & {*array.coords}:
-        place = in_si(array[dim], dim, "m", x_unit)
-        if not np.all(np.isfinite(place)):
-            where = _place(int(np.argmin(np.isfinite(place))), lines, place.size)
-            raise InputError(f"{dim} must be finite, and {where} is not")
-        array = array.assign_coords({dim: (array[dim].dims, place)})
-    array = array.copy(data=values)
+    read: Reading | None = array.attrs.get("read")
+    array = profile_in_si(
+        array, quantity, (QUANTITIES[quantity].units,), unit=unit, x_unit=x_unit,
+        doubted=options.missing is None,
+    )  # fmt: skip
     array.attrs = {}
     if read is not None:
-        about = read._replace(source=_source(source), unit=unit or read.unit).attributes
-        array.attrs = {key: value for key, value in about.items() if value}
+        name = Path(source).name if is_file else type(source).__name__
+        about = read._replace(source=name, unit=unit or read.unit).attributes
+        array.attrs = {key: entry for key, entry in about.items() if entry}
     return array
 
 
-def _source(source: Any) -> str:
-    return Path(source).name if isinstance(source, str | Path) else type(source).__name__
-
-
-def _of_array(values: Any, source: Any) -> Any:
+def _of_array(values: Any, quantity: str) -> Any:
     """Return an array without labels as a profile along a line or over a plane."""
     import xarray as xr
 
+    numbers, si = plain(values, (QUANTITIES[quantity].units,))
     try:
-        array = real_array(values)
-    except TypeError as error:
+        array = as_numbers(numbers)
+    except InputError as error:
         raise InputError(
-            f"must be a path, an array, or a table with labels, got {describe(source)}: {error}"
+            f"must be a path, an array, or a table with labels, got {describe(values)}: {error}"
         ) from None
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
-    return xr.DataArray(array, dims=("x", "y")[: array.ndim])
+    return xr.DataArray(array, dims=("x", "y")[: array.ndim], attrs={"units": si} if si else {})
 
 
-# -- step 2: the column and its coordinates -----------------------------------------------------
+# -- step 2: names ---------------------------------------------------------------------------------
+
+
+def named(
+    data: Any,
+    quantity: str,
+    dims: tuple[str, ...] | None = None,
+    *,
+    x: Wanted = None,
+    value: Wanted = None,
+) -> Any:
+    """Return a quantity among labelled data over 'x' (or 'x' and 'y', or 'row'), the sample first.
+
+    The attributes are the unit and, of a table, what was read. Data
+    without labels, and labelled single numbers, are returned as given.
+    """
+    # The column and its coordinates, by the rule.
+    if hasattr(data, "to_xarray") and hasattr(data, "index"):
+        if data.ndim == 1 or not all(isinstance(name, str) for name in data.columns):
+            raise InputError(
+                "a table of pandas needs headings, such as x (mm) and strength (MPa). Give values"
+                " in their order by .to_numpy()"
+            )
+        data = table_of_frame(data)
+    if isinstance(data, Table):
+        array, read = _of_table(data, quantity, dims, x, value)
+        dims = dims or (("x", "y") if "y" in array.coords else ("x",))
+    elif not (getattr(data, "dims", ()) or hasattr(data, "data_vars")):
+        return data
+    else:
+        dims = dims or (("x", "y") if {"x", "y"} <= {*data.dims} else ("x",))
+        array, read = data, None
+        if hasattr(data, "data_vars"):
+            array, read = _of_dataset(data, quantity, dims, value)
+        elif value not in (None, data.name):
+            raise InputError(
+                f"value: {value!r} is not the name of the only variable, {data.name!r}"
+            )
+        if x is not None or {*array.coords} != {*dims}:
+            array = _with_places(array, dims, x)
+    # The dimensions.
+    array = _directed(array, dims)
+    if len({*dims} & {*array.coords}) == 1 < len(dims):
+        raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
+    array.attrs |= {"read": read, "lines": getattr(data, "lines", ())}
+    return array
 
 
 def _is_map(columns: Sequence[Column]) -> bool:
@@ -365,10 +268,9 @@ def _of_table(
 
 def _of_dataset(data: Any, quantity: str, dims: Any, value: Wanted) -> tuple[Any, Reading]:
     """Return a variable of a dataset, with others along it as coordinates, and what was read."""
-    dims = dims or (("x", "y") if {"x", "y"} <= {*data.dims} else ("x",))
     names = [*data.data_vars]
     columns = tuple(
-        Column(str(name), unit_of(data[name]), data[name], -1 - number, str(name))
+        Column(str(name), stated_unit(data[name]), data[name], -1 - number, str(name))
         for number, name in enumerate(names)
     )
     if value is not None:
@@ -507,9 +409,6 @@ def _plain(name: Any) -> str:
     return str(name).casefold().replace(" ", "_")
 
 
-# -- step 3: dimensions --------------------------------------------------------------------------
-
-
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     """Return the array over 'x' (or 'x' and 'y', or 'row'). A dimension of samples comes first."""
     if len(dims) == 1 and "x" in array.coords:
@@ -532,50 +431,3 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
         )
     array = array.drop_vars([name for name in array.coords if name not in dims])
     return array.transpose(*samples, *along)
-
-
-# -- step 4: checks ------------------------------------------------------------------------------
-
-
-def _place(entry: int, lines: Any, size: int) -> str:
-    """Describe the place of an entry in the source: its line in a table, or its number."""
-    return f"line {lines[entry]}" if np.size(lines) == size else f"entry {entry}"
-
-
-def check_positive(values: Array, quantity: str, lines: Any = (), raw: Any = None) -> None:
-    """Refuse values of a positive quantity that are zero or less."""
-    wrong = np.flatnonzero(values <= 0.0)
-    if quantity in POSITIVE and wrong.size:
-        entry, given = int(wrong[0]), np.ravel(values if raw is None else raw)
-        number = f"{given[entry]:.9g}"
-        raise InputError(
-            f"{quantity} must be positive, is {number} in {_place(entry, lines, given.size)}"
-            f" ({wrong.size} such values). If it means that a value is missing, pass"
-            f" missing={number} to st.read_profile, or make it NaN"
-        )
-
-
-def _doubt_sentinels(values: Any, quantity: str, lines: Any) -> None:
-    """Warn about a number that is far from all others and often marks a missing value."""
-    flat = np.ravel(values)
-    known = flat[np.isfinite(flat)]
-    for end in (known.min(), known.max()) if known.size else ():
-        rest = known[known != end]
-        usual = np.isclose(end, SENTINELS, rtol=1e-5, atol=0.0).any()
-        if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
-            where = _place(int(np.argmax(flat == end)), lines, flat.size)
-            warn_user(
-                f"{quantity}: {end:.9g} occurs in {where} ({known.size - rest.size} such values),"
-                f" and often means that a value is missing. Pass missing={end:.9g}, or missing=()",
-                AccuracyWarning,
-            )
-
-
-def _doubt_metres(heights: Array) -> None:
-    """Warn about heights without a unit that are probably in um or nm."""
-    if heights.size and np.ptp(heights) > TALL:
-        warn_user(
-            f"height: has no unit and is read in m. The heights span {np.ptp(heights):.3g} m. Pass"
-            " unit='um' or another unit, or unit='m' if metres are right",
-            UnitWarning,
-        )

@@ -24,9 +24,9 @@ from stiction.methods.equilibrium.events import (
     tabulate,
 )
 from stiction.methods.equilibrium.patches import critical_patch, patches_of
+from stiction.problem.checks import warn_if_coarse
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
-from stiction.problem.resolution import warn_if_coarse
 from stiction.problem.sample import Sample
 
 OF_SLIDERS = {

@@ -1,0 +1,289 @@
+"""Whether profiles, units and nodes fit a problem.
+
+Each check takes values in SI. The steps of a sample are:
+
+1. Profiles with valid values fit together (`contradictions_of`).
+2. The nodes resolve the nucleation length h_n, and h_n fits the
+   interface (`check_resolution`). Methods warn with the error that they
+   expect (`warn_if_coarse`).
+3. Strengths and stresses are in the assumed units (`doubt_sample`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, UnitWarning, warn_accuracy, warn_user
+from stiction.base.units import Doubt, doubt_units
+from stiction.problem.interface import Interface
+from stiction.problem.specimen import Blocks
+
+MAX_STRENGTH_RATIO = 1e8
+"""Strength of a node over the median beyond which others are lost in round-off."""
+BARRIER = 10.0
+"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, by rank, of
+nodes that weaken."""
+MIN_NODES_IN_NUCLEATION = 4
+"""Nodes in a nucleation length."""
+HARDLY_RESOLVED = 0.04
+"""Nodes in a nucleation length below which a unit is doubted. Hundred times more are needed."""
+MIN_LENGTHS_IN_LINE = 4.0
+"""Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+AT_END = {"II": 0.445 / 1.158, "III": 0.5}
+"""Nucleation length at a free end of two equal blocks over the length in the middle."""
+FRICTION = (1e-3, 10.0), (1e-4, 100.0)
+"""Usual and possible mean strengths over normal pressure, from superlubricity to adhesive gels."""
+RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
+"""Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
+coefficient of 0.1 has 1e-8."""
+INITIAL = (1e-5, math.inf), (0.0, math.inf)
+"""Usual and possible sizes of an initial stress, if there is any, over the strength."""
+SLIP = (1e-8, math.inf), (1e-10, math.inf)
+"""Usual and possible slips over which strength falls, m. An atom measures 1e-10 m."""
+
+
+# -- profiles that fit together -----------------------------------------------------------------
+
+
+def contradictions_of(
+    interface: Interface, strength: Array, residual: Array, initial: Array, overstress: bool
+) -> list[str]:
+    """Return why profiles (samples, *shape), Pa, with valid values do not fit together.
+
+    With `overstress`, the initial stress may exceed the strength.
+    """
+    along, problems = interface.axes, []
+    over = (strength <= initial).reshape(len(strength), -1)
+    if not overstress and over.any():
+        number = int(over.any(axis=1).argmax())
+        node = int(over[number].argmax())
+        most, least = initial[number].flat[node], strength[number].flat[node]
+        further = int(over.any(axis=1).sum()) - 1
+        problems.append(
+            f"strength: must be above initial_stress. It is not at {over[number].sum()} nodes of"
+            f" sample {number}, such as {interface.describe_node(node)}: {least:g} and {most:g} Pa"
+            f"{f', and in {further} more samples' * (further > 0)}. st.Rupture() accepts this"
+        )
+    if (
+        np.max(strength, where=np.isfinite(strength), initial=0.0)
+        > MAX_STRENGTH_RATIO * strength.min()
+    ):
+        middle = np.median(strength, axis=along, keepdims=True)
+        huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
+        if middle.min() <= 0.0:
+            problems.append(
+                f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
+                f" {middle.min():g} Pa: check its sign"
+            )
+        elif huge.any():
+            number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
+            problems.append(
+                f"strength: {strength[number].flat[node]:g} Pa at {interface.describe_node(node)}"
+                f" of sample {number} is more than {MAX_STRENGTH_RATIO:g} times the median,"
+                f" {middle[number].item():g} Pa. Where nothing breaks, give a smaller strength"
+            )
+    nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
+    if nowhere.any():
+        number = int(np.argmax(nowhere))
+        known = strength[number][np.isfinite(strength[number])]
+        problems.append(
+            "strength: must be above residual_strength at one node or more. In sample"
+            f" {number} strength is {known.min():g} to {known.max():g} Pa, and residual_strength is"
+            f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
+        )
+    return problems
+
+
+def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
+    """Return the largest of some weakening rates, Pa/m, among nodes that may break.
+
+    Arrays have shape (samples, *shape). Barriers do not count: with a
+    uniform critical slip they weaken steeply but never slip.
+    """
+    drop = strength - residual
+    if drop.max() <= BARRIER * drop.min() or weakening_rate.max() == weakening_rate.min():
+        return float(weakening_rate.max())
+    drop = drop.reshape(drop.shape[0], -1)
+    weakens = np.isfinite(drop) & (drop > 0.0)
+    count = weakens.sum(axis=1, keepdims=True)
+    # numpy's quantile takes 20 times as long.
+    ordered = np.sort(np.where(weakens, drop, -np.inf), axis=1)
+    typical = np.take_along_axis(ordered, drop.shape[1] - count + (count - 1) // 4, axis=1)
+    return float(weakening_rate.reshape(drop.shape)[drop <= BARRIER * typical].max())
+
+
+# -- resolution --------------------------------------------------------------------------------
+
+
+def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[float, ...]:
+    """Return how many nodes of a `Problem` span h_n, in each direction.
+
+    The weakening rate (Pa/m) is the steepest at any slip, as everywhere
+    in this file.
+    """
+    lengths = problem.nucleation_lengths(weakening_rate)
+    return tuple(np.divide(lengths, problem.interface.spacings).tolist())
+
+
+def check_resolution(problem: Any, weakening_rate: float) -> None:
+    """Refuse a grid that does not resolve h_n at the highest weakening rate (Pa/m)."""
+    lengths = problem.half_spaces.nucleation_lengths(weakening_rate)
+    resolution = np.divide(lengths, problem.interface.spacings)
+    if min(resolution) >= MIN_NODES_IN_NUCLEATION:
+        # Blocks have no single length.
+        if problem.interface.is_held and problem.specimen is None:
+            _check_extent(problem.interface, resolution)
+        return
+    length = lengths[int(np.argmin(resolution))]
+    if min(resolution) < HARDLY_RESOLVED:
+        modulus = problem.solid.shear_modulus
+        raise InputError(
+            "solid.shear_modulus, interface.length, friction: the nucleation length is"
+            f" {length:.3g} m, and the nodes are {problem.interface.spacing:.3g} m apart. Check"
+            f" the units of the modulus, {modulus:g} Pa, of lengths, strengths"
+            f" and the weakening rate, {weakening_rate:.3g} Pa/m"
+        )
+    least = MIN_NODES_IN_NUCLEATION
+    raise InputError(
+        f"interface.nodes: must be {_finer(problem, resolution, least)} or more. The nucleation"
+        f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} of {least} nodes."
+        " Check the unit of interface.length (m)"
+    )
+
+
+def _check_extent(interface: Interface, resolution: Array) -> None:
+    """Refuse an extent narrower than the nucleation length, which is given in nodes."""
+    breakable = interface.breakable
+    for axis, dim in enumerate(interface.dims):
+        across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
+        width = np.count_nonzero(breakable.any(axis=across))
+        if width < (1.0 - 1e-9) * resolution[axis]:
+            spacing = interface.spacings[axis]
+            raise InputError(
+                f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
+                f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen it"
+            )
+
+
+def _finer(problem: Any, resolution: Any, wanted: int) -> str:
+    """Return the number of nodes for which the nucleation length spans `wanted` nodes."""
+    growth = wanted / np.maximum(resolution, 1e-300)
+    halves = np.ceil(0.5 * np.array(problem.interface.shape) * growth)
+    return " x ".join(f"{2 * n:.10g}" for n in halves)
+
+
+def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str) -> None:
+    """Warn with the error `cost` if h_n spans fewer than `enough` nodes at a rate (Pa/m)."""
+    resolution = nodes_in_nucleation_length(problem, weakening_rate)
+    if min(resolution) < enough:
+        spanned = f"{resolution[0]:.1f} nodes"
+        if problem.interface.is_plane:
+            spanned += f" along x and, in mode III, {resolution[1]:.1f} along y"
+        if isinstance(problem.specimen, Blocks):
+            spanned += f", {AT_END[problem.mode] * resolution[0]:.1f} at a free end"
+        wanted = 16 if enough <= 12.0 else 32
+        warn_accuracy(
+            f"the nucleation length spans {spanned}, and {wanted} are recommended"
+            f" (interface.nodes = {_finer(problem, resolution, wanted)}): {cost}"
+        )
+
+
+def warn_if_short(problem: Any, weakening_rate: float) -> None:
+    """Warn about an interface that h_n fills, or on which free ends would count."""
+    interface = problem.interface
+    patch = problem.nucleation_lengths(weakening_rate)[0]
+    length = min(interface.lengths)
+    if problem.specimen is not None:
+        return
+    if patch >= length:
+        warn_user(
+            f"the critical patch (nucleation length {patch:.3g} m) fills the interface"
+            f" ({length:.3g} m). Check the units of length, shear modulus and weakening rate",
+            UnitWarning,
+        )
+    elif length < MIN_LENGTHS_IN_LINE * patch and not interface.is_plane:
+        warn_accuracy(
+            f"the interface is {length / patch:.2g} nucleation lengths long and continues"
+            " periodically. Under an antiplane load, free ends would lower its onset by about"
+            f" {min(3.0, 5.0 * patch / length):.1g} % on average and up to 17 % in single cases"
+        )
+
+
+# -- doubts about units -----------------------------------------------------------------------
+
+
+def doubt_sample(problem: Any, sample: Any) -> None:
+    """Warn about the units of given profiles, as `doubt_strengths` does."""
+    pressure = float(sample.mean(sample.normal_pressure).mean())
+    doubt_strengths(
+        problem,
+        sample.mean_strength,
+        float(sample.residual_strength.mean()),
+        pressure=None if math.isnan(pressure) else pressure,
+        initial=float(np.abs(sample.initial_stress).max()),
+    )
+
+
+def doubt_strengths(
+    problem: Any,
+    strength: float,
+    residual: float = 0.0,
+    scales: Mapping[str, Any] | None = None,
+    pressure: float | None = None,
+    initial: float | None = None,
+) -> None:
+    """Warn about mean peak and residual strengths (Pa) that do not fit the rest of the problem.
+
+    Raise an `InputError` for strengths that cannot fit, and for
+    scales of slip, given by name, that the grid does not resolve at
+    these strengths. By default, `pressure` and `initial`, the size
+    of the initial stress, come from the problem.
+    """
+    friction, modulus = problem.friction, problem.solid.shear_modulus
+    pressure = problem.given_pressure if pressure is None else pressure
+    compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+    if pressure is not None:
+        mean = float(np.mean(pressure))
+        compared.append(("strength", strength, "normal pressure", mean, FRICTION))
+    if residual:
+        compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
+    doubts = [
+        Doubt(
+            f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check the"
+            " units of both (Pa). Friction coefficients need quantity='friction_coefficient'",
+            mean / of,
+            *limits,
+        )
+        for name, mean, what, of, limits in compared
+    ]
+    drop = strength - float(np.mean(friction.residual(np.array(strength))))
+    if friction.weakening_rate is not None and drop > 0.0:
+        slip = drop / float(np.median(friction.weakening_rate))
+        text = (
+            f"strength: its mean, {strength:.4g} Pa, falls within a slip of {slip:.2g} m, the"
+            " size of a few atoms. Check the units of strength, pressure and weakening_rate"
+        )
+        doubts.append(Doubt(text, slip, *SLIP))
+    if initial is None:
+        initial = float(np.max(np.abs(problem.load.initial_stress)))
+    if initial:
+        text = (
+            f"initial_stress: its largest size, {initial:.4g} Pa, is"
+            f" {initial / strength:.2g} of the strength. Check its unit (Pa)"
+        )
+        doubts.append(Doubt(text, initial / strength, *INITIAL))
+    if doubt_units(doubts):
+        return
+    given = friction.scale if friction.weakening_rate is None else None
+    fixed = {} if given is None else dict([given])
+    for scale, value in (scales or fixed).items():
+        fall = np.array(strength - residual)
+        W = max(float(friction.weakening_rate_of(fall, scale, np.median(value))), 1e-300)
+        W *= friction.steepening
+        warn_if_short(problem, W)
+        check_resolution(problem, W)
