@@ -82,8 +82,11 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
         check_resolution(problem, sample.steepest_weakening_rate)
         return sample
     # 1. to 4. The steps for each profile.
-    given, mistakes = named_profiles(profiles), {}
-    placed, nodes = dict(given), (interface,)
+    given, mistakes, nodes = named_profiles(profiles), {}, (interface,)
+    placed: dict[str, Any] = {
+        name: value.to_xarray(interface) if isinstance(value, ProfileFile) else value
+        for name, value in given.items()
+    }
     for step, known in (
         (named, (interface.dims,)), (profile_in_si, ()), (on_nodes, nodes), (as_rows, nodes)
     ):  # fmt: skip
