@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import stiction as st
+from stiction import statistics
 from stiction.plot.style import INK, PAGE, PALE, QUIET, color, paper_style
-from stiction.statistics import estimates
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 PIXELS = 1400
@@ -67,7 +67,7 @@ def monte_carlo(
             lowest = int(tau_n[0].argmin())
             below.plot(x[lowest], tau_n[0, lowest], "o", color=color(i), markersize=3.5)
             _density(beside[1], tau_n[:, ::16].ravel(), i)
-            estimate = estimates.density(
+            estimate = statistics.density(
                 onsets[ratio].critical_stress.values * 1e-6, bounds=(0.66, 1.66)
             )
             seen = estimate.value > 2e-3 * estimate.value.max()
@@ -97,7 +97,7 @@ def monte_carlo(
 
 
 def _density(axes: Axes, values: Any, index: int) -> None:
-    estimate = estimates.density(values, bounds=(0.66, 1.66))
+    estimate = statistics.density(values, bounds=(0.66, 1.66))
     axes.plot(estimate.value, estimate.x, color=color(index), linewidth=1.0)
 
 

@@ -17,7 +17,7 @@ from reproduction.numbers_with_errors import Number, mean, share
 from reproduction.runner import Data, LeftOut
 from reproduction.setting import DROP, FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIMULATED, H
 from reproduction.studies import NORMAL, READINGS, infinite_variance_ratio
-from stiction.statistics.estimates import density
+from stiction.statistics import density
 
 RESIDUAL, SECOND = setting.RESIDUAL, setting.SECOND
 SPACING = setting.PROBLEM.interface.spacing

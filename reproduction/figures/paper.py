@@ -12,7 +12,7 @@ from reproduction.measures import is_misplaced, offsets, paired, stress_density
 from reproduction.numbers_with_errors import Number, mean, quantile
 from reproduction.runner import Data
 from reproduction.setting import FIRST, HIGH, LAST, LOW, MEAN, PROBLEM, RATIOS, SIMULATED, H, L
-from stiction.statistics import estimates
+from stiction.statistics import density as smooth_density
 
 LAW = setting.MARGINAL.distribution
 X = PROBLEM.interface.x / L
@@ -212,7 +212,7 @@ def figure_5(d: Data):
         density = counts / counts.sum() / (edges[1] - edges[0])
         densities.plot(density, 0.5 * (edges[1:] + edges[:-1]), **look)
         weakest = d.at("moments", "weakest_strength", ratio)
-        least = estimates.density(weakest, bounds=setting.DENSITY_BOUNDS)
+        least = smooth_density(weakest, bounds=setting.DENSITY_BOUNDS)
         minima.plot(least.value / least.value.max(), least.x / MEAN, **look)
         x, value, error = stress_density(d, ratio)
         stress.plot(x / MEAN, value * MEAN, **look, label=f"{ratio:g}")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from stiction.statistics.estimates import density, mean, quantiles, standard_deviation
+from stiction.statistics import density, mean, quantiles, standard_deviation
 
 RNG = np.random.default_rng(20)
 

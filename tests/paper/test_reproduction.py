@@ -99,7 +99,7 @@ def test_readings_that_differ_leave_a_statement_to_the_text_and_limits_are_varie
 
 def test_only_public_names_are_used():
     """Beyond them the style of figures and a smoothed density, which only figures use."""
-    figures = r"from stiction\.(plot\.style|statistics(\.estimates)?) import "
+    figures = r"from stiction\.(plot\.style|statistics) import "
     for path in (ROOT / "reproduction").rglob("*.py"):
         text = re.sub(figures, "", path.read_text())
         assert set(re.findall(r"\bst\.(\w+)", text)) <= {*st.__all__, "__version__"}, path

@@ -27,8 +27,8 @@ from stiction.plot.axes import (
 )
 from stiction.plot.style import BAND, INK, MARKERS, PALE, QUIET, color, series
 from stiction.reliability.answer import Answer, bounded
-from stiction.statistics.estimates import density
-from stiction.statistics.estimates import quantiles as estimate_quantiles
+from stiction.statistics import density
+from stiction.statistics import quantiles as estimate_quantiles
 
 MAX_CURVES = 6
 FEWEST = 20

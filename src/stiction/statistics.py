@@ -1,4 +1,7 @@
-"""Estimates from samples, with errors: means, standard deviations, quantiles and densities."""
+"""Statistics of samples: means, quantiles and densities with errors, and agreement with tests.
+
+The exact moments of the nucleation stress are in `stiction.theory`.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +15,17 @@ from scipy.ndimage import gaussian_filter1d
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import Real, RealArray, check, checked
+from stiction.inference.agreement import agreement
+
+__all__ = ["agreement"]
 
 GRID_CELLS = 4096
 KERNEL_END = 8.0
 """End of the kernel, in standard deviations."""
+
+
+def __dir__() -> list[str]:  # what completion lists
+    return __all__
 
 
 class WithError(NamedTuple):
@@ -87,7 +97,7 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
     Examples
     --------
     >>> import numpy as np
-    >>> from stiction.statistics.estimates import density, quantiles
+    >>> from stiction.statistics import density, quantiles
     >>> found = quantiles(np.random.default_rng(0).normal(size=2000), [0.5])
     >>> bool(found.lower[0] < 0.0 < found.upper[0])
     True
@@ -148,7 +158,7 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     Examples
     --------
     >>> import numpy as np
-    >>> from stiction.statistics.estimates import density, quantiles
+    >>> from stiction.statistics import density, quantiles
     >>> found = density(np.random.default_rng(0).normal(size=2000))
     >>> bool(abs(found.value.max() - 0.4) < 0.03)  # 1/sqrt(2 pi)
     True
