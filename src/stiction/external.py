@@ -1,6 +1,7 @@
 """Functions for external programs: samplers, reliability codes, tables, the SCEC comparison."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,36 +35,6 @@ def __dir__() -> list[str]:  # what completion lists
     return __all__
 
 
-@dataclass(frozen=True, eq=False)
-class Simulator:
-    """Simulated peaks as a function of parameters. See `stiction.external.simulator`."""
-
-    problem: Problem
-    random: RandomInterface
-    parameters: tuple[str, ...]
-    method: Any
-    samples: int
-    seed: int
-    load_cell_error: float
-
-    def __call__(self, theta: Any, *, first: int = 0) -> Array:
-        """Return the peaks (samples,), Pa, of samples first, first + 1, ... at theta."""
-        first = check("first", first, Number)
-        values = check("theta", theta, RealArray)
-        if values.shape != (len(self.parameters),) or not np.isfinite(values).all():
-            raise InputError(
-                f"theta: must be {len(self.parameters)} finite numbers,"
-                f" {', '.join(self.parameters)}, got {describe(theta)}"
-            )
-        at_values = with_parameters(self.problem, self.random, self.parameters, values)
-        (peaks,) = simulate(
-            [Experiment(*at_values, self.method)],
-            Simulation(self.method, self.samples, self.seed), first, "critical_stress",
-        )  # fmt: skip
-        errors = np.random.default_rng([self.seed, first, 1]).standard_normal(self.samples)
-        return peaks + self.load_cell_error * errors
-
-
 @checked
 def simulator(
     problem: Problem,
@@ -74,7 +45,7 @@ def simulator(
     samples: Count,
     seed: Number = 0,
     load_cell_error: NotNegative = 0.0,
-) -> Simulator:
+) -> Callable[..., Array]:
     """Return a function that simulates the peaks of repeated tests, for dynesty or sbi.
 
     Parameters
@@ -91,8 +62,8 @@ def simulator(
 
     Returns
     -------
-    Simulator
-        A callable that can be pickled for other processes.
+    callable
+        A function that can be pickled for other processes.
         ``simulate(theta)`` returns an array (samples,) of
         peaks, Pa, for an array theta with a number for each
         parameter. ``simulate(theta, first=k)`` returns the
@@ -128,7 +99,27 @@ def simulator(
             unknown += [text for text in error.problems if "unknown" in text]
     if unknown:
         raise InputError(unknown)
+    return partial(
+        _peaks_at, problem, interface, parameters, Simulation(method, samples, seed),
+        load_cell_error,
+    )  # fmt: skip
 
-    return Simulator(
-        problem, interface, tuple(parameters), method, samples, seed, load_cell_error
+
+def _peaks_at(
+    problem: Problem, random: RandomInterface, parameters: Names, simulation: Simulation,
+    error: float, theta: Any, *, first: int = 0,
+) -> Array:  # fmt: skip
+    """Return the peaks (samples,), Pa, of samples first, first + 1, ... at parameters theta."""
+    first = check("first", first, Number)
+    values = check("theta", theta, RealArray)
+    if values.shape != (len(parameters),) or not np.isfinite(values).all():
+        raise InputError(
+            f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
+            f" {describe(theta)}"
+        )
+    experiment = Experiment(
+        *with_parameters(problem, random, parameters, values), simulation.method
     )
+    (peaks,) = simulate([experiment], simulation, first, "critical_stress")
+    rng = np.random.default_rng([simulation.seed, first, 1])
+    return peaks + error * rng.standard_normal(peaks.size)

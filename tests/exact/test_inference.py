@@ -257,12 +257,3 @@ def test_a_prior_that_begins_where_its_density_is_zero():
     prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": distribution})
     low, high = prior.ends[:, 0]
     assert 0.1 * H_N < low < high < 10.0 * H_N
-
-
-def test_draws_of_the_prior_and_back():
-    low = scipy.stats.norm(0.6e6, 0.02e6)
-    prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": LENGTH, "marginal.low": low})
-    u = np.random.default_rng(0).random((50, 2))
-    np.testing.assert_allclose(prior.u(prior.theta(u)), u, atol=1e-12)
-    outside = prior.theta(u[:1]) * np.array([100.0, 1.0])
-    assert not (0.0 <= prior.u(outside)[0, 0] <= 1.0)

@@ -6,13 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.stats
 import xarray as xr
 from setups import LOCAL
 
 import stiction as st
-from stiction.ensemble.experiment import Experiment
-from stiction.inference.infer import UNFINISHED
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
@@ -30,65 +27,6 @@ PEAKS = st.monte_carlo(PROBLEM, STRENGTH, **THIRTY, pilot=False).critical_stress
 def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
     options = {"method": LOCAL, "samples": 400} | options
     return st.infer(problem, random, peaks, prior=prior, **options)
-
-
-def test_a_call_after_an_interruption_takes_the_finished_onsets(monkeypatch):
-    solve, solved = Experiment.results, []
-
-    def results(self, first, count):
-        if len(solved) == last:
-            raise stop
-        solved.append(first)
-        return solve(self, first, count)
-
-    monkeypatch.setattr(Experiment, "results", results)
-    given = {"prior": {"correlation_length": (H_N, 2.0 * H_N)}, "workers": 1}
-    stop, last = KeyboardInterrupt, -1
-    uninterrupted = infer(**given)
-    total, last = len(solved), len(solved) + 2
-    with pytest.raises(KeyboardInterrupt):
-        infer(**given)
-    last = -1
-    resumed = infer(**given)
-    assert len(solved) == 2 * total  # no batch is solved twice
-    np.testing.assert_array_equal(resumed.u, uninterrupted.u)
-    infer(**given)
-    assert len(solved) == 3 * total  # a complete call leaves nothing behind
-    stop, last = MemoryError, len(solved) + 2
-    with pytest.raises(MemoryError):
-        infer(**given)
-    assert not UNFINISHED  # an error leaves nothing behind
-
-
-@pytest.mark.filterwarnings("ignore:Estimated shape parameter:UserWarning")  # seven peaks
-def test_arviz():
-    arviz = pytest.importorskip("arviz")
-    posterior = infer(prior=PRIOR, samples=400, load_cell_error=5e3)
-    found = posterior.to_arviz()
-    groups = {"posterior", "prior", "log_likelihood", "posterior_predictive", "observed_data"}
-    assert all(group in found for group in groups)
-    likely = found["log_likelihood"]["peak"]
-    assert likely.dims[-1] == "test"
-    assert found["observed_data"]["peak"].size == PEAKS.size
-    theta = np.stack([posterior.draws[name][:5] for name in PRIOR], axis=1)
-    whole = likely.sum("test").values[0, :5]
-    np.testing.assert_allclose(posterior.log_likelihood(theta), whole, rtol=1e-9)
-    loo = arviz.loo(found)
-    assert np.isfinite(getattr(loo, "elpd_loo", None) or loo.elpd)
-
-
-def test_predicted_campaigns_have_as_many_independent_tests_as_the_measured_one():
-    """Nearly nothing is unknown, so that tests of a campaign scatter as those of all do."""
-    prior = {"marginal.low": scipy.stats.uniform(0.659e6, 2e3)}
-    both = infer({0.1: PEAKS, 0.05: PEAKS[:6] + 1e4}, prior=prior, load_cell_error=2e3)
-    campaigns = both.to_arviz()["posterior_predictive"]["peak"].values.reshape(4000, 36)
-    alike = np.corrcoef(campaigns.T)[np.triu_indices(36, 1)]
-    assert np.abs(alike).max() < 0.1  # 630 pairs of 4,000: 4 standard errors are 0.064
-    for columns, one in zip((slice(30), slice(30, 36)), both.predicted, strict=True):
-        own = campaigns[:, columns]
-        assert own.mean() == pytest.approx(one.mean(), abs=0.1 * one.std())
-        within = np.sqrt(own.var(axis=1, ddof=1).mean())
-        assert within == pytest.approx(one.std(), rel=0.1)
 
 
 def test_doubts_are_named_where_the_caller_stands():

@@ -42,12 +42,7 @@ def test_the_recipe_needs_what_the_package_needs():
 
 def test_the_lowest_versions_that_are_tested_are_those_that_are_promised():
     extras = META["optional-dependencies"]
-    needed = [
-        *META["dependencies"],
-        *extras["distributed"],
-        *extras["inference"],
-        *extras["test"],
-    ]
+    needed = [*META["dependencies"], *extras["distributed"], *extras["test"]]
     promised = {re.sub(r">=([\d.]+).*", r"==\1", one) for one in needed}
     lines = (ROOT / "tests" / "lowest.txt").read_text().splitlines()
     assert {line for line in lines if not line.startswith("#")} == promised

@@ -27,8 +27,6 @@ Steps:
 
 import itertools
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -39,7 +37,7 @@ from scipy.stats import entropy
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, Progress, checked
-from stiction.base.progress import Meter, Show
+from stiction.base.progress import Meter
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
 from stiction.inference.fit import FieldFit
@@ -92,24 +90,6 @@ PRIOR_END, PILED = 0.02, 4.0
 """Fraction of a prior at either end, and multiple of it above which the posterior piles up."""
 OUTWARDS = np.array([[-1.0], [1.0]])
 """Directions in which the lower and the upper corner of a box move when it grows."""
-
-
-UNFINISHED: dict[Any, Array] = {}
-"""Onsets from an interrupted call. The next equal call takes them."""
-
-
-@contextmanager
-def _simulating(
-    method: Any, samples: int | None, seed: int, workers: int | None, progress: Show
-) -> Iterator[Simulation]:
-    """Provide a simulation. It keeps its onsets after Ctrl-C, and discards them otherwise."""
-    with Meter("infer", show=progress) as meter:
-        try:
-            yield Simulation(method, samples, seed, workers, meter, UNFINISHED)
-        except Exception:
-            UNFINISHED.clear()
-            raise
-        UNFINISHED.clear()
 
 
 @checked
@@ -170,7 +150,7 @@ def infer(
     Returns
     -------
     Posterior
-        With `draws`, `mean`, `interval` and `information` (nats). `to_arviz()` is for ArviZ.
+        With `draws`, `mean`, `interval` and `information` (nats).
 
     Raises
     ------
@@ -189,7 +169,7 @@ def infer(
     -----
     The posterior is summed on a grid, with a kernel density of simulated onsets as likelihood
     (`stiction.inference.infer` has the steps). At most four parameters are simulated, besides
-    those that only shift and stretch the strength. After Ctrl-C an identical call continues.
+    those that only shift and stretch the strength.
 
     Examples
     --------
@@ -237,7 +217,8 @@ def infer(
             f"peaks: are of specimens of {length:g} m, but the problem is of {size:g} m. Pass the"
             " problem of the tests. The posterior serves other problems, too"
         )
-    with _simulating(method, samples, seed, workers, progress) as simulation:
+    with Meter("infer", show=progress) as meter:
+        simulation = Simulation(method, samples, seed, workers, meter)
         if of_parameters:
             if between is not None:
                 raise InputError(

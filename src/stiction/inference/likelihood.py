@@ -154,18 +154,13 @@ def of_length(problem: Problem, length: float | None) -> Problem:
 
 
 class Simulation(NamedTuple):
-    """Settings for the simulation of onsets.
-
-    `done` holds onsets from an interrupted call, by experiment and
-    samples. New onsets are added.
-    """
+    """Settings for the simulation of onsets."""
 
     method: Any
     samples: int | None  # at each node; by default as many as the method needs
     seed: int
     workers: int | None = None  # threads; all cores by default
     meter: Meter = SILENT
-    done: dict[Any, Array] | None = None
 
 
 def is_guided(prior: Prior, method: Any) -> bool:
@@ -183,7 +178,6 @@ def simulate(
     Sample i has the same draws in each experiment (step 3).
     """
     samples: Any = simulation.samples
-    done = {} if simulation.done is None else simulation.done
     peaks = np.empty((len(experiments), samples))
     seeded = [experiment.with_seed(simulation.seed) for experiment in experiments]
     # Batches begin at blocks of draws, because a part of a block costs
@@ -196,10 +190,7 @@ def simulate(
 
     def work(job: tuple[Array, Experiment, int, int]) -> None:
         row, experiment, start, count = job
-        key = experiment, start, count, variable
-        if key not in done:
-            done[key] = experiment.results(start, count)[variable]
-        row[start - first : start - first + count] = done[key]
+        row[start - first : start - first + count] = experiment.results(start, count)[variable]
         simulation.meter.advance(count)
 
     in_threads(work, jobs, simulation.workers or usable_cores())

@@ -13,13 +13,12 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Number, RealArray, check, checked
+from stiction.base.model import Count, Number, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.units import as_texts
 from stiction.base.variables import unit_of_key
 from stiction.inference.likelihood import Simulation
 from stiction.inference.peaks import Peaks, title_of
-from stiction.inference.prior import Prior
 from stiction.inference.specimens import (
     MEAN_KEY,
     PRIOR_SCALE,
@@ -36,8 +35,7 @@ from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key, value_at, with_values
 from stiction.random.fields import RandomInterface
 
-POSTERIOR_DRAWS, CHAINS = 4000, 4
-"""Number of draws, and of the chains into which ArviZ expects them to be cut."""
+POSTERIOR_DRAWS = 4000
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -93,12 +91,6 @@ class Posterior(WithFactors, Result):
         return str(self.likelihood.method.label)
 
     @property
-    def prior(self) -> Prior:
-        """Prior, whose `theta(u)` and `u(theta)` map the unit cube to the parameters and back."""
-        prior: Prior = self.likelihood.prior
-        return prior
-
-    @property
     def inferred(self) -> tuple[str, ...]:
         """Keys of the parameters that measurements changed. The others were stated."""
         return self.names
@@ -112,7 +104,7 @@ class Posterior(WithFactors, Result):
     def before(self) -> dict[str, Array]:
         """Draws from the prior."""
         u = np.random.default_rng(self.seed).random(self.u.shape)
-        return dict(zip(self.names, self.prior.theta(u).T, strict=True))
+        return dict(zip(self.names, self.likelihood.prior.theta(u).T, strict=True))
 
     @cached_property
     def mean(self) -> dict[str, float]:
@@ -127,7 +119,7 @@ class Posterior(WithFactors, Result):
 
     def at(self, draw: int) -> tuple[Problem, RandomInterface]:
         """Return the problem and the random interface at a draw."""
-        return self.prior.at(np.array([own[draw] for own in self.draws.values()]))
+        return self.likelihood.prior.at(np.array([own[draw] for own in self.draws.values()]))
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
@@ -169,89 +161,11 @@ class Posterior(WithFactors, Result):
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return self._scattered([self.at(int(draw))[1] for draw in draws])
 
-    def prior_transform(self, u: Any) -> Array:
-        """Return the parameters at points u in the unit cube, in which the prior is uniform.
-
-        Parameters
-        ----------
-        u : (parameters,) or (points, parameters) array
-        """
-        given = self._points("u", u)
-        return self.prior.theta(np.atleast_2d(given)).reshape(given.shape)
-
-    def log_likelihood(self, theta: Any) -> Array | float:
-        """Return the logarithm of the likelihood of all peaks.
-
-        Parameters
-        ----------
-        theta : (parameters,) or (points, parameters) array
-            Parameters in the order of `names`.
-
-        Returns
-        -------
-        float or (points,) array
-            -inf outside the prior.
-        """
-        given = self._points("theta", theta)
-        values = self.likelihood(self.prior.u(np.atleast_2d(given)))
-        return float(values[0]) if given.ndim == 1 else values
-
-    def _points(self, name: str, given: Any) -> Array:
-        points: Array = check(name, given, RealArray)
-        wanted = len(self.names)
-        if points.ndim not in (1, 2) or points.shape[-1] != wanted:
-            raise InputError(
-                f"{name}: must have shape ({wanted},) or (points, {wanted}). Got {points.shape}"
-            )
-        return points
-
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
         """Peaks of further tests: for each kind of specimen, one peak for each draw."""
         kinds = range(len(self.peaks.values))
         return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
-
-    def to_arviz(self) -> Any:
-        """Return the posterior, prior, log-likelihood, prediction and data for ArviZ.
-
-        The result is an `arviz.InferenceData`, or a `DataTree` from
-        ArviZ 1 on. The draws are independent. They are divided into
-        four chains because ArviZ compares chains.
-
-        Raises
-        ------
-        InputError
-            If ArviZ is not installed.
-        """
-        try:
-            import arviz
-        except ImportError:
-            raise InputError(
-                "to_arviz: needs the package arviz. Run: pip install 'stiction[inference]'"
-            ) from None
-        measured = np.concatenate(self.peaks.values)
-        name = "friction_coefficient" if self.peaks.unit == "1" else "peak"
-        groups = {
-            "posterior": {key: _in_chains(own) for key, own in self.draws.items()},
-            "prior": {key: _in_chains(own) for key, own in self.before.items()},
-            "log_likelihood": {name: _in_chains(self.likelihood.parts(self.u))},
-            "posterior_predictive": {name: _in_chains(self._campaigns())},
-            "observed_data": {name: measured},
-        }
-        # ArviZ compares models by the likelihood of single tests.
-        of: Any = {"coords": {"test": np.arange(measured.size)}, "dims": {name: ["test"]}}
-        if "InferenceData" in vars(arviz):  # before its version 1
-            return arviz.from_dict(**groups, **of)
-        return arviz.from_dict(groups, **of)
-
-    def _campaigns(self) -> Array:
-        """For each draw, draw a campaign with the measured number of tests, as (draws, tests)."""
-        # All tests of a campaign share the parameters of their draw.
-        parts = [
-            self.likelihood.predicted(kind, np.repeat(self.u, peaks.size, axis=0), self.seed)
-            for kind, peaks in enumerate(self.peaks.values)
-        ]
-        return np.concatenate([part.reshape(len(self.u), -1) for part in parts], axis=1)
 
     def _summary(self) -> Summary:
         strength, rows = self.at(0)[1].strength, []
@@ -268,11 +182,6 @@ class Posterior(WithFactors, Result):
             rows.append(Row(name, self.mean[name], self.interval[name], unit, remark))
         title = f"{title_of(self.peaks)}; onset by {self.method}, posterior means"
         return Summary(title, rows, "90 % interval", self.notes)
-
-
-def _in_chains(values: Array) -> Array:
-    """Divide draws (draws, ...) into chains (chains, draws, ...)."""
-    return values.reshape(CHAINS, -1, *values.shape[1:])
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -423,14 +332,6 @@ class SpecimenPosterior(Posterior):
         """Return the prediction if it needs no samples: specimens differ only as a whole."""
         exact = self.grid.profiles.whole and not self._between
         return self.prediction(problem, method, {}, None) if exact else None
-
-    @property
-    def prior(self) -> Any:
-        """Raise an `InputError`, because fields within a specimen have no prior of parameters."""
-        raise InputError(
-            "prior: fields within a specimen have none. `prior_transform` and `log_likelihood` need"
-            " a posterior from st.infer with a prior of parameters"
-        )
 
     def _summary(self) -> Summary:
         summary = super()._summary()

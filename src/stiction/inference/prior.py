@@ -72,15 +72,6 @@ class Prior:
             result[:, i] = distribution.ppf(low + (high - low) * u[:, i])
         return result
 
-    def u(self, theta: Array) -> Array:
-        """Return the inverse of `theta`. A point outside the prior is outside [0, 1]."""
-        result = np.empty_like(theta)
-        for i, distribution in enumerate(self.distributions.values()):
-            low, high = _tails(distribution)
-            result[:, i] = (distribution.cdf(theta[:, i]) - low) / (high - low)
-        low, high = self.ends
-        return np.where((theta < low) | (theta > high), -1.0, result)
-
     def at(self, theta: Array) -> tuple[Problem, RandomInterface]:
         """Return the problem and the random interface at a point (parameters,)."""
         with self.named(theta):
