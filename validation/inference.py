@@ -15,9 +15,9 @@ import numpy as np
 import scipy.stats
 
 import stiction as st
-from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import Simulation, experiments_at, make_likelihood, simulate
 from stiction.inference.peaks import make_peaks
+from stiction.inference.posterior import grid_of
 from stiction.inference.prior import make_prior
 
 DRAWS, BINS, TESTS = 99, 10, 25

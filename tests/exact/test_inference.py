@@ -9,7 +9,6 @@ from setups import EXACT, LOCAL, turns
 
 import stiction as st
 from stiction.inference.density import densities_of, log_likelihoods
-from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
     Simulation,
     effective_samples,
@@ -18,6 +17,7 @@ from stiction.inference.likelihood import (
     moved,
     simulate,
 )
+from stiction.inference.posterior import grid_of
 from stiction.inference.prior import find_scaling, make_prior
 
 PROBLEM = st.paper.problem(nodes=256)

@@ -20,7 +20,7 @@ Steps for the information, for each design and each simulated campaign:
 1. Draw the parameters from the prior.
 2. Draw the peaks from the simulated onsets that also give the likelihood.
 3. Compute the posterior of the unknown parameters on a grid
-   (`stiction.inference.grid`). Known parameters keep their drawn
+   (`stiction.inference.posterior`). Known parameters keep their drawn
    values. If the posterior lies between the points of a coarse grid,
    make the box smaller around the true parameters.
 4. Compute the divergence of each marginal
@@ -65,11 +65,10 @@ from stiction.base.model import (
 from stiction.base.progress import Meter
 from stiction.base.variables import Variable
 from stiction.ensemble.experiment import Experiment
-from stiction.inference.grid import grid_of
 from stiction.inference.infer import profiles_of
 from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
 from stiction.inference.peaks import Peaks, factor_of, si_of
-from stiction.inference.posterior import SpecimenPosterior
+from stiction.inference.posterior import SpecimenPosterior, grid_of
 from stiction.inference.prior import make_prior
 from stiction.inference.specimens import (
     MEAN_KEY,

@@ -6,7 +6,10 @@ normal noise. Find the marginal, the spectrum and the noise.
 
 Sources. The composite likelihood follows Varin, Reid and Firth (2011),
 Statistica Sinica 21, 5. The criterion is due to Akaike (1974), IEEE
-Transactions on Automatic Control 19, 716. Steps 3, 5 and 6 are our own.
+Transactions on Automatic Control 19, 716. Steps 7 and 8 follow Paule and
+Mandel (1982), Journal of Research of the National Bureau of Standards
+87, 377, and Viechtbauer (2007), Statistics in Medicine 26, 37. Steps 3,
+5, 6 and 9 are our own.
 
 Steps:
 
@@ -26,8 +29,18 @@ Steps:
    ratios has the mean and variance of a sum over N^2/sum rho_ij^3
    independent values.
 6. If records come from different specimens, scale them as if they came
-   from one specimen (`between`). This requires the scatter of means
+   from one specimen (steps 7 to 9). This requires the scatter of means
    that the field alone causes, so repeat the fit `ROUNDS` times.
+7. Records k = 1, ..., n have means with logarithms L_k, to which the
+   field alone gives the variances v_k. With weights 1/(s + v_k), take
+   the mean m(s) of the logarithms and Q(s) = sum (L_k - m(s))^2/(s + v_k).
+   At the true variance s between specimens, Q has a chi-square
+   distribution with n - 1 degrees of freedom.
+8. Estimate s from Q(s) = n - 1, the mean of this distribution. Use s =
+   0 if Q(0) is smaller.
+9. Reduce the differences between the logarithms until Q(0) = n - 1, and
+   scale the records to these means. Equal means would lack the variance
+   that the field alone causes between records.
 """
 
 import math
@@ -38,10 +51,11 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, collect_warnings, issue
-from stiction.inference.between import as_of_one, levels_of, scatter_between
 from stiction.inference.marginal_fit import Family, kolmogorov_distance, mean_log_likelihood
 from stiction.inference.records import Record
 from stiction.inference.whittle import (
@@ -70,6 +84,10 @@ BANDS_PER_OCTAVE = 3
 """Bands of wavenumbers whose averages measure the roughness."""
 DRAWN = 5.0
 """Difference of scores above which no field of the lower family is drawn."""
+
+
+MOST_SCATTER = math.log(2.0)
+"""Largest variance s of the search, of a log-normal factor with coefficient of variation 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +176,10 @@ class BestFit:
     def within(self) -> Array:
         """Variance that the field alone causes in the log mean of each record."""
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
+
+    def chance_of_scatter(self, levels: Array) -> float:
+        """Return the probability that means of records from one field scatter as much (step 7)."""
+        return float(chi2.sf(_q(levels, self.of_means, 0.0), levels.size - 1))
 
     @property
     def independent(self) -> float:
@@ -353,3 +375,53 @@ def ranking(
         for place, member in zip(best_first, estimates, strict=True)
     }
     return estimates, families, independent
+
+
+def levels_of(rows: Sequence[Array]) -> Array:
+    """Return the means of records from different specimens."""
+    levels = np.array([row.mean() for row in rows])
+    if levels.min() <= 0.0:
+        raise InputError(f"between: needs records with a positive mean. Got {levels.min():g}")
+    return levels
+
+
+def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
+    """Return the records scaled as if all came from one specimen (step 9).
+
+    `within` holds the variances v_k.
+    """
+    levels = levels_of(rows)
+    if levels.size < 2:
+        return list(rows)
+    logarithms = np.log(levels)
+    # Records of a uniform field have no variance of their own.
+    weight = 1.0 / np.maximum(within, 1e-300)
+    away = logarithms - weight @ logarithms / weight.sum()
+    excess = max(float(weight @ away**2) / (levels.size - 1), 1e-300)
+    wanted = np.exp(away / math.sqrt(excess))
+    # The mean over all records stays.
+    factors = wanted / wanted.mean() * levels.mean() / levels
+    return [row * factor for row, factor in zip(rows, factors, strict=True)]
+
+
+def _q(values: Array, within: Array, s: float) -> float:
+    """Return Q(s) for values (step 7)."""
+    weight = 1.0 / (s + within)
+    middle = float(weight @ values / weight.sum())
+    return float(weight @ (values - middle) ** 2)
+
+
+def scatter_between(logarithms: Array, within: Array) -> float:
+    """Estimate the coefficient of variation of a log-normal factor between records (step 8).
+
+    For a single record the estimate is 0.
+    """
+
+    def excess(s: float) -> float:  # it falls as s rises
+        return _q(logarithms, within, s) - (logarithms.size - 1)
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    bracketed = excess(MOST_SCATTER) < 0.0
+    variance = brentq(excess, 0, MOST_SCATTER) if bracketed else MOST_SCATTER
+    return math.sqrt(math.expm1(variance))

@@ -4,8 +4,8 @@ Problem. Records are samples of one random field, with noise. Find the
 field, and how well the records determine the field.
 
 Sources. The parts, and their sources, are described in `records`,
-`window`, `whittle`, `marginal_fit`, `estimate`, `bootstrap`, `between`
-and `specimens`.
+`window`, `whittle`, `marginal_fit`, `estimate`, `bootstrap` and
+`specimens`.
 
 Steps:
 
@@ -46,7 +46,6 @@ from stiction.base.errors import InputError, UnitWarning, unknown_name, warn_acc
 from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Progress, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
-from stiction.inference.between import chance_of_scatter
 from stiction.inference.bootstrap import (
     MIN_REPETITIONS,
     NotRepeated,
@@ -524,7 +523,7 @@ def _judged(
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, fitted, fits) for name, of in tests.items()}
     if levels.size > 1 and not fitted.setting.between:
-        p_values["level"] = chance_of_scatter(levels, fitted.of_means)
+        p_values["level"] = fitted.chance_of_scatter(levels)
     doubts = _doubts(fitted, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
         doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")

@@ -20,7 +20,7 @@ Steps:
    slightly widened, is the relevant part of the prior. Otherwise use
    the whole prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on
-   a grid (`grid`).
+   a grid (`posterior`).
 5. If the posterior reaches an end of the box, widen the box on this
    side and repeat step 4.
 """
@@ -41,7 +41,6 @@ from stiction.base.progress import Meter
 from stiction.ensemble.pilot import compare, pilot_doubt
 from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
 from stiction.inference.fit import FieldFit
-from stiction.inference.grid import grid_of
 from stiction.inference.likelihood import (
     Likelihood,
     Simulation,
@@ -53,7 +52,7 @@ from stiction.inference.likelihood import (
     variable_of,
 )
 from stiction.inference.peaks import Peaks, by_specimen, factor_of, make_peaks
-from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, SpecimenPosterior
+from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, SpecimenPosterior, grid_of
 from stiction.inference.prior import Prior, make_prior, refuse_conditioned
 from stiction.inference.specimens import (
     MEAN_KEY,
