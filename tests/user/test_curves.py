@@ -8,8 +8,8 @@ from refusals import refuses
 from setups import beta_strength
 
 import stiction as st
-from stiction.inference.agreement import _p_values, _permuted
-from stiction.inference.curves import Curves, noise_of, summary_of, turning_points
+from stiction.inference.agreement import _p_values, _permuted, summary_of
+from stiction.inference.curves import Curves, noise_of, turning_points
 
 RNG = np.random.default_rng(0)
 TRAVEL = np.linspace(0.0, 1e-3, 2001)  # m
@@ -181,7 +181,7 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     curves = curves_of(paths)
     own = predicted(FIELD)
     found = st.statistics.agreement(own, curves, replicates=400)
-    assert set(found.precursors) == {"number", "size", "first_load"}
+    assert set(found.p_values) > {"number", "size", "first_load"}
     assert min(found.p_values.values()) > 0.05
     stronger = beta_strength(4e-3, low=0.9e6, high=1.9e6)
     wrong = st.statistics.agreement(predicted(stronger), curves, replicates=400)

@@ -201,6 +201,6 @@ def test_a_curve_is_not_a_list_of_peaks(tmp_path):
         + "\n".join(f"{k / 100};{10 * k if k < 90 else 700}" for k in range(120))
     )
     refuses("'Weg' only rises over 120 lines ... st.read_curve", lambda: st.read_peaks(path))
-    assert "peak 890 N" in str(st.read_curve(path))
+    assert "curve  890    N" in str(st.read_curve(path))
     path.write_text("time (s);peak (N)\n" + "\n".join(f"{60 * k};{70 + k}" for k in range(12)))
     assert st.read_peaks(path).values[0].size == 12

@@ -36,8 +36,8 @@ Steps for a posterior. The peaks of one campaign share the unknown parameters.
    distance of the measured campaign.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -48,7 +48,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, checked
 from stiction.base.representation import Result, Row, Summary
-from stiction.inference.curves import Curves, summary_of
+from stiction.inference.curves import Curves, precursors
 from stiction.inference.peaks import Peaks, factor_of, make_peaks, title_of
 from stiction.inference.posterior import Posterior
 
@@ -62,8 +62,8 @@ distribution may have heavy tails."""
 DOUBTFUL_P_VALUE = 0.05
 """P-value below which measured and predicted peaks contradict each other."""
 BAND_LEVEL = 0.9
-PRECURSORS = {"number": "number", "size": "largest", "first_load": "load of the first"}
-"""Compared properties of precursors, with their names in printed text."""
+PRECURSORS = ("number", "size", "first_load")
+"""Compared properties of precursors."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,18 +81,17 @@ class Agreement(Result):
         multiplied by the square root of the number of tests.
     p_values : dict of str to float
         For each distance, by name: the probability of a distance at
-        least as large if the prediction is right.
+        least as large if the prediction is right. If curves were
+        compared, also the p-values of the ``number`` of precursors of a
+        test, of the ``size`` of its largest precursor, or 0, and of
+        ``first_load``, the force at its first precursor, or else the
+        peak.
     predicted : tuple of (values, fraction)
         Predicted distribution function for each kind of specimen:
         rising values in the unit of the peaks, and the fraction of peaks
         up to each value.
     band : float
         The largest deviation stays below this value in 90 % of campaigns.
-    precursors : dict of str to (measured, predicted) arrays
-        Given if curves were compared. For each test there is the
-        ``number`` of precursors, the ``size`` (N or Pa) of the largest
-        precursor, or 0, and ``first_load``, the force at the first
-        precursor, or else the peak. `p_values` also has these names.
     """
 
     peaks: Peaks
@@ -101,7 +100,6 @@ class Agreement(Result):
     p_values: dict[str, float]
     predicted: tuple[tuple[Array, Array], ...]
     band: float
-    precursors: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -208,15 +206,12 @@ def agreement(
     share = np.searchsorted(np.sort(values), at, side="right") / values.size
     result = _agreement(measured, distances, ((at, share),))
     if isinstance(peaks, Curves) and "event" in prediction.dims:
-        precursors = _precursors(prediction, peaks)
-        for name, pair in precursors.items():
-            distances = _permuted(*pair, replicates, rng)
-            result.p_values[name] = _p_values(distances)[0]
-        result = replace(result, precursors=precursors)
+        for name, pair in zip(PRECURSORS, _precursors(prediction, peaks), strict=True):
+            result.p_values[name] = _p_values(_permuted(*pair, replicates, rng))[0]
     return result
 
 
-def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array, Array]]:
+def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array, Array]]:
     """Return the number, largest size and first load of precursors, measured and predicted.
 
     Predicted drops follow from the force before and after each event.
@@ -247,8 +242,16 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> dict[str, tuple[Array
         # two forces of each event give the turning points.
         predicted.append(summary_of(force, threshold))
     measured = [summary_of(curve.force, threshold) for curve in curves]
-    pairs = zip(np.transpose(measured), np.transpose(predicted), strict=True)
-    return dict(zip(PRECURSORS, pairs, strict=True))
+    return zip(np.transpose(measured), np.transpose(predicted), strict=True)
+
+
+def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
+    """Return number of precursors, largest size, and force at the first precursor or else
+    the peak."""
+    starts, ends = precursors(force, threshold)
+    sizes = force[starts] - force[ends]
+    first = force[starts[0]] if sizes.size else force.max()
+    return float(sizes.size), float(sizes.max(initial=0.0)), float(first)
 
 
 def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:

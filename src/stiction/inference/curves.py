@@ -30,19 +30,18 @@ Steps:
    peak, from three quarters of the fall to their median on. A final fall
    below half of this median is unloading, and does not count.
 
-Readings that are no friction are named in a warning: a single reading
-far above both neighbours (left out), equal largest readings (a
-saturated load cell), and a force at the start (no tare). A record with
-several full slides, or with forces of both signs, is not one test:
-`split` cuts it.
+Readings that are no friction are named in a warning: a single reading far above
+both neighbours (left out), equal largest readings (a saturated load cell), and a
+force at the start (no tare). A record with several full slides, or with forces of
+both signs, is not one test: `split` cuts it.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -58,6 +57,7 @@ from stiction.problem.reading.columns import (
     Reading,
     Table,
     Wanted,
+    named,
     read_column,
     reading_of,
     role_of,
@@ -152,32 +152,26 @@ class Curve(Result):
     plateau: float
     peak_error: float = 0.0
 
-    def __str__(self) -> str:
-        count = self.drops.size.size
-        place = in_words(self.travel_unit, self.peak_travel)
-        text = (
-            f"{self.name}: peak {in_words(self.unit, self.peak)} at {place}, {count} precursor"
-        )
-        text += "s" * (count != 1)
+    def _row(self, name: str) -> Row:
+        count, force = len(self.drops), partial(in_words, self.unit)
+        texts = [
+            f"+- {force(self.peak_error)}",
+            f"at {in_words(self.travel_unit, self.peak_travel)}",
+        ]
+        texts.append(f"{count} precursor" + "s" * (count != 1))
         if count:
-            first = in_words(self.unit, self.drops.force[0])
-            text += f" from {first} on, of up to {in_words(self.unit, self.drops.size.max())}"
-        after = f", plateau {in_words(self.unit, self.plateau)}" * math.isfinite(self.plateau)
-        return f"{text}{after}, noise {in_words(self.unit, self.noise)}"
+            first, most = self.drops.force[0], self.drops.size.max()
+            texts[-1] += f" from {force(first)} on, of up to {force(most)}"
+        texts += [f"plateau {force(self.plateau)}"] * math.isfinite(self.plateau)
+        texts.append(f"noise {force(self.noise)}")
+        return Row(name, self.peak, (), self.unit, ", ".join(texts))
 
     def _summary(self) -> Summary:
-        rows = [
-            Row("peak", self.peak, (), self.unit, f"+- {in_words(self.unit, self.peak_error)}"),
-            Row("peak at", self.peak_travel, (), self.travel_unit),
-            Row("precursors", self.drops.size.size),
-            Row("plateau", self.plateau, (), self.unit),
-            Row("noise of a reading", self.noise, (), self.unit),
-        ]
-        return Summary(self.name, rows)
+        return Summary(self.name, [self._row("peak")])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Curves(Result):
+class Curves(Sequence[Curve], Result):
     """Curves from repeated tests, for `read_peaks`, `infer` and figures.
 
     Attributes
@@ -203,28 +197,20 @@ class Curves(Result):
     def __len__(self) -> int:
         return len(self.tests)
 
-    def __iter__(self) -> Iterator[Curve]:
-        return iter(self.tests)
-
-    def __getitem__(self, number: int) -> Curve:
+    def __getitem__(self, number: Any) -> Any:
         return self.tests[number]
 
-    def __str__(self) -> str:
-        return "\n".join(map(str, (*self.tests, *self._readings())))
-
-    def _readings(self) -> list[str]:
-        """Return what was read, once for files with the same columns."""
+    def _summary(self) -> Summary:
+        # Files with the same columns are shown once.
         alike: dict[Any, list[Reading]] = {}
         for reading in self.read:
             alike.setdefault(reading._replace(source="", values=0), []).append(reading)
-        return [
+        notes = [
             f"{files[0]}" + f" (and {len(files) - 1} files alike)" * (len(files) > 1)
             for files in alike.values()
         ]
-
-    def _summary(self) -> Summary:
-        rows = [Row(curve.name, curve.peak, (), curve.unit) for curve in self]
-        return Summary(f"Peaks of {len(self)} tests", rows, notes=self._readings())
+        rows = [curve._row(curve.name) for curve in self]
+        return Summary(f"Peaks of {len(self)} tests", rows, notes=notes)
 
 
 @checked
@@ -303,27 +289,30 @@ def read_curve(
     >>> import stiction as st
     >>> travel = np.linspace(0.0, 1e-3, 500)
     >>> force = np.minimum(2e5 * travel, 100.0) - 20.0 * (travel > 3e-4) - 10.0 * (travel > 8e-4)
-    >>> print(st.read_curve((travel, force), unit="N", travel_unit="m")[0])
-    test: peak 80 N at 501 µm, 1 precursor from 59.7 N on, of up to 19.6 N, plateau 70 N, noise 0 N
+    >>> curves = st.read_curve((travel, force), unit="N", travel_unit="m")
+    >>> curves[0].peak, len(curves[0].drops), curves[0].plateau
+    (80.0, 1, 70.0)
     """
-    options = Options(skip, sheet, missing, decimal)
     tests: list[Curve] = []
     read: list[Reading] = []
-    for name, table in _tables(source, options):
+    for name, table in _tables(source, Options(skip, sheet, missing, decimal)):
         with prefixed(name):
             if table.begins and split != "tables":
-                raise InputError(
-                    f"{several_tables(table)}. split='tables' reads each as a test"
-                )
-            readings, reading = _readings(table, force, travel, unit, travel_unit, speed)
-            spans = [*_tests_of(table, readings)]
-        read.append(reading)
-        for label, rows in spans:
-            number = f", test {label}" * bool(label)
-            with prefixed(name + number):
-                parts = _parts(name + number, readings.part(rows), noise, split)
-                for part, sub in parts:
-                    tests.append(_curve(Path(name).stem + number + part, sub, noise, split))
+                raise InputError(f"{several_tables(table)}. split='tables' reads all of them")
+            columns = [c for c in table.columns if c.heading or not table.headed]
+            column = read_column(columns, "force", "force", force, FORCE_UNITS)
+            along = _travel_of([c for c in columns if c is not column], travel)
+            at, at_si = column_in_si(along, "travel", travel_unit, TRAVEL_UNITS, "travel_unit")
+            values, si = column_in_si(column, "force", unit, FORCE_UNITS, "unit")
+            if at_si == "s" and speed is not None:
+                at, at_si = at * speed, "m"
+            used = "travel" if at_si == "m" else "time"
+            read.append(reading_of(table, column, unit or si, {used: along}))
+        readings = Readings(Path(name).stem, si, at_si, at, values, table.lines)
+        for label, rows in _tests_of(table, readings):
+            with prefixed(name + label):
+                parts = _parts(readings.part(rows, label), noise, split)
+                tests += [_curve(part, noise, split) for part in parts]
     if len({(curve.unit, curve.travel_unit) for curve in tests}) > 1:
         raise InputError(
             "source: units of force or travel differ between tests. Read them in separate calls"
@@ -338,30 +327,33 @@ def read_curve(
 
 
 class Readings(NamedTuple):
-    """Readings from a file in SI, with units and line numbers."""
+    """Readings of a test in SI, with units and line numbers."""
 
-    travel: Array
-    force: Array
+    name: str
     unit: str
     travel_unit: str
+    travel: Array
+    force: Array
     lines: Array
 
-    def part(self, rows: Any) -> Readings:
-        """Return some of the readings."""
-        return self._replace(
-            travel=self.travel[rows], force=self.force[rows], lines=self.lines[rows]
-        )
+    def part(self, rows: Any, label: str = "") -> Readings:
+        """Return some of the readings, and add a label to the name."""
+        return Readings(self.name + label, *self[1:3], *(array[rows] for array in self[3:]))
+
+    def cut(self, begins: Any, word: str) -> list[Readings]:
+        """Return the parts that begin at given readings."""
+        pieces = np.split(np.arange(self.force.size), begins)
+        return [self.part(rows, f", {word} {i}") for i, rows in enumerate(pieces, 1)]
 
 
 def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
     """Yield the name and table of each file in a folder, or of a single source."""
     if isinstance(source, str | Path):
-        path = Path(source)
+        path, endings = Path(source), (*TEXT, EXCEL)
         files = [path]
         if path.is_dir():
-            endings = (*TEXT, EXCEL)
-            files = [file for file in sorted(path.iterdir()) if file.suffix.lower() in endings]
-            files = [file for file in files if not file.name.startswith((".", "~"))]
+            visible = [file for file in sorted(path.iterdir()) if file.name[0] not in ".~"]
+            files = [file for file in visible if file.suffix.lower() in endings]
             if not files:
                 raise InputError(f"{path}: has no file that ends in {', '.join(endings)}")
         for file in files:
@@ -372,10 +364,9 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
         yield "test", table_of_frame(source)
     elif isinstance(source, tuple | list) and len(source) == 2:
         columns = []
-        for number, (name, units) in enumerate(
-            (("travel", TRAVEL_UNITS), ("force", FORCE_UNITS))
-        ):
-            values, unit = with_stated_unit(source[number], units)
+        wanted = ("travel", TRAVEL_UNITS), ("force", FORCE_UNITS)
+        for number, (given, (name, units)) in enumerate(zip(source, wanted, strict=True)):
+            values, unit = with_stated_unit(given, units)
             columns.append(Column(name, unit or "", np.asarray(values, float), number, name))
         sizes = [column.values.size for column in columns]
         if sizes[0] != sizes[1]:
@@ -387,40 +378,14 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
         )
 
 
-def _readings(
-    table: Table, force: Wanted, travel: Wanted, unit: str | None, travel_unit: str | None,
-    speed: float | None,
-) -> tuple[Readings, Reading]:  # fmt: skip
-    """Return force and travel from a table, in SI, and what was read."""
-    columns = [column for column in table.columns if column.heading or not table.headed]
-    column = read_column(
-        columns, "force", "force", force, FORCE_UNITS, lambda c: role_of(c) == "friction"
-    )
-    left = [other for other in columns if other is not column]
-    along = _travel_of(left, travel)
-    if texts := [c.text for c in (along, column) if c.text]:
-        raise InputError(texts)
-    at, at_si = column_in_si(along, "travel", travel_unit, TRAVEL_UNITS, "travel_unit")
-    values, si = column_in_si(column, "force", unit, FORCE_UNITS, "unit")
-    if at_si == "s" and speed is not None:
-        at, at_si = at * speed, "m"
-    reading = reading_of(
-        table, column, unit or si, {"travel" if at_si == "m" else "time": along}
-    )
-    return Readings(at, values, si, at_si, table.lines), reading
-
-
 def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
     """Return the column of travel, or else time, which a stop of the machine would stretch."""
     if wanted is not None:
         return stated_column(columns, "travel", wanted)
     numeric = [column for column in columns if not column.text]
-    travels = [
-        c for c in numeric if role_of(c) == "travel" and (not c.unit or is_in(c.unit, "m"))
-    ]
-    clear = [c for c in travels if c.name.casefold() not in ("x", "x_value")]
+    travels = [c for c in numeric if role_of(c) == "travel" and c.may_be_in("m")]
     choices = (
-        clear, travels,
+        [c for c in travels if c.name.casefold() not in ("x", "x_value")], travels,
         [c for c in numeric if role_of(c) == "time" or c.name.casefold() == "x_value"],
         [c for c in numeric if is_in(c.unit, "m")], [c for c in numeric if is_in(c.unit, "s")],
     )  # fmt: skip
@@ -431,161 +396,134 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
 
 
 def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
-    """Yield the label of each test in a table, and a mask of its rows."""
-    numbers = [
-        column
-        for column in table.columns
-        if re.match(TESTS, column.name.strip("_:. ").casefold())
-        and role_of(column) == "specimen"
-    ]
+    """Yield the label of each test in a table, and a mask of its rows. A single test has none."""
+    numbers = [c for c in named(table.columns, TESTS) if role_of(c) == "specimen"]
     if len(numbers) == 1 and np.isfinite(numbers[0].values).all():
         for label in dict.fromkeys(numbers[0].values.tolist()):
-            yield f"{label:g}", numbers[0].values == label
+            yield f", test {label:g}", numbers[0].values == label
         return
-    lines, restarts = table.lines, np.diff(readings.travel, prepend=0.0) < 0
-    # A new test begins after an empty line only if the travel goes back
-    # there, or at a remark.
-    begins = (np.diff(lines, prepend=lines[:1]) > 1) & restarts
-    begins |= np.isin(lines, table.begins[1:])
+    # A new test begins after an empty line only if the travel goes back there, or at a remark.
+    begins = np.diff(table.lines, prepend=table.lines[:1]) > 1
+    begins &= np.diff(readings.travel, prepend=0.0) < 0
+    begins |= np.isin(table.lines, table.begins[1:])
     block = np.cumsum(begins)
-    # A single test has no number.
     for label in range(int(block[-1]) + 1):
-        yield f"{label + 1}" if block[-1] else "", block == label
+        yield f", test {label + 1}" * bool(block[-1]), block == label
 
 
-def _known(name: str, readings: Readings) -> Readings:
-    """Return readings that are not missing, with rising travel and positive force."""
-    travel, force = readings.travel, readings.force
-    known = np.isfinite(travel) & np.isfinite(force)  # machines miss single readings
-    if not known.all():
-        warn_accuracy(f"{name}: {int((~known).sum())} of {known.size} readings are missing")
+def _parts(readings: Readings, noise: float | None, split: Split | None) -> list[Readings]:
+    """Return the parts of a record that are one test each."""
+    known = np.isfinite(readings.travel) & np.isfinite(readings.force)
+    if not known.all():  # machines miss single readings
+        warn_accuracy(
+            f"{readings.name}: {int((~known).sum())} of {known.size} readings are missing"
+        )
         readings = readings.part(known)
-    if readings.force.size < MIN_READINGS:
-        raise InputError(f"holds {readings.force.size} readings, fewer than {MIN_READINGS}")
     travel, force = readings.travel, readings.force
-    if readings.travel_unit == "m" and travel[-1] <= travel.min() + 0.05 * np.ptp(travel) and (
-        travel[0] >= travel.max() - 0.05 * np.ptp(travel) > travel[-1]
-    ):  # fmt: skip
-        warn_accuracy(f"{name}: the travel only falls. Its sign is changed")
-        readings = readings._replace(travel=-travel)
-    return readings
-
-
-def _parts(
-    name: str, readings: Readings, noise: float | None, split: Split | None
-) -> list[tuple[str, Readings]]:
-    """Return the parts of a record that are one test each, with their labels."""
-    readings = _known(name, readings)
-    force = readings.force
-    size = max(float(np.abs(force).max()), 1e-300)
     threshold = _threshold(force, noise)[1]
-    positive, negative = (
-        force > max(threshold, BOTH_SIGNS * size),
-        -force > max(threshold, BOTH_SIGNS * size),
-    )
-    if positive.any() and negative.any():
+    if readings.travel_unit == "m" and travel[0] - travel[-1] >= 0.9 * np.ptp(travel) > 0.0:
+        warn_accuracy(f"{readings.name}: the travel only falls. Its sign is changed")
+        readings = readings._replace(travel=-travel)
+    clear = np.abs(force) > max(threshold, BOTH_SIGNS * float(np.abs(force).max()))
+    marked, signs = np.flatnonzero(clear), np.sign(force)
+    turns = marked[1:][np.diff(signs[marked]) != 0.0]
+    if turns.size:
         if split != "strokes":
             raise InputError(
                 "forces have both signs, as in a reciprocating test. Pass split='strokes' to read"
                 " each stroke as a test"
             )
         # The sign holds until the force clearly has the other sign.
-        marked = np.flatnonzero(positive | negative)
-        turns = marked[1:][np.diff(positive[marked].astype(int)) != 0]
-        begins = [
-            int(np.flatnonzero(np.sign(force[:turn]) != np.sign(force[turn]))[-1]) + 1
-            for turn in turns
-        ]
-        pieces = np.split(np.arange(force.size), begins)
-        return [
-            (f", stroke {i}", readings.part(rows)._replace(force=np.abs(force[rows])))
-            for i, rows in enumerate(pieces, 1)
-        ]
+        begins = [np.flatnonzero(signs[:turn] != signs[turn])[-1] + 1 for turn in turns]
+        return readings._replace(force=np.abs(force)).cut(begins, "stroke")
     if -force.min() > force.max():
-        warn_accuracy(f"{name}: forces are negative. Their signs are changed")
+        warn_accuracy(f"{readings.name}: forces are negative. Their signs are changed")
         readings = readings._replace(force=-force)
-    readings = _without_spikes(name, readings, threshold)
+    readings = _without_spikes(readings, threshold)
     force = readings.force
     if not force.max() > 0.0:
         raise InputError("all forces are zero")
     if split == "cycles":
         starts, ends = turning_points(force, threshold)
         sizes = force[starts] - force[ends]
-        full = ends[sizes >= 0.5 * np.median(np.sort(sizes)[-3:])]
+        full = ends[sizes >= 0.5 * np.median(np.sort(sizes)[-3:])] + 1
         if full.size == 0:
             raise InputError("split: the record has no full slide. Leave split out")
-        pieces = np.split(np.arange(force.size), full + 1)[: full.size]
-        return [(f", cycle {i}", readings.part(rows)) for i, rows in enumerate(pieces, 1)]
-    if _returns(force) >= MAX_RETURNS:
+        return readings.part(slice(full[-1])).cut(full[:-1], "cycle")
+    # Readings above HIGH, or else below LOW of the peak, and how often the force returns.
+    high = force >= HIGH * force.max()
+    level = high[high | (force < LOW * force.max())]
+    returns = int(np.sum(level[1:] > level[:-1])) - int(not level[0])
+    if returns >= MAX_RETURNS:
         raise InputError(
-            f"the force falls from its peak and returns {_returns(force)} times, as in a record of"
+            f"the force falls from its peak and returns {returns} times, as in a record of"
             " stick-slip. Pass split='cycles' to read each cycle as a test"
         )
-    return [("", readings)]
-
-
-def _returns(force: Array) -> int:
-    """Return how often the force falls from HIGH to below LOW of its peak, and returns."""
-    level = np.where(force >= HIGH * force.max(), 1, np.where(force < LOW * force.max(), -1, 0))
-    level = level[level != 0]
-    return int(np.sum((level[1:] == 1) & (level[:-1] == -1))) - int(level[:1].sum() < 0)
+    return [readings]
 
 
 def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
     """Return the noise of a reading and the smallest fall that counts (steps 1 and 2)."""
+    if force.size < MIN_READINGS:
+        raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
     top = int(np.argmax(np.abs(force)))
     if noise is None:
         noise = noise_of(force[: top + 1] if top >= MIN_READINGS else force)
     white_range = 2.0 * noise * math.sqrt(2.0 * math.log(force.size))
-    return noise, max(white_range, MIN_DROP_SHARE * float(np.abs(force).max()))
+    return noise, max(white_range, MIN_DROP_SHARE * abs(float(force[top])))
 
 
-def _without_spikes(name: str, readings: Readings, threshold: float) -> Readings:
+def _without_spikes(readings: Readings, threshold: float) -> Readings:
     """Leave out single readings that are far above both neighbours, and warn about them."""
-    force = readings.force
-    steps = np.diff(force)
+    force, steps = readings.force, np.diff(readings.force)
     least = threshold + 3.0 * float(np.median(np.abs(steps)))
     rise = np.minimum(steps[:-1], -steps[1:])  # above both neighbours
     spikes = np.flatnonzero((rise > least) & (rise > TARE * np.abs(force).max())) + 1
     if spikes.size == 0 or spikes.size > max(1, MAX_SPIKES_SHARE * force.size):
         return readings
-    first = spikes[0]
+    reading, line = in_words(readings.unit, float(force[spikes[0]])), readings.lines[spikes[0]]
     warn_accuracy(
-        f"{name}: {spikes.size} single readings are far above both neighbours, such as"
-        f" {in_words(readings.unit, float(force[first]))} in line {readings.lines[first]}. They are"
-        " left out"
+        f"{readings.name}: {spikes.size} single readings are far above both neighbours, such as"
+        f" {reading} in line {line}. They are left out"
     )
     return readings.part(np.delete(np.arange(force.size), spikes))
 
 
-def _curve(name: str, readings: Readings, noise: float | None, split: Split | None) -> Curve:
+def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curve:
     """Return the curve of one test (steps 1 to 6)."""
-    travel, force, lines = readings.travel, readings.force, readings.lines
-    if force.size < MIN_READINGS:
-        raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
-    # Time never goes back. A position may tremble, but a new cycle is
-    # another test.
-    allowed = 0.0 if readings.travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
+    name, unit, travel_unit, travel, force, lines = readings
+    # 1. and 2.
+    noise, threshold = _threshold(force, noise)
+    # Time never goes back. A position may tremble, but a new cycle is another test.
+    allowed = 0.0 if travel_unit == "s" else MAX_BACKWARD_SHARE * float(np.ptp(travel))
     back = np.flatnonzero(np.maximum.accumulate(travel) - travel > allowed)
     if back.size and split != "strokes":
         raise InputError(
             f"line {lines[back[0]]}: travel or time goes back. Read one cycle at a time, and"
             " separate tests by an empty line or number them in a column 'test'"
         )
-    # 1. and 2.
-    noise, threshold = _threshold(force, noise)
     top = int(np.argmax(force))
     # 3.
     starts, ends = precursors(force, threshold)
     # 4.
     begin = int(ends.max(initial=0))
     peak, error = _peak(force[begin:], top - begin, noise, threshold)
-    _doubt_readings(name, force, peak, noise, split)
+    equal, same = np.flatnonzero(force == force[top]), np.mean(np.diff(force) == 0.0)
+    if noise > 0.0 and same < 0.1 and np.any(equal[2:] - equal[:-2] == 2):
+        warn_accuracy(
+            f"{name}: the {equal.size} largest readings are equal, {force[top]:.6g}, though the"
+            " record has noise. The load cell may have been saturated, and the peak be higher"
+        )
+    first = float(np.median(force[:3]))
+    if first > TARE * peak and split is None:
+        warn_accuracy(
+            f"{name}: the force begins at {first:.4g}, {100.0 * first / peak:.0f} % of the peak."
+            " If the load cell was not tared, subtract this force"
+        )
     # 5. and 6.
     return Curve(
-        name, travel, force, readings.unit, readings.travel_unit, noise, threshold,
-        peak=peak, peak_error=error,
-        peak_travel=float(travel[top]),
+        name, travel, force, unit, travel_unit, noise, threshold,
+        peak=peak, peak_error=error, peak_travel=float(travel[top]),
         drops=Drops(travel[starts], force[starts], force[starts] - force[ends]),
         plateau=math.nan if split == "cycles" else _plateau(force, threshold),
     )  # fmt: skip
@@ -602,7 +540,7 @@ def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float
     powers = np.vander(u, 3)
     factors, *_ = np.linalg.lstsq(powers, force[first:last])
     fitted = powers @ factors
-    place = powers[int(np.argmax(fitted))]
+    place = powers[fitted.argmax()]
     error = noise * math.sqrt(place @ np.linalg.inv(powers.T @ powers) @ place)
     return float(fitted.max()), error
 
@@ -617,33 +555,6 @@ def _plateau(force: Array, threshold: float) -> float:
         after = after[: int(np.flatnonzero(after >= 0.9 * level)[-1]) + 1]
     after = after[int(np.argmax(after <= level + 0.25 * (peak - level))) :]
     return float(after.mean())
-
-
-def _doubt_readings(
-    name: str, force: Array, peak: float, noise: float, split: Split | None
-) -> None:
-    """Warn about a saturated load cell, and about a force at the start."""
-    equal, same = np.flatnonzero(force == force.max()), np.mean(np.diff(force) == 0.0)
-    if noise > 0.0 and same < 0.1 and np.any(equal[2:] - equal[:-2] == 2):
-        warn_accuracy(
-            f"{name}: the {equal.size} largest readings are equal, {force.max():.6g}, though the"
-            " record has noise. The load cell may have been saturated, and the peak be higher"
-        )
-    first = float(np.median(force[:3]))
-    if first > TARE * peak and split is None:
-        warn_accuracy(
-            f"{name}: the force begins at {first:.4g}, {100.0 * first / peak:.0f} % of the peak."
-            " If the load cell was not tared, subtract this force"
-        )
-
-
-def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number of precursors, largest size, and force at the first precursor or else
-    the peak."""
-    starts, ends = precursors(force, threshold)
-    sizes = force[starts] - force[ends]
-    first = force[starts[0]] if sizes.size else force.max()
-    return float(sizes.size), float(sizes.max(initial=0.0)), float(first)
 
 
 def precursors(force: Array, threshold: float) -> tuple[Any, Any]:
@@ -670,8 +581,7 @@ def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:
     """Return the readings at which drops begin and end (step 3)."""
     # `high` and `low` are the extreme readings since the last turning point.
     starts, ends = [], []
-    high = low = 0
-    falling = False
+    high, low, falling = 0, 0, False
     for place, value in enumerate(force.tolist()):
         if falling:
             if value < force[low]:

@@ -94,6 +94,10 @@ class Column:
         """The heading, or the number of a column without a heading."""
         return self.heading or self.name
 
+    def may_be_in(self, *units: str) -> bool:
+        """Return whether the unit is one of these, or is not stated."""
+        return not self.unit or any(is_in(self.unit, si) for si in units)
+
     def __str__(self) -> str:
         number = f"column {self.number}" if self.number >= 0 else "variable"
         return f"{number} {self.heading!r}" if self.heading else number
@@ -161,22 +165,26 @@ def _begins(word: str, part: str) -> bool:
     return word == part or (len(part) > 3 and word.startswith(part))
 
 
+def named(columns: Sequence[Column], names: str) -> list[Column]:
+    """Return the columns whose headings begin with one of the names, as a pattern."""
+    return [c for c in columns if re.match(names, c.name.strip("_:. ").casefold())]
+
+
 def read_column(
     columns: Sequence[Column],
     quantity: str,
     argument: str,
     wanted: Wanted,
     units: Iterable[str],
-    says: Callable[[Column], bool],
+    says: Callable[[Column], bool] = lambda column: role_of(column) == "friction",
 ) -> Column:
     """Return the column of a quantity by the rule, or refuse the choice (steps 1 to 4)."""
     # 1.
     if wanted is not None:
         return stated_column(columns, argument, wanted)
     # 2.
-    units = tuple(units)
     numeric = [column for column in columns if not column.text]
-    fitting = [c for c in numeric if not c.unit or any(is_in(c.unit, si) for si in units)]
+    fitting = [column for column in numeric if column.may_be_in(*units)]
     # 3.
     chosen = [column for column in fitting if says(column)]
     if not chosen:
@@ -223,6 +231,8 @@ def stated_column(columns: Sequence[Column], argument: str, wanted: str | int) -
             f"columns {numbers} are all called {wanted!r}. Choose a column by its number,"
             f" {argument}={fitting[0].number}"
         )
+    if fitting[0].text:
+        raise InputError(fitting[0].text)
     return fitting[0]
 
 
