@@ -92,10 +92,12 @@ class World:
         self.problem, self.random = self.study.problem, self.study.random
         self.method, self.interface = self.study.method, self.problem.interface
         self.Pa = self.units["Pa"]
+        self.coefficients = self.random.strength.quantity == "friction_coefficient"
 
     def profiles(self, rows: Any = slice(None)) -> Any:
         """Some of the samples, as profiles that a call accepts."""
-        return profiles_of(self.problem, self.strength[rows])
+        rows = self.strength[rows]
+        return {"friction_coefficient": rows} if self.coefficients else rows
 
     def factor(self, unit: str) -> float:
         """How often a new unit goes into the old one: of 'N m-1', 'J/m', 'kg m-3'."""
@@ -113,9 +115,9 @@ class World:
         """The same world with stresses, lengths and times in other units."""
         new = World.__new__(World)
         new.units = {"Pa": 1.0, "m": 1.0, "s": 1.0} | units
-        of_stress = field_of(self.problem) is FIELD
-        strength = self.strength * (units["Pa"] if of_stress else 1.0)
-        plain = _rewritten(self.plain, new.factor, of_stress="Pa" if of_stress else "1")
+        strength = self.strength * (1.0 if self.coefficients else units["Pa"])
+        unit = "1" if self.coefficients else "Pa"
+        plain = _rewritten(self.plain, new.factor, of_stress=unit)
         return World(plain, strength, new.units)
 
     def moved(self, move: Callable[[Any], Any], words: Any = MappingProxyType({})) -> World:

@@ -58,6 +58,7 @@ UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "thickness": "m",
     "width": "m",
     "stiffness": "N m-1",
+    "mass": "kg",
     "shear_modulus": "Pa",
     "youngs_modulus": "Pa",
     "density": "kg m-3",

@@ -1,0 +1,184 @@
+"""Laws of loads and specimens, each of which is given to an onset by equilibrium or a rupture."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from contracts.bodies import COEFFICIENTS, SOLID, World, _rewritten
+from contracts.test_results import alike_but_for_places, assert_alike
+
+import stiction as st
+from stiction.random.dotted_keys import with_values
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+NODES, HEIGHT, INF = 56, 0.021, float("inf")
+X = (np.arange(NODES) + 0.5) / NODES
+PRESSED = st.Load(normal_pressure=2.1e6)
+BASE = st.Base(height=0.03, behind=0.02, ahead=0.05)
+SOFTER = st.Solid(shear_modulus=0.7e9, poisson_ratio=0.35, density=1200.0)
+
+
+def body(specimen: Any = None, load: st.Load = PRESSED) -> st.Problem:
+    """A body of 73 mm, whose strength falls to three tenths over 9 micrometres."""
+    width = None if specimen else 0.0113
+    friction = st.LinearWeakening(critical_slip=9e-6, residual_ratio=0.3)
+    interface = st.Interface(0.073, NODES, width=width)
+    return st.Problem(SOLID, interface, friction, load, specimen=specimen)
+
+
+def blocks(drive: Any, **more: Any) -> st.Blocks:
+    return st.Blocks(height=HEIGHT, thickness=0.0071, drive=drive, **more)
+
+
+def pusher(place: float, width: float, **more: Any) -> st.Pusher:
+    """A pusher whose middle and width are given as shares of the height."""
+    return st.Pusher(height=place * HEIGHT, width=width * HEIGHT, **more)
+
+
+def slider(drive: Any = None, base: st.Base = BASE, **more: Any) -> st.Problem:
+    drive = drive or st.Pusher(height=0.006, width=0.004, stiffness=6e7)
+    return body(
+        st.Slider(height=0.041, thickness=0.0071, base=base, drive=drive, **more),
+        st.Load(pressing_force=1.1e3),
+    )
+
+
+BODIES = {  # a number of each field of Load, Blocks, Slider, Base and of each drive
+    "profile": body(load=dataclasses.replace(PRESSED, profile=1.0 + 0.4 * np.sin(7.0 * X))),
+    "initial stress": body(load=dataclasses.replace(PRESSED, initial_stress=9e4 * X)),
+    "uneven pressure": body(load=st.Load(normal_pressure=2e6 + 4e5 * np.cos(5.0 * X))),
+    "force": body(blocks(st.Platen()), st.Load(pressing_force=1.1e3)),
+    "uneven pressure on blocks": body(
+        blocks(st.Platen()),
+        st.Load(normal_pressure=2e6 + 4e5 * np.cos(5.0 * X), initial_stress=4e4),
+    ),
+    "dead load": body(blocks(st.Platen())),
+    "machine": body(blocks(st.Platen(stiffness=3e7, mass=0.1), quality_factor=9.0)),
+    "rigid machine": body(blocks(st.Platen(stiffness=INF))),
+    "glued": body(blocks(st.Platen(), pressing="glued")),
+    "pusher up to the top": body(blocks(pusher(0.9, 0.2))),
+    "pusher down to the interface": body(blocks(pusher(0.04, 0.08, side="right", stiffness=2e7))),
+    "pusher of a whole side": body(blocks(pusher(0.5, 1.0, mass=0.05, stiffness=2e7))),
+    "two pushers": body(blocks(pusher(0.4, 0.3, side="both", stiffness=INF), pressing="glued")),
+    "slider": slider(),
+    "tilted slider": slider(tilt=0.3),
+    "slider under a plate": slider(pressing="plate"),
+    "slider on rollers": slider(base=dataclasses.replace(BASE, bottom="rollers", solid=SOFTER)),
+    "slider sheared at its top": slider(st.TopShear(stiffness=4e7)),
+}  # fmt: skip
+BLOCKS = [name for name, problem in BODIES.items() if isinstance(problem.specimen, st.Blocks)]
+CASES = [(name, "equilibrium") for name in BODIES] + [(name, "rupture") for name in BLOCKS]
+every = pytest.mark.parametrize(("name", "kind"), CASES)
+
+
+@cache
+def world(name: str, kind: str) -> World:
+    """Two samples of friction coefficients on a body."""
+    problem = BODIES[name]
+    method = st.Equilibrium() if kind == "equilibrium" else st.Rupture()
+    study = st.Study(problem=problem, random=COEFFICIENTS, method=method, samples=2)
+    return World(study.to_dict(), COEFFICIENTS.sample(problem.interface, samples=2, seed=2))
+
+
+def onset(w: World) -> Any:
+    result = st.onset(w.problem, w.profiles(), method=w.method, progress=False)
+    return result.drop_vars(JUMPING, errors="ignore")
+
+
+JUMPING = ["certificate_gap", "median_rupture_speed"]
+"""Round-off, and a median over nodes, which jumps if round-off decides which of them count."""
+
+
+@cache
+def plain(name: str, kind: str) -> Any:
+    return onset(world(name, kind))
+
+
+def test_every_field_of_a_load_and_of_a_specimen_has_another_value():
+    parts = [problem.load for problem in BODIES.values()]
+    parts += [problem.specimen for problem in BODIES.values() if problem.specimen]
+    parts += [part.drive for part in parts if hasattr(part, "drive")]
+    parts += [part.base for part in parts if hasattr(part, "base")]
+    for kind in (st.Load, st.Blocks, st.Slider, st.Base, st.Platen, st.Pusher, st.TopShear):
+        for field in dataclasses.fields(kind):
+            own = [getattr(part, field.name) for part in parts if isinstance(part, kind)]
+            missing = field.name != "type" and field.default is not dataclasses.MISSING
+            assert not missing or any(np.any(value != field.default) for value in own), field
+
+
+@every
+def test_other_units_change_nothing_else(name, kind):
+    other = world(name, kind).in_units(Pa=0.25, m=2.0, s=8.0)
+    close = 1e-9 if kind == "equilibrium" else 1e-5
+    before, after = (
+        r.drop_vars("event_magnitude", errors="ignore")
+        for r in (plain(name, kind), onset(other))
+    )
+    assert_alike(before, after, close, other.factor)
+
+
+@every
+def test_a_mirror_mirrors_the_onset(name, kind):
+    w = world(name, kind)
+    if isinstance(getattr(w.problem.specimen, "drive", None), st.TopShear):
+        return  # it has no side
+    after = onset(w.moved(np.flip, {"left": "right", "right": "left"}))
+    length, seam = w.interface.lengths[0], 0.0 if w.interface.is_free else w.interface.spacing
+    alike_but_for_places(
+        plain(name, kind), after, 1e-7 if kind == "equilibrium" else 1e-5, np.flip,
+        lambda place: length - seam - place, w.interface, swap=True,
+    )  # fmt: skip
+
+
+@every
+def test_round_off_of_any_number_moves_no_other(name, kind):
+    """By 1e-12 of each number, such as heights of blocks and of pushers that end together."""
+    w, rng = world(name, kind), np.random.default_rng(8)
+    nudged = _rewritten(w.plain["problem"], lambda unit: 1.0 + rng.uniform(-1e-12, 1e-12))
+    if np.all(w.problem.load.profile == 1.0):  # a profile of one is no number of a user
+        nudged["load"]["profile"] = 1.0
+    strength = w.strength * (1.0 + rng.uniform(-1e-12, 1e-12, w.strength.shape))
+    moved = World(w.plain | {"problem": nudged}, strength)
+    assert_alike(plain(name, kind), onset(moved), 1e-6 if kind == "equilibrium" else 1e-5)
+
+
+@every
+def test_twice_the_pressure_and_slip_are_twice_the_stress(name, kind):
+    """All is in proportion, so that the friction coefficient stays."""
+    w, twice = world(name, kind), {"problem.friction.critical_slip": 1.8e-5}
+    for key in ("initial_stress", "normal_pressure", "pressing_force"):
+        if (value := getattr(w.problem.load, key)) is not None:
+            twice[f"problem.load.{key}"] = 2.0 * np.asarray(value)[()]
+    problem = with_values({"problem": w.problem}, twice)["problem"]
+    before, after = (
+        plain(name, kind),
+        st.onset(problem, w.profiles(), method=w.method, progress=False),
+    )
+    factors = {"Pa": 2.0, "N": 2.0, "1": 1.0}
+    names = [key for key in before if before[key].attrs.get("units") in factors]
+    names = [key for key in names if "magnitude" not in key]
+    assert_alike(
+        before[names], after[names], 1e-9 if kind == "equilibrium" else 1e-5, factors.get
+    )
+
+
+@every
+def test_an_initial_stress_in_proportion_to_the_load_is_a_load(name, kind):
+    """It lowers the critical load by as much, and changes no stress."""
+    w = world(name, kind)
+    if isinstance(w.problem.specimen, st.Slider):
+        return
+    initial = w.problem.load.initial_stress + 2e4 * w.problem.load_profile
+    load = dataclasses.replace(w.problem.load, initial_stress=initial)
+    problem = dataclasses.replace(w.problem, load=load)
+    before, after = (
+        plain(name, kind),
+        st.onset(problem, w.profiles(), method=w.method, progress=False),
+    )
+    for key in ("critical_stress", "first_instability"):
+        np.testing.assert_allclose(after[key], before[key], rtol=1e-6, err_msg=key)
+    np.testing.assert_allclose(after.critical_load + 2e4, before.critical_load, rtol=1e-6)
