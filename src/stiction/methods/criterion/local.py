@@ -375,7 +375,9 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     result = np.clip(result, low, high)
     named = tau_p._asdict() if isinstance(tau_p, Sample) else named_profiles(tau_p)
     given: Any = named.get("strength", named.get("friction_coefficient"))
-    return result[0] if np.ndim(given) == len(interface.shape) else result
+    if not hasattr(given, "ndim"):
+        given = np.asarray(given, dtype=object)  # elements of a list may have units
+    return result[0] if given.ndim == len(interface.shape) else result
 
 
 def check_law(problem: Problem) -> None:
