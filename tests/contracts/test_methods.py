@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
+import xarray as xr
 from contracts.bodies import BODIES, attempt, field_of, profiles_of
 
 import stiction as st
@@ -295,6 +296,34 @@ def test_strength_bounds_its_onsets_as_it_says(kind, name, spread):
             assert (stress <= rows.strength[:, free].mean(axis=1).max() * (1 + 1e-9)).all(), (
                 event
             )
+
+
+def partly_firm(kind: str, name: str, kept: float) -> Any:
+    """Onsets where a third of the nodes keep a share of their strength."""
+    problem, rows = BODIES[name], SAMPLES[name][:2]
+    on_slider = isinstance(problem.specimen, st.Slider)
+    scale = {"critical_slip": 4e-5 if on_slider else 4e-6}
+    law = st.LinearWeakening(
+        **{"weakening_rate": 0.3e12} if kind == "local_criterion" else scale
+    )
+    problem = dataclasses.replace(problem, friction=law)
+    firm = (np.arange(rows[0].size) % 9 < 3).reshape(problem.interface.shape)
+    given = {"strength": rows, "residual_strength": rows * np.where(firm, kept, 0.4)}
+    dims, unit = ("sample", *problem.interface.dims), {"units": "1" if on_slider else "Pa"}
+    given = {key: xr.DataArray(values, dims=dims, attrs=unit) for key, values in given.items()}
+    return st.onset(problem, given, method=example(kind, problem), progress=False)
+
+
+@every
+def test_a_node_below_its_residual_strength_never_weakens(kind, name):
+    """As a node whose residual strength is its strength, and nearly as one that hardly weakens."""
+    firm = partly_firm(kind, name, 1.0)
+    assert same(partly_firm(kind, name, 1.3), firm)
+    if kind in ("equilibrium", "rupture") and (name == "slider" or "ends" not in name):
+        # But for what rests on a mean of weakening rates, or on the slip at the corner of the law.
+        hardly = partly_firm(kind, name, 1.0 - 1e-7)
+        for key in ("critical_stress", "first_instability"):
+            np.testing.assert_allclose(hardly[key], firm[key], rtol=1e-5, err_msg=key)
 
 
 @cache
