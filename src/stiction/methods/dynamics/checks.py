@@ -56,11 +56,12 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
             f"where the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
             " for this grid. Take more nodes, or end the interface there (interface.extent)"
         )
-    if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
+    if now.run.reverse_margin < -_MIN_REVERSE * now.run.scale:
         warn_accuracy(
-            f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
-            f"{interface.describe_node(int(now['reverse_node']))}: slip in reverse is not modelled,"
-            " so these nodes were kept at rest. Change the sign of the load, or unload less"
+            f"the stress fell below minus the strength, by {-now.run.reverse_margin:.3g} Pa at "
+            f"{interface.describe_node(int(now.run.reverse_node))}: slip in reverse is not"
+            " modelled, so these nodes were kept at rest. Change the sign of the load, or unload"
+            " less"
         )
 
 
@@ -170,6 +171,6 @@ def check_finite(run: Run, state: RuptureState, reason: int) -> None:
             for node in np.flatnonzero(~np.isfinite(state.slip_rate))[:1]
         ]
         raise FloatingPointError(
-            f"the slip rate became non-finite at t = {now['time']:.9g} s,{''.join(places)} tau_0 ="
-            f" {now['load']:.6g} Pa, after {state.steps} steps. The last finite state is kept"
+            f"the slip rate became non-finite at t = {now.step.time:.9g} s,{''.join(places)} tau_0"
+            f" = {now.step.load:.6g} Pa, after {state.steps} steps. The last finite state is kept"
         )

@@ -131,68 +131,70 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
 
 @jit_inside
-def _set_maximum(now: Any, radiated: float) -> None:
+def _set_maximum(step: Any, maximum: Any, radiated: float) -> None:
     """Record the present mean stress as the last maximum."""
-    now.maximum_stress, now.maximum_radiated = now.whole_stress, radiated
-    now.maximum_strength, now.largest_fall = now.strength_change, 0.0
-    now.maximum_breakable = now.mean_stress
-    now.maximum_time, now.maximum_load, now.maximum_node = now.time, now.load, now.top_node
+    maximum.stress, maximum.radiated = step.whole_stress, radiated
+    maximum.strength, maximum.largest_fall = step.strength_change, 0.0
+    maximum.breakable, maximum.node = step.mean_stress, step.top_node
+    maximum.time, maximum.load = step.time, step.load
 
 
 @jit_inside
 def _begin_event(now: Any) -> None:
     """Step 4: begin an instability at the last maximum of the mean stress."""
-    now.in_event, now.event_slip_rate = 1, now.top_slip_rate
-    now.event_begun = 1
-    is_first = now.instabilities == 0
-    now.instabilities += 1
+    event, results, maximum = now.event, now.results, now.maximum
+    event.unstable, event.begun, event.slip_rate = 1, 1, now.step.top_slip_rate
+    is_first = results.instabilities == 0
+    results.instabilities += 1
     if is_first:
-        now.first_stress = now.maximum_breakable
-    if is_first or now.maximum_breakable > now.critical_stress:
-        now.critical_stress = now.maximum_breakable
-    if is_first or now.maximum_stress > now.onset_stress:
-        now.onset_stress, now.onset_time = now.maximum_stress, now.maximum_time
-        now.onset_load, now.onset_node = now.maximum_load, now.maximum_node
+        results.first_stress = maximum.breakable
+    if is_first or maximum.breakable > results.critical_stress:
+        results.critical_stress = maximum.breakable
+    if is_first or maximum.stress > results.onset_stress:
+        results.onset_stress, results.onset_time = maximum.stress, maximum.time
+        results.onset_load, results.onset_node = maximum.load, maximum.node
 
 
 @jit_inside
 def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
     """Step 3: end an event, because the mean stress has recovered or the interface is calm."""
-    if now.in_event:
-        now.in_event = 0
+    event, results = now.event, now.results
+    if event.unstable:
+        event.unstable = 0
         # Once all nodes have broken the event cannot have been arrested.
-        now.last_arrested = not now.all_broken and now.event_slip_rate > unstable_slip_rate
-        now.arrested_events += now.last_arrested
-        _set_maximum(now, radiated)
+        event.last_arrested = not results.all_broken and event.slip_rate > unstable_slip_rate
+        results.arrested_events += event.last_arrested
+        _set_maximum(now.step, now.maximum, radiated)
 
 
 @jit_inside
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     """Update maximum and instabilities after a step. Return the fall of the mean stress, Pa."""
+    step, maximum, event, results = now.step, now.maximum, now.event, now.results
     # 1. The fall by waves.
-    below = now.maximum_stress - now.whole_stress
-    fall = min(below, radiated - now.maximum_radiated)
-    now.largest_fall = max(now.largest_fall, fall)
-    if now.largest_fall > now.maximum_strength - now.strength_change:
+    below = maximum.stress - step.whole_stress
+    fall = min(below, radiated - maximum.radiated)
+    maximum.largest_fall = max(maximum.largest_fall, fall)
+    if maximum.largest_fall > maximum.strength - step.strength_change:
         fall = 0.0
     # 2. The place of the maximum.
-    if below < _AT_MAXIMUM * now.scale and fall > 0.0:
-        now.maximum_node = now.top_node
-    if now.in_event:
+    if below < _AT_MAXIMUM * now.run.scale and fall > 0.0:
+        maximum.node = step.top_node
+    if event.unstable:
         # 3. The end of an instability.
-        now.event_slip_rate = max(now.event_slip_rate, now.top_slip_rate)
-        if now.whole_stress > now.maximum_stress:
+        event.slip_rate = max(event.slip_rate, step.top_slip_rate)
+        if step.whole_stress > maximum.stress:
             end_event(now, thresholds.unstable_slip_rate, radiated)
-    elif now.whole_stress > now.maximum_stress:
+    elif step.whole_stress > maximum.stress:
         # 4. Another maximum, or the beginning of an instability.
-        _set_maximum(now, radiated)
-    elif fall > EVENT_DROP * now.scale and not now.all_broken:
+        _set_maximum(step, maximum, radiated)
+    elif fall > EVENT_DROP * now.run.scale and not results.all_broken:
         _begin_event(now)
     # 5. The end of all strength above the residual.
-    if now.weakened_nodes >= thresholds.breakable and not now.all_broken:
-        now.all_broken, now.kinetic_stress = 1, now.mean_stress
-        if not now.in_event:
-            now.arrested_events -= now.last_arrested
+    if step.weakened_nodes >= thresholds.breakable and not results.all_broken:
+        results.all_broken, results.kinetic_stress = 1, step.mean_stress
+        if not event.unstable:
+            results.arrested_events -= event.last_arrested
     return fall
 
 
@@ -201,7 +203,7 @@ def finish_step(
     state: RuptureState,
     grid: Grid,
     setting: Setting,
-    step: TakenStep,
+    taken: TakenStep,
     increments: Array,
     strength: Array,
     record: StepRecord,
@@ -214,12 +216,13 @@ def finish_step(
     no rows, it stays empty.
     """
     now = state.diagnostics[0]
+    step, run, event = now.step, now.run, now.event
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival
     thresholds, peak = setting.thresholds, setting.nodes.peak
     top_slip_rate, top_node, weakened = -1.0, 0, 0
     slip_sum, change, stress_sum = 0.0, 0.0, 0.0  # the last two over nodes that can break
-    margin, margin_node = now.reverse_margin, now.reverse_node
+    margin, margin_node = run.reverse_margin, run.reverse_node
     for i in range(slip.size):
         if slip_rate[i] > top_slip_rate:
             top_slip_rate, top_node = slip_rate[i], i
@@ -234,40 +237,40 @@ def finish_step(
             # Assume that slip grew at a constant rate in the step, and
             # interpolate.
             passed = (slip[i] - front) / max(increments[i], 1e-300)
-            arrival[i] = step.time - step.size * min(1.0, passed)
+            arrival[i] = taken.time - taken.size * min(1.0, passed)
         slip_sum += slip[i]
         if peak[i] < np.inf:
             change += strength[i] - peak[i]
             stress_sum += stress[i]
-    whole_stress = setting.mean_initial + step.load * setting.mean_profile - step.radiated
-    now.time, now.size, now.load = step.time, step.size, step.load
-    now.whole_stress, now.weakened_nodes = whole_stress, weakened
-    now.strength_change = change / thresholds.period_nodes
+    whole_stress = setting.mean_initial + taken.load * setting.mean_profile - taken.radiated
+    step.time, step.size, step.load = taken.time, taken.size, taken.load
+    step.whole_stress, step.weakened_nodes = whole_stress, weakened
+    step.strength_change = change / thresholds.period_nodes
     # Without locked nodes, equation (1) has less round-off than the sum.
-    now.mean_stress = stress_sum / thresholds.breakable if thresholds.held else whole_stress
-    now.top_slip_rate, now.top_node = top_slip_rate, top_node
-    now.reverse_margin, now.reverse_node = margin, margin_node
-    now.work, now.mean_slip = now.work + step.work, slip_sum / thresholds.breakable
+    step.mean_stress = stress_sum / thresholds.breakable if thresholds.held else whole_stress
+    step.top_slip_rate, step.top_node = top_slip_rate, top_node
+    run.reverse_margin, run.reverse_node = margin, margin_node
+    step.work, step.mean_slip = step.work + taken.work, slip_sum / thresholds.breakable
     per_node = thresholds.period_nodes / thresholds.breakable
-    now.mean_slip_rate = step.radiated / grid.impedance * per_node
-    now.scale = max(now.scale, value_at(setting.scale, step.load))
-    fall = observe(now, thresholds, step.radiated)
-    if top_slip_rate > thresholds.unstable_slip_rate and not now.event_begun:
-        now.peak_rate = max(now.peak_rate, now.mean_slip_rate)
-        if now.mean_slip_rate >= PULSE_SHARE * now.peak_rate:
-            now.fast_since = now.fast_since if now.fast else now.time
-            now.fast, now.fast_until = 1, now.time
-    settled = now.time >= now.fast_until + thresholds.settling_time
-    if settled and now.fast and now.event_open and not now.event_begun:
+    step.mean_slip_rate = taken.radiated / grid.impedance * per_node
+    run.scale = max(run.scale, value_at(setting.scale, taken.load))
+    fall = observe(now, thresholds, taken.radiated)
+    if top_slip_rate > thresholds.unstable_slip_rate and not event.begun:
+        event.peak_rate = max(event.peak_rate, step.mean_slip_rate)
+        if step.mean_slip_rate >= PULSE_SHARE * event.peak_rate:
+            event.fast_since = event.fast_since if event.fast else step.time
+            event.fast, event.fast_until = 1, step.time
+    settled = step.time >= event.fast_until + thresholds.settling_time
+    if settled and event.fast and event.open and not event.begun:
         # 6. The end of an event. The next one may begin from here.
-        end_event(now, thresholds.unstable_slip_rate, step.radiated)
-        now.event_calm = 1
-    if now.maximum_time == now.time:  # an event may begin here
-        now.maximum_work = now.work
+        end_event(now, thresholds.unstable_slip_rate, taken.radiated)
+        event.calm = 1
+    if now.maximum.time == step.time:  # an event may begin here
+        now.maximum.work = step.work
         for i in range(slip.size):
             state.maximum_slip[i] = slip[i]
     if record.steps.size > 0:
-        record.steps[row] = now
+        record.steps[row] = step
         for s in range(setting.stations.size):
             node, station = setting.stations[s], record.stations[row, s]
             station.slip, station.slip_rate = slip[node], slip_rate[node]

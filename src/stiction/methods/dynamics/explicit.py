@@ -101,7 +101,7 @@ def _correct(
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     transfer, predicted, increments = tables.transfer, tables.predicted, tables.increments
     work, total = 0.0, 0.0
-    mean_load = 0.5 * (load + state.diagnostics[0].load)
+    mean_load = 0.5 * (load + state.diagnostics[0].step.load)
     for i in range(slip.size):
         increment = 0.5 * step * (slip_rate[i] + predicted[i])
         next_slip = slip[i] + increment
@@ -122,18 +122,18 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     Slip rates due to waves come and go. Creep is slow, or as fast as
     when the count began.
     """
-    scale, before, top = now.scale, now.calm_slip_rate, now.top_slip_rate
+    scale, before, top = now.run.scale, now.stepping.calm_slip_rate, now.step.top_slip_rate
     quiet = top < _CALM_STRESS * scale / impedance + thresholds.calm_slip * rise / step
     steady = 0.5 * before <= top <= 2.0 * before
     # Once all nodes have broken only the load drives steady slip,
     # however fast it is.
-    slid = thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable
+    slid = thresholds.slid_stop and now.step.weakened_nodes >= thresholds.breakable
     slow = top < STEADY_STRESS * scale / impedance or slid
     if quiet or (steady and slow):
-        now.calm_steps += 1
+        now.stepping.calm_steps += 1
     else:
-        now.calm_steps, now.calm_slip_rate = 0, top
-    return now.calm_steps >= thresholds.calm_count
+        now.stepping.calm_steps, now.stepping.calm_slip_rate = 0, top
+    return now.stepping.calm_steps >= thresholds.calm_count
 
 
 @jit
@@ -155,8 +155,8 @@ def explicit_steps(
     slip_rate_hat, slip_hat = tables.slip_rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
-    while taken < count and reason == Reason.DONE and not (now.event_begun or now.event_calm):
-        time = now.time + step
+    while taken < count and reason == Reason.DONE and not (now.event.begun or now.event.calm):
+        time = now.step.time + step
         load = value_at(setting.load, time)
         # 1. Predict.
         forward(grid.transform, state.slip_rate, slip_rate_hat)
@@ -170,7 +170,7 @@ def explicit_steps(
         _transfer(grid, slip_hat, state.memory_sum, tables)
         work, total = _correct(state, setting, tables, load, impedance)
         if not np.isfinite(total):
-            now.time = time
+            now.step.time = time
             reason = Reason.NOT_FINITE
             break
         # 3. Advance slip and memory of the modes.
@@ -182,23 +182,23 @@ def explicit_steps(
             grid.poles.size, grid.multiplicity,
         )  # fmt: skip
         # 4. Diagnostics, and the end.
-        rise, radiated = abs(load - now.load), impedance * total / thresholds.period_nodes
-        now.explicit_steps += 1
+        rise, radiated = abs(load - now.step.load), impedance * total / thresholds.period_nodes
+        now.stepping.explicit_steps += 1
         done = TakenStep(time, step, load, work * grid.cell, radiated)
         fall = finish_step(
             state, grid, setting, done, tables.increments, tables.strength, record, taken
         )
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
-        slid = thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable
+        slid = thresholds.slid_stop and now.step.weakened_nodes >= thresholds.breakable
         if slid and (calm or not thresholds.held):
             reason = Reason.ALL_SLID
-        elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
+        elif thresholds.event_stop and fall > EVENT_DROP * now.run.scale:
             reason = Reason.DROPPED
         elif calm:
             end_event(now, thresholds.unstable_slip_rate, radiated)
-            now.event_calm = now.event_open
-            if thresholds.rest_stop and now.instabilities > 0:
+            now.event.calm = now.event.open
+            if thresholds.rest_stop and now.results.instabilities > 0:
                 reason = Reason.AT_REST
             elif not thresholds.explicit_only:
                 reason = Reason.TO_IMPLICIT

@@ -91,11 +91,11 @@ class _Attempt(NamedTuple):
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
     """Step 1: return (size to try, size for later steps, whether cut short, whether the last)."""
 
-    thresholds, time, clipped, size = setting.thresholds, now.time, False, step
+    thresholds, time, clipped, size = setting.thresholds, now.step.time, False, step
     smallest = thresholds.smallest_step
-    small = thresholds.load_step * now.scale
+    small = thresholds.load_step * now.run.scale
     while True:
-        rise = value_at(setting.load, time + size) - now.load
+        rise = value_at(setting.load, time + size) - now.step.load
         if size <= _JUST_ABOVE * smallest or abs(rise) <= small:
             break
         size /= np.sqrt(2.0)
@@ -153,7 +153,7 @@ def _assemble(
         tables.increment[i] = state.past[i] * size
         tables.slipping[i] = 1 if state.slip_rate[i] > 0.0 else 0
     # Round-off of the transforms limits the accuracy.
-    return max(_SOLVED_STRESS * state.diagnostics[0].scale, _ROUND_OFF_SHARE * largest)
+    return max(_SOLVED_STRESS * state.diagnostics[0].run.scale, _ROUND_OFF_SHARE * largest)
 
 
 @jit_inside
@@ -167,7 +167,7 @@ def _effect(
     """
     nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
-    scale = state.diagnostics[0].scale
+    scale = state.diagnostics[0].run.scale
     largest, total, radiated = 0.0, 0.0, 0.0
     smallest_drop, fast_slip = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
@@ -189,9 +189,9 @@ def _accelerates(
 ) -> Any:
     """Step 4: return whether the interface accelerates too much for an accurate load at onset."""
     # A step that hardly raises the load cannot misplace the onset.
-    matters = abs(attempt.load - now.load) > _FREE_LOAD_RISE * now.scale
-    noticed = _NOTICED_RADIATION * now.scale
-    allowed = _MAX_ACCELERATION * max(now.previous_radiated, noticed)
+    matters = abs(attempt.load - now.step.load) > _FREE_LOAD_RISE * now.run.scale
+    noticed = _NOTICED_RADIATION * now.run.scale
+    allowed = _MAX_ACCELERATION * max(now.stepping.previous_radiated, noticed)
     growing = radiated > noticed and radiated > allowed
     # At the smallest size, waves of an arrested event alone are no
     # reason for explicit steps.
@@ -229,7 +229,7 @@ def _accept(
     backward(grid.transform, transfer_hat, transfer)
     slip, slip_rate, past, stress = state.slip, state.slip_rate, state.past, state.stress
     profile, initial = setting.nodes.profile, setting.nodes.initial
-    mean_load = 0.5 * (load + state.diagnostics[0].load)
+    mean_load = 0.5 * (load + state.diagnostics[0].step.load)
     work = 0.0
     for i in range(u.size):
         work += u[i] * (mean_load * profile[i] + initial[i])
@@ -270,6 +270,7 @@ def implicit_steps(
     IMPLICIT, and `step` is the first size to try.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
+    stepping = now.stepping
     smallest = _JUST_BELOW * thresholds.smallest_step
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
@@ -279,8 +280,8 @@ def implicit_steps(
         if size < smallest and not clipped:
             reason = Reason.TO_EXPLICIT
             break
-        ratio = size / (size + now.previous_size) if now.two_step else 0.0
-        time = now.time + size
+        ratio = size / (size + stepping.previous_size) if stepping.two_step else 0.0
+        time = now.step.time + size
         load = value_at(setting.load, time)
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
         # 2. and 3. Slip increments.
@@ -303,24 +304,28 @@ def implicit_steps(
                 reason = Reason.TO_EXPLICIT
                 break
             continue
-        steady = np.sqrt(_MAX_ACCELERATION) * now.previous_radiated
-        growing = radiated > _NOTICED_RADIATION * now.scale and radiated > steady
+        steady = np.sqrt(_MAX_ACCELERATION) * stepping.previous_radiated
+        growing = radiated > _NOTICED_RADIATION * now.run.scale and radiated > steady
         # 5. Take it.
         done = _accept(state, grid, setting, tables, attempt, radiated)
-        now.implicit_steps += 1
-        now.two_step, now.previous_size, now.previous_radiated = 1, size, radiated
+        stepping.implicit_steps += 1
+        stepping.two_step, stepping.previous_size, stepping.previous_radiated = (
+            1,
+            size,
+            radiated,
+        )
         fall = finish_step(state, grid, setting, done, u, tables.strength, record, taken)
         taken += 1
         # 6. The next size, or the end.
         if not clipped:
             step = _next_size(thresholds.slip_step, size, largest, growing)
-        if thresholds.slid_stop and now.weakened_nodes >= thresholds.breakable:
+        if thresholds.slid_stop and now.step.weakened_nodes >= thresholds.breakable:
             reason = Reason.ALL_SLID
-        elif thresholds.event_stop and fall > EVENT_DROP * now.scale:
+        elif thresholds.event_stop and fall > EVENT_DROP * now.run.scale:
             reason = Reason.DROPPED
-        elif step < smallest and not (clipped or last or now.time >= thresholds.end_time):
+        elif step < smallest and not (clipped or last or now.step.time >= thresholds.end_time):
             reason = Reason.TO_EXPLICIT
-        ends = reason != Reason.DONE or now.event_begun or now.event_calm
-        if ends or last or now.time >= thresholds.end_time:
+        ends = reason != Reason.DONE or now.event.begun or now.event.calm
+        if ends or last or now.step.time >= thresholds.end_time:
             break
     return taken, step, reason

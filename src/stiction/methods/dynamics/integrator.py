@@ -34,6 +34,7 @@ from stiction.methods.dynamics.memory import (
 from stiction.methods.dynamics.state import (
     DIAGNOSTICS,
     STATION,
+    STEP,
     ExplicitTables,
     Floats,
     ImplicitTables,
@@ -59,7 +60,7 @@ _ENDINGS: dict[int, str] = {
     Reason.DROPPED: "onset",
     Reason.AT_REST: "rest",
 }
-NO_RECORD = StepRecord(np.empty(0, DIAGNOSTICS), np.empty((0, 0), STATION))
+NO_RECORD = StepRecord(np.empty(0, STEP), np.empty((0, 0), STATION))
 
 
 @dataclasses.dataclass(eq=False)
@@ -148,38 +149,38 @@ class Run:
         slip_rate[slip_rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
         stress = stress - impedance * slip_rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
-        now = diagnostics[0]
-        now["time"] = now["maximum_time"] = time
-        now["load"] = now["maximum_load"] = now["start_load"] = load
+        now = diagnostics.view(np.recarray)[0]
+        now.step.time = now.maximum.time = time
+        now.step.load = now.maximum.load = now.run.start_load = load
         # The mean stress before the first slip, when no waves are radiated.
-        now["maximum_stress"] = setting.mean_initial + load * setting.mean_profile
+        now.maximum.stress = setting.mean_initial + load * setting.mean_profile
         radiated = impedance * slip_rate.sum() / thresholds.period_nodes
-        now["whole_stress"] = now["maximum_stress"] - radiated
+        now.step.whole_stress = now.maximum.stress - radiated
         weakens = np.isfinite(limit)
         change = (limit[weakens] - nodes.peak[weakens]).sum()
-        now["strength_change"] = change / thresholds.period_nodes
+        now.step.strength_change = change / thresholds.period_nodes
         # Stress above the strength counts as strength.
-        now["maximum_strength"] = now["strength_change"] + radiated
-        now["maximum_breakable"] = now["maximum_stress"]
+        now.maximum.strength = now.step.strength_change + radiated
+        now.maximum.breakable = now.maximum.stress
         if thresholds.held:
-            now["maximum_breakable"] = self.mean(load * nodes.profile + nodes.initial)
-        now["mean_stress"] = self.mean(stress)
-        now["maximum_node"] = now["top_node"] = int(np.argmax(excess))
+            now.maximum.breakable = self.mean(load * nodes.profile + nodes.initial)
+        now.step.mean_stress = self.mean(stress)
+        now.maximum.node = now.step.top_node = int(np.argmax(excess))
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
-        now["reverse_margin"], now["reverse_node"] = margin.min(), int(np.argmin(margin))
-        now["top_slip_rate"], now["mean_slip"] = slip_rate.max(), self.mean(delta)
-        now["weakened_nodes"] = np.count_nonzero(delta >= nodes.residual_slip)
+        now.run.reverse_margin, now.run.reverse_node = margin.min(), int(np.argmin(margin))
+        now.step.top_slip_rate, now.step.mean_slip = slip_rate.max(), self.mean(delta)
+        now.step.weakened_nodes = np.count_nonzero(delta >= nodes.residual_slip)
         scale = max(0.0, self.scale_at(load))
-        now["scale"] = scale
+        now.run.scale = scale
         front = thresholds.front_share * nodes.residual_slip
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
         explicit = thresholds.explicit_only or impedance * slip_rate.max() > _OVERSTRESS * scale
-        now["phase"] = Phase.EXPLICIT if explicit else Phase.IMPLICIT
-        now["next_size"] = min(max(size, first), LARGEST_STEP)
+        now.stepping.phase = Phase.EXPLICIT if explicit else Phase.IMPLICIT
+        now.stepping.next_size = min(max(size, first), LARGEST_STEP)
         return RuptureState(
             slip=delta,
             slip_rate=slip_rate,
@@ -196,7 +197,7 @@ class Run:
 
     def ended(self, state: RuptureState) -> bool:
         """Return whether the end time is reached, apart from round-off after many steps."""
-        remaining = self.setting.thresholds.end_time - state.now["time"]
+        remaining = self.setting.thresholds.end_time - state.now.step.time
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
@@ -210,10 +211,10 @@ class Run:
         times, values = self.setting.load
         resting = (  # the last piece of the load does not rise, and no node slips
             not state.explicit
-            and state.now["time"] >= times[-1]
+            and state.now.step.time >= times[-1]
             and values[-1] <= values[-2]
             and self.medium.impedance * state.slip_rate.max()
-            <= _RESTING_STRESS * state.now["scale"]
+            <= _RESTING_STRESS * state.now.run.scale
         )
         return "rest" if self.stop != "time" and resting else None
 
@@ -249,8 +250,8 @@ class Run:
             steps_taken, reason = steps(state, count - taken, rest_of_record)
             taken += steps_taken
             now, held = state.now, self.setting.thresholds.held
-            rests = bool(now["event_calm"] or (reason == Reason.ALL_SLID and held))
-            if rests or now["event_begun"]:
+            rests = bool(now.event.calm or (reason == Reason.ALL_SLID and held))
+            if rests or now.event.begun:
                 self._follow_event(state, rests)
             # 2. to 4. The other type of steps takes over, or the run ends.
             if reason == Reason.TO_EXPLICIT:
@@ -270,39 +271,39 @@ class Run:
         """
         now = state.now
         if rests:
-            self._keep_event(state, state.slip, "load", "work")
+            self._keep_event(state, state.slip, now.step)
         else:
-            self._keep_event(state, state.maximum_slip, "maximum_load", "maximum_work")
-        now["fast"], now["peak_rate"], now["event_open"] = 0, 0.0, now["event_begun"]
+            self._keep_event(state, state.maximum_slip, now.maximum)
+        now.event.fast, now.event.peak_rate, now.event.open = 0, 0.0, now.event.begun
         # The next event may begin from the present state of rest.
-        if rests and now["maximum_time"] == now["time"]:
-            now["maximum_work"], state.maximum_slip[:] = now["work"], state.slip
+        if rests and now.maximum.time == now.step.time:
+            now.maximum.work, state.maximum_slip[:] = now.step.work, state.slip
         for name in ("time", "load", "work", "node"):
-            now[f"event_{name}"] = now[f"maximum_{name}"]
+            now.event[name] = now.maximum[name]
         state.event_slip[:] = state.maximum_slip
-        now["event_begun"] = now["event_calm"] = 0
+        now.event.begun = now.event.calm = 0
 
     def _keep_event(
-        self, state: RuptureState, slip: Floats, load: str, work: str, settled: bool = True
+        self, state: RuptureState, slip: Floats, end: Any, settled: bool = True
     ) -> None:
         """Keep the open event with its slip, load and work at the end, if its slip was fast."""
         now, thresholds = state.now, self.setting.thresholds
         # A sliding interface never comes to rest.
-        slides = now["all_broken"] and not thresholds.held and slip is state.slip
-        slides &= now["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
-        if now["event_open"] and now["fast"] and not slides:
+        slides = now.results.all_broken and not thresholds.held and slip is state.slip
+        slides &= now.step.top_slip_rate > _STOPPED_SHARE * thresholds.unstable_slip_rate
+        if now.event.open and now.event.fast and not slides:
             event = np.zeros((), event_type(slip.size))
-            event["time"], event["node"] = now["event_time"], now["event_node"]
+            event["time"], event["node"] = now.event.time, now.event.node
             event["settled"] = settled
-            event["duration"] = now["fast_until"] - now["fast_since"]
-            event["load"] = now["event_load"], now[load]
-            event["work"] = now["event_work"], now[work]
+            event["duration"] = now.event.fast_until - now.event.fast_since
+            event["load"] = now.event.load, end.load
+            event["work"] = now.event.work, end.work
             event["slip"] = state.event_slip, slip
             self.events.append(event)
 
     def cut_event(self, state: RuptureState) -> None:
         """Keep the event that the end of the run cuts short."""
-        self._keep_event(state, state.slip, "load", "work", settled=False)
+        self._keep_event(state, state.slip, state.now.step, settled=False)
 
     @property
     def cut_short(self) -> bool:
@@ -311,17 +312,17 @@ class Run:
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
-        remaining = self.setting.thresholds.end_time - state.now["time"]
+        remaining = self.setting.thresholds.end_time - state.now.step.time
         if remaining < count * medium.step:
             count = min(count, max(1, int(np.ceil(remaining / medium.step - 1e-6))))
         return explicit_steps(count, state, medium.grid, self.setting, tables, record)
 
     def _implicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
-        size, grid = float(state.now["next_size"]), self.medium.grid
+        size, grid = float(state.now.stepping.next_size), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # release the tables of explicit steps before making new tables
             self.tables = implicit_tables(grid)
-        taken, state.now["next_size"], reason = implicit_steps(
+        taken, state.now.stepping.next_size, reason = implicit_steps(
             count, size, state, grid, self.setting, self.tables, record
         )
         return taken, reason
@@ -337,13 +338,15 @@ class Run:
         """Phase 2: let explicit steps take over."""
         tables = self._explicit_tables()
         to_explicit(self.medium.grid, state, tables.step, tables.table, state.memory_sum)
-        state.now["calm_steps"], state.now["calm_slip_rate"] = 0, state.slip_rate.max()
+        stepping = state.now.stepping
+        stepping.calm_steps, stepping.calm_slip_rate = 0, state.slip_rate.max()
 
     def _to_implicit(self, state: RuptureState) -> None:
         """Phase 3: let implicit steps take over."""
         to_implicit(self.medium.grid, state, self.medium.step)
+        stepping, thresholds = state.now.stepping, self.setting.thresholds
         state.past[:] = state.slip_rate
-        state.now["next_size"] = 2.0 * self.setting.thresholds.smallest_step
-        state.now["two_step"] = 0  # the first implicit step is of first order
-        mean_rate = state.slip_rate.sum() / self.setting.thresholds.period_nodes
-        state.now["previous_radiated"] = self.medium.impedance * mean_rate
+        stepping.next_size = 2.0 * thresholds.smallest_step
+        stepping.two_step = 0  # the first implicit step is of first order
+        mean_rate = state.slip_rate.sum() / thresholds.period_nodes
+        stepping.previous_radiated = self.medium.impedance * mean_rate

@@ -44,6 +44,7 @@ from stiction.methods.dynamics.integrator import Run
 from stiction.methods.dynamics.state import (
     DIAGNOSTICS,
     STATION,
+    STEP,
     Floats,
     RuptureState,
     StepRecord,
@@ -91,7 +92,7 @@ SCALARS: dict[str, Variable] = over(
     fracture_energy=("J/m", "energy dissipated above the residual"),
     radiated_energy=("J/m", "work minus dissipated and strain energy"),
 )
-STEPS: dict[str, Variable] = over(  # DIAGNOSTICS of these names
+STEPS: dict[str, Variable] = over(  # as in STEP
     "step",
     step_time=("s", "time after each step"),
     step_load=("Pa", "load factor tau_0 after each step"),
@@ -117,7 +118,7 @@ OVER_NODES = over(
     arrival_time=("s", "arrival time of the front, see `Rupture.arrival`"),
 )
 TIME = Variable("s", "time from zero load", ("time",))
-_FROM_DIAGNOSTICS = ("time", "load", "mean_stress", "work")
+_OF_STEP = ("time", "load", "mean_stress", "work")
 
 
 Place = Annotated[
@@ -209,9 +210,7 @@ class Recorder:
         # Steps write to these rows. `take_steps` copies the rows that
         # were filled.
         rows, stations = save.every, len(save.stations)
-        self._record = StepRecord(
-            np.empty(rows, DIAGNOSTICS), np.empty((rows, stations), STATION)
-        )
+        self._record = StepRecord(np.empty(rows, STEP), np.empty((rows, stations), STATION))
         self._columns = {name: self._record.steps[name.removeprefix("step_")] for name in STEPS}
         for name in STATIONS if stations else ():
             self._columns[name] = self._record.stations[name.removeprefix("station_")]
@@ -235,11 +234,11 @@ class Recorder:
     def add(self, state: RuptureState) -> None:
         """Keep a frame of the present state."""
         run, now, medium = self.run, state.now, self.run.medium
-        frame: dict[str, Any] = {name: float(now[name]) for name in _FROM_DIAGNOSTICS}
+        frame: dict[str, Any] = {name: float(now.step[name]) for name in _OF_STEP}
         frame |= {
             "mean_slip": float(run.mean(state.slip)),
             "top_slip_rate": float(state.slip_rate.max()),
-            "weakened_fraction": float(now["weakened_nodes"])
+            "weakened_fraction": float(now.step.weakened_nodes)
             / run.setting.thresholds.breakable,
             "seismic_moment": moment_of(medium.problem, state.slip),
         }

@@ -78,81 +78,98 @@ PULSE_SHARE = 0.1
 """Slip is fast if a node slips at the rate of an instability, and if the mean slip rate is above
 this fraction of its maximum in the event. Echoes in a period of two extents reach 0.06."""
 
-DIAGNOSTICS = np.dtype(
-    [
-        # The last step.
-        ("time", "f8"),  # s
-        ("size", "f8"),  # s
-        ("load", "f8"),  # tau_0, Pa
-        ("work", "f8"),  # of the load on the slip so far, J/m
-        ("mean_slip", "f8"),  # m
-        ("mean_slip_rate", "f8"),  # m/s
-        ("mean_stress", "f8"),  # of the nodes that can break, Pa, as all stresses here
-        ("whole_stress", "f8"),  # and with the stress that nodes beyond an extent took over
-        ("strength_change", "f8"),  # change of their mean strength by slip
-        ("top_slip_rate", "f8"),  # largest slip rate, m/s, and its node
-        ("top_node", "i8"),
-        ("weakened_nodes", "i8"),  # number of nodes at the residual strength
-        # The last maximum of `whole_stress`.
-        ("maximum_stress", "f8"),
-        ("maximum_breakable", "f8"),  # mean stress of the nodes that can break at that time
-        ("maximum_radiated", "f8"),  # Z <V>
-        ("maximum_strength", "f8"),  # `strength_change`
-        ("largest_fall", "f8"),  # of the mean stress since then, by waves
-        ("maximum_time", "f8"),
-        ("maximum_load", "f8"),
-        ("maximum_work", "f8"),
-        ("maximum_node", "i8"),  # the fastest
-        # Instabilities. Stresses, times and loads have a meaning after
-        # the first instability.
-        ("instabilities", "i8"),  # number of instabilities so far
-        ("in_event", "i8"),  # whether an instability is under way
-        ("event_slip_rate", "f8"),  # largest slip rate in it, m/s
-        # The event that `Run` follows until its fast slip has settled,
-        # or until the next one begins.
-        ("event_open", "i8"),  # whether there is one
-        ("event_begun", "i8"),  # whether one has just begun,
-        ("event_calm", "i8"),  # or has just ended
-        ("event_time", "f8"),  # when it began, s, at this load, Pa, after this work, J/m
-        ("event_load", "f8"),
-        ("event_work", "f8"),
-        ("event_node", "i8"),  # the fastest as it began
-        ("peak_rate", "f8"),  # largest mean slip rate in the event while slip was fast, m/s
-        ("fast", "i8"),  # whether slip was fast in the event, and if so
-        ("fast_since", "f8"),  # when it was so first, s,
-        ("fast_until", "f8"),  # and last: see step 6 of `diagnostics`
-        ("arrested_events", "i8"),
-        ("last_arrested", "i8"),  # whether the last instability is among them
-        ("first_stress", "f8"),  # mean stress at the first instability
-        ("onset_stress", "f8"),  # `whole_stress` at the highest instability
-        ("critical_stress", "f8"),  # largest mean stress of breakable nodes at an instability
-        ("onset_time", "f8"),
-        ("onset_load", "f8"),
-        ("onset_node", "i8"),
-        ("all_broken", "i8"),  # whether all breakable nodes have reached residual strength
-        ("kinetic_stress", "f8"),  # if so, the mean stress when that happened
-        # Choice of steps.
-        ("phase", "i8"),  # a `Phase`
-        ("next_size", "f8"),  # size that the next implicit step tries, s
-        ("two_step", "i8"),  # whether the next implicit step follows an implicit step
-        ("previous_size", "f8"),  # of the last implicit step, s
-        ("previous_radiated", "f8"),  # Z <V> after it
-        ("explicit_steps", "i8"),
-        ("implicit_steps", "i8"),
-        ("calm_steps", "i8"),  # calm steps in a row
-        ("calm_slip_rate", "f8"),  # largest slip rate when the row began, m/s
-        # The whole run so far.
-        ("scale", "f8"),  # stress scale of the largest load
-        ("start_load", "f8"),  # load at the start of the run
-        ("start_error", "f8"),  # error of the onset due to the start
-        # Smallest sum of stress and strength. Below 0 slip would reverse.
-        ("reverse_margin", "f8"),
-        ("reverse_node", "i8"),  # its node
-    ]
-)
-"""Diagnostics of every step, in a record that compiled steps and checkpoints share."""
 
-STATION = np.dtype([("slip", "f8"), ("slip_rate", "f8"), ("shear_stress", "f8")])
+def record(numbers: str, counts: str = "", **groups: np.dtype[Any]) -> np.dtype[Any]:
+    """Return the type of a record of groups, numbers, and counts or flags, by their names."""
+    fields = [(name, "f8") for name in numbers.split()]
+    fields += [(name, "i8") for name in counts.split()]
+    return np.dtype([*groups.items(), *fields])
+
+
+STEP = record(
+    "time size load work mean_slip mean_slip_rate mean_stress whole_stress strength_change"
+    " top_slip_rate",
+    "top_node weakened_nodes",
+)
+"""The last step: its end, s, and its size, s; then, at its end,
+
+- `load`: tau_0, Pa; `work` of the load on the slip so far, J/m
+- `mean_slip` (m) and `mean_slip_rate` (m/s)
+- `mean_stress` of the nodes that can break, Pa, as all stresses here
+- `whole_stress`: the same with the stress that nodes beyond an extent took over
+- `strength_change` of their mean strength by slip
+- `top_slip_rate`: the largest, m/s, at `top_node`
+- `weakened_nodes`: number of nodes at the residual strength
+"""
+
+MAXIMUM = record("stress breakable radiated strength largest_fall time load work", "node")
+"""The last maximum of `whole_stress`:
+
+- `stress`; `breakable`: mean stress of the nodes that can break at that time
+- `radiated`: Z <V>; `strength`: `strength_change`
+- `largest_fall` of the mean stress since then, by waves
+- `time` (s), `load`, `work`, and the fastest `node`
+"""
+
+EVENT = record(
+    "slip_rate time load work peak_rate fast_since fast_until",
+    "unstable last_arrested open begun calm node fast",
+)
+"""The present instability, and the event that `Run` follows until its fast slip has settled, or
+until the next one begins:
+
+- `unstable`: whether an instability is under way; `slip_rate`: the largest in it, m/s
+- `last_arrested`: whether the last instability is among the arrested events
+- `open`: whether there is an event; `begun`, `calm`: whether it has just begun or ended
+- `time` (s), `load` and `work` when it began, and the fastest `node` then
+- `peak_rate`: largest mean slip rate in the event while slip was fast, m/s
+- `fast`: whether slip was fast in the event, first at `fast_since` and last at `fast_until` (s),
+  see step 6 of `diagnostics`
+"""
+
+RESULTS = record(
+    "first_stress onset_stress critical_stress onset_time onset_load kinetic_stress",
+    "instabilities arrested_events onset_node all_broken",
+)
+"""Results so far. Stresses, times and loads have a meaning after the first instability:
+
+- `instabilities`, `arrested_events`: their numbers
+- `first_stress`: mean stress at the first instability
+- `onset_stress`, `onset_time`, `onset_load`, `onset_node`: `whole_stress` at the highest
+  instability, and its time, load and node
+- `critical_stress`: largest mean stress of breakable nodes at an instability
+- `all_broken`: whether all breakable nodes have reached residual strength; `kinetic_stress`: if
+  so, the mean stress when that happened
+"""
+
+STEPPING = record(
+    "next_size previous_size previous_radiated calm_slip_rate",
+    "phase two_step explicit_steps implicit_steps calm_steps",
+)
+"""Choice of steps:
+
+- `phase`: a `Phase`; `explicit_steps`, `implicit_steps`: numbers of steps so far
+- `next_size`: size that the next implicit step tries, s
+- `two_step`: whether the next implicit step follows an implicit step, of the size
+  `previous_size` (s), with Z <V> = `previous_radiated` after it
+- `calm_steps`: calm steps in a row; `calm_slip_rate`: largest slip rate when the row began, m/s
+"""
+
+RUN = record("scale start_load start_error reverse_margin", "reverse_node")
+"""The whole run so far:
+
+- `scale`: stress scale of the largest load
+- `start_load`: load at the start; `start_error`: error of the onset due to the start
+- `reverse_margin`: smallest sum of stress and strength, at `reverse_node`. Below 0 slip would
+  reverse.
+"""
+
+DIAGNOSTICS = record(
+    "", step=STEP, maximum=MAXIMUM, event=EVENT, results=RESULTS, stepping=STEPPING, run=RUN
+)
+"""Diagnostics of a run, in a record that compiled steps and checkpoints have in common."""
+
+STATION = record("slip slip_rate shear_stress")
 """Slip (m), slip rate (m/s) and stress (Pa) of a node."""
 
 
@@ -174,7 +191,7 @@ def event_type(nodes: int) -> np.dtype[Any]:
 class StepRecord(NamedTuple):
     """Rows that keep every step. Without rows, no step is kept."""
 
-    steps: NDArray[Any]  # (steps,) array of DIAGNOSTICS
+    steps: NDArray[Any]  # (steps,) array of STEP
     stations: NDArray[Any]  # (steps, stations) array of STATION
 
 
@@ -277,18 +294,18 @@ class RuptureState(NamedTuple):
 
     @property
     def now(self) -> Any:
-        """Diagnostics, by name."""
-        return self.diagnostics[0]
+        """Diagnostics, by group and name."""
+        return self.diagnostics.view(np.recarray)[0]
 
     @property
     def explicit(self) -> bool:
         """Whether explicit steps come next."""
-        return bool(self.now["phase"] == Phase.EXPLICIT)
+        return bool(self.now.stepping.phase == Phase.EXPLICIT)
 
     @property
     def steps(self) -> int:
         """Number of steps so far, explicit and implicit."""
-        return int(self.now["explicit_steps"] + self.now["implicit_steps"])
+        return int(self.now.stepping.explicit_steps + self.now.stepping.implicit_steps)
 
 
 class ExplicitTables(NamedTuple):

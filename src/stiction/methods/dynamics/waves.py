@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_allocating, jit_inside
 from stiction.methods.dynamics.mesh import Mesh
-from stiction.methods.dynamics.state import PULSE_SHARE
+from stiction.methods.dynamics.state import PULSE_SHARE, record
 from stiction.methods.equilibrium.strength import StaticSample, strength_at
 
 
@@ -75,21 +75,19 @@ class Waves(NamedTuple):
         return self.totals[0]
 
 
-TOTALS = np.dtype(
-    [
-        ("time", "f8"),  # s
-        ("travel", "f8"),  # of the drive of a block, m
-        ("speed", "f8"),  # of this drive, m/s
-        ("force", "f8"),  # change of the force of this drive, N/m
-        ("friction", "f8"),  # energy that friction took from a block, J/m
-        ("fast_slip_rate", "f8"),  # slip rate that counts as fast, m/s
-        ("peak_rate", "f8"),  # largest sum of the rates of all nodes while slip was fast, m/s
-        ("fast", "i8"),  # whether slip was fast, as in `diagnostics`, and if so
-        ("fast_since", "f8"),  # when it was so first, s,
-        ("fast_until", "f8"),  # and last
-    ]
+TOTALS = record(
+    "time travel speed force friction fast_slip_rate peak_rate fast_since fast_until", "fast"
 )
-"""Numbers of an event so far."""
+"""Numbers of an event so far:
+
+- `time`, s; `travel` (m) and `speed` (m/s) of the drive of a block
+- `force`: change of the force of this drive, N/m
+- `friction`: energy that friction took from a block, J/m
+- `fast_slip_rate`: slip rate that counts as fast, m/s
+- `peak_rate`: largest sum of the rates of all nodes while slip was fast, m/s
+- `fast`: whether slip was fast, as in `diagnostics`, first at `fast_since` and last at `fast_until`
+  (s)
+"""
 
 
 def block_at_rest(mesh: Mesh, slip: Array) -> Waves:
