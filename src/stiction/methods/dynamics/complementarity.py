@@ -7,11 +7,11 @@ Find the slip increments u >= 0 (m) in a step, such that at every node
     stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
 
 g is the stress at the end of a step without slip
-(`tables.trial_stress`). M is a circulant matrix with positive
-eigenvalues (`tables.symbol`, Pa/m): elasticity, memory and radiation.
-The strength of a node follows a straight line, b - w u. As u grows, the
-node may pass to a different line. w is the weakening rate of the node
-(`tables.falling`), and g - b is `tables.driving`.
+(`SlipProblem.trial`). M is a circulant matrix with positive
+eigenvalues (`SlipProblem.symbol`, Pa/m): elasticity, memory and
+radiation. The strength of a node follows a straight line, b - w u. As u
+grows, the node may pass to a different line. w is the weakening rate of
+the node (`SlipProblem.falling`), and g - b is `SlipProblem.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
@@ -41,8 +41,8 @@ from typing import Any
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
-from stiction.elasticity.operator import Transform, convolve
-from stiction.methods.dynamics.state import ImplicitTables, Setting, node_line, node_strength
+from stiction.elasticity.operator import convolve
+from stiction.methods.dynamics.state import Setting, SlipProblem, node_line, node_strength
 
 _MAX_CG, _MAX_NEWTON = 400, 60  # iterations
 _MIN_CURVATURE = 1e-10  # of p (M - W) p as a share of p M p
@@ -50,13 +50,13 @@ _JOINING = 10.0  # stress above the strength with which a node joins, in units o
 
 
 @jit_inside
-def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any:
+def _solve(problem: SlipProblem, accuracy: float) -> Any:
     """Step 2: improve u in place to a residual of `accuracy` (Pa). Return whether that succeeds."""
-    u, slipping, driving = tables.increment, tables.slipping, tables.driving
-    falling, product, work = tables.falling, tables.product, tables.work
-    r, p, z = tables.cg_residual, tables.cg_direction, tables.cg_preconditioned
-    n = u.size
-    convolve(transform, tables.symbol, u, work, product)
+    transform, work, product = problem.transform, problem.work, problem.product
+    u, slipping = problem.increment, problem.slipping
+    driving, falling, n = problem.driving, problem.falling, u.size
+    r, p, z = problem.cg_residual, problem.cg_direction, problem.cg_preconditioned
+    convolve(transform, problem.symbol, u, work, product)
     largest = 0.0
     for i in range(n):
         r[i] = p[i] = 0.0
@@ -67,7 +67,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         return largest <= accuracy  # False for NaN
     rz_before = 1.0
     for iteration in range(_MAX_CG):
-        convolve(transform, tables.inverse, r, work, z)
+        convolve(transform, problem.inverse, r, work, z)
         rz = 0.0
         for i in range(n):
             if slipping[i] > 0:
@@ -75,7 +75,7 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
         beta = rz / rz_before if iteration > 0 else 0.0
         for i in range(n):
             p[i] = z[i] + beta * p[i] if slipping[i] > 0 else 0.0
-        convolve(transform, tables.symbol, p, work, product)
+        convolve(transform, problem.symbol, p, work, product)
         curvature, elastic = 0.0, 0.0  # p (M - W) p and p M p
         for i in range(n):
             if slipping[i] > 0:
@@ -99,23 +99,17 @@ def _solve(transform: Transform, tables: ImplicitTables, accuracy: float) -> Any
 
 @jit_inside
 def solve_increment(
-    transform: Transform,
-    setting: Setting,
-    slip: Array,
-    tables: ImplicitTables,
-    accuracy: float,
-    line_accuracy: float,
+    problem: SlipProblem, setting: Setting, slip: Array, accuracy: float, line_accuracy: float
 ) -> Any:
     """Find the slip increments of an implicit step. Return whether they were found.
 
-    `tables.increment` and `tables.slipping` hold the first guess, and
+    `problem.increment` and `problem.slipping` hold the first guess, and
     then the solution. The stress is accurate to `accuracy` (Pa). The
     strength may differ by `line_accuracy` (Pa) from the straight line
     that replaces it.
     """
-    u, slipping, trial = tables.increment, tables.slipping, tables.trial_stress
-    driving, falling, product = tables.driving, tables.falling, tables.product
-    n = u.size
+    u, slipping, trial = problem.increment, problem.slipping, problem.trial
+    driving, falling, product, n = problem.driving, problem.falling, problem.product, u.size
     # 1. The first slipping set and its lines.
     for i in range(n):
         if slipping[i] == 0 and trial[i] > node_strength(setting, i, slip[i]):
@@ -126,10 +120,10 @@ def solve_increment(
         driving[i] = trial[i] - start
     for _ in range(_MAX_NEWTON):
         # 2. The increments of this set on these lines.
-        if not _solve(transform, tables, accuracy):
+        if not _solve(problem, accuracy):
             return False
         # 3. Nodes that join, leave, or pass to another line.
-        convolve(transform, tables.symbol, u, tables.work, product)
+        convolve(problem.transform, problem.symbol, u, problem.work, product)
         changed = 0
         for i in range(n):
             if slipping[i] == 0:

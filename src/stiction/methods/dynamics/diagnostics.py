@@ -76,7 +76,6 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit_inside
 from stiction.methods.dynamics.state import (
     PULSE_SHARE,
-    Grid,
     Nodes,
     PiecewiseLinear,
     RuptureState,
@@ -94,13 +93,15 @@ _AT_MAXIMUM = 1e-5  # distance from its maximum at which the mean stress counts 
 
 
 class TakenStep(NamedTuple):
-    """The step that was taken."""
+    """The step that was taken, with the slip of the nodes in it, and their strength after it."""
 
     time: float  # at its end, s
     size: float  # s
     load: float  # tau_0 at its end, Pa
     work: float  # of the load on the slip, J/m
     radiated: float  # Z <V> at its end, Pa
+    increments: Array  # m
+    strength: Array  # Pa
 
 
 def stress_scale(nodes: Nodes) -> PiecewiseLinear:
@@ -200,22 +201,13 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
 @jit_inside
 def finish_step(
-    state: RuptureState,
-    grid: Grid,
-    setting: Setting,
-    taken: TakenStep,
-    increments: Array,
-    strength: Array,
-    record: StepRecord,
-    row: int,
+    state: RuptureState, setting: Setting, taken: TakenStep, record: StepRecord, row: int
 ) -> Any:
     """Update diagnostics, arrivals and the record. Return the fall of the mean stress, Pa.
 
-    `increments` is the slip of the nodes in the step (m), and
-    `strength` is their strength after the step (Pa). If the record has
-    no rows, it stays empty.
+    If the record has no rows, it stays empty.
     """
-    now = state.diagnostics[0]
+    now, increments, strength = state.diagnostics[0], taken.increments, taken.strength
     step, run, event = now.step, now.run, now.event
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress
     residual_slip, arrival = setting.nodes.residual_slip, state.arrival
@@ -252,7 +244,7 @@ def finish_step(
     run.reverse_margin, run.reverse_node = margin, margin_node
     step.work, step.mean_slip = step.work + taken.work, slip_sum / thresholds.breakable
     per_node = thresholds.period_nodes / thresholds.breakable
-    step.mean_slip_rate = taken.radiated / grid.impedance * per_node
+    step.mean_slip_rate = taken.radiated / setting.grid.impedance * per_node
     run.scale = max(run.scale, value_at(setting.scale, taken.load))
     fall = observe(now, thresholds, taken.radiated)
     if top_slip_rate > thresholds.unstable_slip_rate and not event.begun:

@@ -140,17 +140,17 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
 def explicit_steps(
     count: int,
     state: RuptureState,
-    grid: Grid,
     setting: Setting,
     tables: ExplicitTables,
     record: StepRecord,
 ) -> Any:
     """Take up to `count` explicit steps in place. Return (steps taken, reason).
 
-    `state.phase` is EXPLICIT. `record` has at least `count` rows, or no
+    `stepping.phase` is EXPLICIT. `record` has at least `count` rows, or no
     rows to keep no record.
     """
-    impedance, step = grid.impedance, tables.step
+    grid, step = setting.grid, tables.step
+    impedance = grid.impedance
     now, thresholds = state.diagnostics[0], setting.thresholds
     slip_rate_hat, slip_hat = tables.slip_rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
@@ -184,10 +184,9 @@ def explicit_steps(
         # 4. Diagnostics, and the end.
         rise, radiated = abs(load - now.step.load), impedance * total / thresholds.period_nodes
         now.stepping.explicit_steps += 1
-        done = TakenStep(time, step, load, work * grid.cell, radiated)
-        fall = finish_step(
-            state, grid, setting, done, tables.increments, tables.strength, record, taken
-        )
+        work *= grid.cell
+        done = TakenStep(time, step, load, work, radiated, tables.increments, tables.strength)
+        fall = finish_step(state, setting, done, record, taken)
         taken += 1
         calm = _calm(now, thresholds, step, impedance, rise)
         slid = thresholds.slid_stop and now.step.weakened_nodes >= thresholds.breakable

@@ -53,7 +53,6 @@ from stiction.methods.dynamics.diagnostics import (
 )
 from stiction.methods.dynamics.memory import advance_with_ramp, fading_memory, tabulate
 from stiction.methods.dynamics.state import (
-    Grid,
     ImplicitTables,
     Reason,
     RuptureState,
@@ -115,10 +114,11 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 
 @jit_inside
 def _assemble(
-    state: RuptureState, grid: Grid, setting: Setting, tables: ImplicitTables, attempt: _Attempt
+    state: RuptureState, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
     """Step 2: write matrix, stress without slip and first guess. Return the accuracy of u, Pa."""
-    stiffness, entry, symbol = grid.stiffness, grid.entry, tables.symbol
+    grid, problem = setting.grid, tables.problem
+    stiffness, entry, symbol = grid.stiffness, grid.entry, problem.symbol
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
     size, ratio, rise = attempt.size, attempt.ratio, attempt.rise
     impedance = grid.impedance
@@ -133,11 +133,11 @@ def _assemble(
             fading = stiffness[1, q] * (response[entry[q]] + rise * ramp[entry[q]]) / size
             symbol[q] = symbol[0] + stiffness[0, q] - fading
         for q in range(symbol.size):
-            tables.inverse[q] = 1.0 / symbol[q]
+            problem.inverse[q] = 1.0 / symbol[q]
         tables.valid_for[0], tables.valid_for[1], tables.filled[0] = size, ratio, 1
     fading_memory(grid, state.memory, tables)
     forward(grid.transform, state.past, past_hat)
-    trial_hat, trial = tables.work, tables.trial_stress
+    trial_hat, trial = problem.work, problem.trial
     trial_hat[0] = impedance * ratio * past_hat[0]
     for q in range(1, trial_hat.size):
         memory = tables.memory_sum[q] - rise * ramp[entry[q]] * past_hat[q]
@@ -150,8 +150,8 @@ def _assemble(
         trial[i] += attempt.load * profile[i] + initial[i]
         if setting.nodes.peak[i] < np.inf:
             largest = max(largest, abs(trial[i]))
-        tables.increment[i] = state.past[i] * size
-        tables.slipping[i] = 1 if state.slip_rate[i] > 0.0 else 0
+        problem.increment[i] = state.past[i] * size
+        problem.slipping[i] = 1 if state.slip_rate[i] > 0.0 else 0
     # Round-off of the transforms limits the accuracy.
     return max(_SOLVED_STRESS * state.diagnostics[0].run.scale, _ROUND_OFF_SHARE * largest)
 
@@ -202,16 +202,12 @@ def _accelerates(
 
 @jit_inside
 def _accept(
-    state: RuptureState,
-    grid: Grid,
-    setting: Setting,
-    tables: ImplicitTables,
-    attempt: _Attempt,
-    radiated: float,
+    state: RuptureState, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Step 5: take the step in place and return it. Write the strength after it."""
+    """Step 5: take the step in place. Write the strength after it, and return the work, J/m."""
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
-    u, transfer, transfer_hat = tables.increment, tables.transfer, tables.work
+    grid, u = setting.grid, tables.problem.increment
+    transfer, transfer_hat = tables.transfer, tables.problem.work
     slip_rate_hat, slope_hat, slip_hat = tables.slip_rate_hat, tables.slope_hat, state.slip_hat
     forward(grid.transform, u, slip_rate_hat)
     for q in range(slip_rate_hat.size):
@@ -238,7 +234,7 @@ def _accept(
         past[i] = u[i] / size
         stress[i] = transfer[i] + load * profile[i] + initial[i] - grid.impedance * slip_rate[i]
         tables.strength[i] = node_strength(setting, i, slip[i])
-    return TakenStep(attempt.time, size, load, work * grid.cell, radiated)
+    return work * grid.cell
 
 
 @jit_inside
@@ -257,20 +253,18 @@ def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
 @jit
 def implicit_steps(
     count: int,
-    step: float,
     state: RuptureState,
-    grid: Grid,
     setting: Setting,
     tables: ImplicitTables,
     record: StepRecord,
 ) -> Any:
-    """Take up to `count` accepted implicit steps in place. Return (steps, next size, reason).
+    """Take up to `count` accepted implicit steps in place. Return (steps taken, reason).
 
-    The parameters are described in `explicit_steps`. `state.phase` is
-    IMPLICIT, and `step` is the first size to try.
+    The parameters are described in `explicit_steps`. `stepping.phase` is IMPLICIT.
     """
-    now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.increment
+    now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.problem.increment
     stepping = now.stepping
+    step = stepping.next_size
     smallest = _JUST_BELOW * thresholds.smallest_step
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
@@ -285,15 +279,15 @@ def implicit_steps(
         load = value_at(setting.load, time)
         attempt = _Attempt(size, time, load, ratio, 2.0 * ratio / size)
         # 2. and 3. Slip increments.
-        accuracy = _assemble(state, grid, setting, tables, attempt)
+        accuracy = _assemble(state, setting, tables, attempt)
         line_accuracy = accuracy if thresholds.curved else 0.0
-        solved = solve_increment(
-            grid.transform, setting, state.slip, tables, accuracy, line_accuracy
-        )
+        solved = solve_increment(tables.problem, setting, state.slip, accuracy, line_accuracy)
         # 4. Keep the step, or try half its size.
         largest, total, radiated = 0.0, 0.0, 0.0
         if solved:
-            largest, total, radiated = _effect(state, setting, u, grid.impedance, attempt)
+            largest, total, radiated = _effect(
+                state, setting, u, setting.grid.impedance, attempt
+            )
         if not np.isfinite(total):
             reason = Reason.NOT_FINITE
             break
@@ -307,14 +301,15 @@ def implicit_steps(
         steady = np.sqrt(_MAX_ACCELERATION) * stepping.previous_radiated
         growing = radiated > _NOTICED_RADIATION * now.run.scale and radiated > steady
         # 5. Take it.
-        done = _accept(state, grid, setting, tables, attempt, radiated)
+        work = _accept(state, setting, tables, attempt)
+        done = TakenStep(time, size, load, work, radiated, u, tables.strength)
         stepping.implicit_steps += 1
         stepping.two_step, stepping.previous_size, stepping.previous_radiated = (
             1,
             size,
             radiated,
         )
-        fall = finish_step(state, grid, setting, done, u, tables.strength, record, taken)
+        fall = finish_step(state, setting, done, record, taken)
         taken += 1
         # 6. The next size, or the end.
         if not clipped:
@@ -328,4 +323,5 @@ def implicit_steps(
         ends = reason != Reason.DONE or now.event.begun or now.event.calm
         if ends or last or now.step.time >= thresholds.end_time:
             break
-    return taken, step, reason
+    stepping.next_size = step
+    return taken, reason

@@ -315,17 +315,13 @@ class Run:
         remaining = self.setting.thresholds.end_time - state.now.step.time
         if remaining < count * medium.step:
             count = min(count, max(1, int(np.ceil(remaining / medium.step - 1e-6))))
-        return explicit_steps(count, state, medium.grid, self.setting, tables, record)
+        return explicit_steps(count, state, self.setting, tables, record)
 
     def _implicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
-        size, grid = float(state.now.stepping.next_size), self.medium.grid
         if not isinstance(self.tables, ImplicitTables):
             self.tables = None  # release the tables of explicit steps before making new tables
-            self.tables = implicit_tables(grid)
-        taken, state.now.stepping.next_size, reason = implicit_steps(
-            count, size, state, grid, self.setting, self.tables, record
-        )
-        return taken, reason
+            self.tables = implicit_tables(self.medium.grid)
+        return implicit_steps(count, state, self.setting, self.tables, record)
 
     def _explicit_tables(self) -> ExplicitTables:
         if not isinstance(self.tables, ExplicitTables):

@@ -55,6 +55,30 @@ arrays as [block][copy][real, imaginary][64] and memory variables as
 [block][copy][pair][4][64]. The four rows hold the memory of the real signal (real
 and imaginary part), and then the memory of the imaginary signal. Because the row
 length is constant, the compiler can vectorise without run-time checks for overlap.
+
+Example by hand
+---------------
+A line of two nodes has one mode with memory. Let |k| c_s = 1/s, with a single pair s = -1 and w = 1.
+A step of h = log 2 has E = 1/2 and B = 1 - E = 1/2. At a slip rate of 1 m/s, (2) is psi = 1 -
+exp(-t) metres: 1/2 after a step, and 3/4 after two. The explicit steps store y = psi/B, 1 and 3/2.
+They also store w E B y, 1/4 and 3/8. With the response w B = 1/2, the next steps end with S = 1/4 +
+1/2 = 3/4, and S = 3/8 + 1/2 = 7/8:
+
+>>> import numba
+>>> from stiction.elasticity.operator import make_transform
+>>> unit, (entry, offset, multiplicity) = np.ones(1), offsets((2,))
+>>> constants = make_transform((2,)), 1.0, 1.0, np.zeros((2, 2)), entry, offset, multiplicity
+>>> grid = Grid(*constants, unit, unit, -unit + 0j, unit + 0j, 1)
+>>> table, response = step_table(grid, np.log(2.0))
+>>> y, memory_sum = empty_memory(grid)
+>>> V = zeros(TWO_ROWS)
+>>> V[0] = 1.0
+>>> advance = numba.njit(lambda *arguments: advance_memory(*arguments))
+>>> for _ in range(2):
+...     advance(y, table, V, memory_sum, 1, 1)
+...     print(f"{y[0]:g} {memory_sum[0]:g} {memory_sum[0] + response[1]:g}")
+1 0.25 0.75
+1.5 0.375 0.875
 """
 
 from typing import Any
@@ -72,6 +96,7 @@ from stiction.methods.dynamics.state import (
     Ints,
     Phase,
     RuptureState,
+    SlipProblem,
     Spectrum,
 )
 
@@ -243,13 +268,13 @@ def to_explicit(
     for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
         real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
         total[:] = (real * y[block, ..., 0, :] - imaginary * y[block, ..., 1, :]).sum(axis=1)
-    state.now["phase"] = Phase.EXPLICIT
+    state.now.stepping.phase = Phase.EXPLICIT
 
 
 def to_implicit(grid: Grid, state: RuptureState, step: float) -> None:
     """Step 3: multiply psi/B by B for explicit steps h."""
     _scale_memory(grid, state.memory, step, divide=False)
-    state.now["phase"] = Phase.IMPLICIT
+    state.now.stepping.phase = Phase.IMPLICIT
 
 
 def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:
@@ -287,15 +312,17 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     table, ramp = (zeros(count * pairs * rows * ENTRIES) for rows in (4, 2))
-    arrays: Any = (
-        *(table, ramp, *work_arrays(2, entries, float), *work_arrays(2, modes, float)),
-        *work_arrays(5, modes, complex),
-        *work_arrays(10, nodes, float),
-        np.zeros(nodes, dtype=np.int64),
-        *np.zeros((2, count * grid.multiplicity * 2 * ENTRIES)),
-        np.empty((2, TWO_ROWS)),
-    )
-    return ImplicitTables(np.zeros(1, dtype=np.int64), np.zeros(2), *arrays)
+    *spectra, work = work_arrays(5, modes, complex)
+    transfer, strength, trial, driving, falling, u, *of_solver = work_arrays(10, nodes, float)
+    problem = SlipProblem(
+        grid.transform, *work_arrays(2, modes, float), work, trial, driving, falling, u,
+        np.zeros(nodes, dtype=np.int64), *of_solver,
+    )  # fmt: skip
+    packed, second_packed = np.zeros((2, count * grid.multiplicity * 2 * ENTRIES))
+    return ImplicitTables(
+        np.zeros(1, dtype=np.int64), np.zeros(2), table, ramp, *work_arrays(2, entries, float),
+        *spectra, transfer, strength, packed, second_packed, np.empty((2, TWO_ROWS)), problem,
+    )  # fmt: skip
 
 
 @jit_inside

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import pydantic
 from numpy.typing import NDArray
-from pydantic import AliasChoices, BeforeValidator, Field, PlainSerializer
+from pydantic import BeforeValidator, Field, PlainSerializer
 
 from stiction.base.errors import InputError
 from stiction.base.model import (
@@ -140,10 +140,7 @@ class Rupture(Listed):
 
     loading_rate: Positive | None = None
     end_time: Positive | None = None
-    # The second name is a former one, which is documented nowhere.
-    load_history: LoadHistory = Field(
-        default=None, validation_alias=AliasChoices("load_history", "load")
-    )
+    load_history: LoadHistory = None
     kernel_tolerance: Positive = 1e-6
     courant: ShareUpToOne = 0.9
     implicit: Flag = True
@@ -320,6 +317,7 @@ def make_run(
     # would cut it off.
     rising = np.sign(np.diff(load.values))
     setting = Setting(
+        grid=medium.grid,
         law=friction.parameters,
         nodes=nodes,
         mean_profile=float(nodes.profile[finite].mean()),

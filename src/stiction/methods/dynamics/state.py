@@ -246,8 +246,9 @@ class Nodes(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Load, friction and stepping for an interface. They do not change in a run."""
+    """Elasticity, load, friction and stepping for an interface. They do not change in a run."""
 
+    grid: Grid
     law: Any  # ``friction.parameters``
     nodes: Nodes
     mean_profile: float  # <p>
@@ -323,6 +324,27 @@ class ExplicitTables(NamedTuple):
     increments: Array  # of slip, by the mean of the rates before and after the step
 
 
+class SlipProblem(NamedTuple):
+    """Problem (1) of `complementarity` for the slip in a step, with its solution and work arrays.
+
+    Arrays have the shape (nodes,), and `symbol`, `inverse` and `work` (modes,).
+    """
+
+    transform: Transform
+    symbol: Array  # eigenvalues of M, Pa/m
+    inverse: Array  # 1/symbol
+    work: Spectrum
+    trial: Array  # g, stress without slip, Pa
+    driving: Array  # g - b on the present straight lines of strength, Pa
+    falling: Array  # w, their slopes, Pa/m
+    increment: Array  # u, m
+    slipping: Ints  # S: 0 stuck, 1 slipping
+    product: Array
+    cg_residual: Array  # r, p and z of conjugate gradients
+    cg_direction: Array
+    cg_preconditioned: Array
+
+
 class ImplicitTables(NamedTuple):
     """Tables for implicit steps of a given size, with the work arrays of a run."""
 
@@ -332,24 +354,13 @@ class ImplicitTables(NamedTuple):
     ramp: Array
     response: Array
     ramp_response: Array
-    symbol: Array  # (modes,): eigenvalues of the matrix of a step, Pa/m
-    inverse: Array
-    memory_sum: Spectrum  # (modes,), like the next four
+    memory_sum: Spectrum  # (modes,), like the next three
     past_hat: Spectrum
     slip_rate_hat: Spectrum
     slope_hat: Spectrum  # of the slip rate in the step
-    work: Spectrum
-    trial_stress: Array  # (nodes,), like the rest up to `slipping`
-    transfer: Array
-    strength: Array  # after the step
-    increment: Array
-    driving: Array
-    falling: Array
-    cg_residual: Array
-    cg_direction: Array
-    product: Array
-    cg_preconditioned: Array
-    slipping: Ints  # 0 stuck, 1 slipping
+    transfer: Array  # (nodes,)
+    strength: Array  # (nodes,): after the step
     packed: Array  # a Fourier array in packed order, like `second_packed`
     second_packed: Array
     sums: Array  # (2, 128)
+    problem: SlipProblem
