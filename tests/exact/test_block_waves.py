@@ -13,9 +13,8 @@ import stiction as st
 from stiction.methods.dynamics.mesh import condensed, layer_matrix, make_mesh
 from stiction.methods.dynamics.specimens import RuptureSearch, begin
 from stiction.methods.dynamics.waves import block_at_rest, wave_steps
-from stiction.methods.equilibrium.sample import sample_of
 from stiction.methods.equilibrium.solver import follow_to_sliding as path_of
-from stiction.methods.equilibrium.solver import make_search
+from stiction.methods.equilibrium.solver import make_search, sample_of
 from stiction.methods.equilibrium.strength import LINEAR
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)

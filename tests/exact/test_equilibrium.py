@@ -17,8 +17,8 @@ from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
 from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.patches import count_patches, main_patch
-from stiction.methods.equilibrium.sample import pieces_of, sample_of
-from stiction.methods.equilibrium.strength import LINEAR, make_sample
+from stiction.methods.equilibrium.solver import sample_of
+from stiction.methods.equilibrium.strength import LINEAR, make_sample, pieces_of
 
 COLUMN = stiffness_column(256, 0.1, 1e9)
 

@@ -9,7 +9,7 @@ from setups import EXACT
 from sliders import SLIDER, coefficients, rig_problem
 
 import stiction as st
-from stiction.methods.equilibrium.contact import stages
+from stiction.methods.equilibrium import slider as stages
 
 PUSH = st.Pusher(height=0.006, width=0.004)
 RIGS = {

@@ -17,9 +17,9 @@ from stiction.elasticity.protocol import DenseEntries
 from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
 from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
-from stiction.methods.equilibrium.endings import PathStatus
-from stiction.methods.equilibrium.sample import pieces_of, sample_of
-from stiction.methods.equilibrium.strength import make_sample
+from stiction.methods.equilibrium.solver import sample_of
+from stiction.methods.equilibrium.state import PathStatus
+from stiction.methods.equilibrium.strength import make_sample, pieces_of
 from stiction.problem.sample import pressing_of
 from stiction.random.stresses import mean_in_stress, support_in_stress
 

@@ -9,7 +9,7 @@ from setups import make_problem, within
 import stiction as st
 from stiction.methods.dynamics import slow_start as module
 from stiction.methods.dynamics.slow_start import slow_start, static_search
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import sample_of
 
 PROBLEM = st.paper.problem(nodes=512)
 

@@ -10,10 +10,8 @@ from setups import SOLID, exact_onset, make_problem, turns
 import stiction as st
 import stiction.methods.equilibrium.dense.search
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.endings import PathStatus, Route
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding
-from stiction.methods.equilibrium.state import at_rest
+from stiction.methods.equilibrium.solver import follow_to_sliding, sample_of
+from stiction.methods.equilibrium.state import PathStatus, Route, at_rest
 
 
 def assert_first(problem, tau_p, weakening_rate=None):

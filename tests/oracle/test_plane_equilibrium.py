@@ -20,7 +20,7 @@ from setups import (
 import stiction as st
 from stiction.elasticity.operator import lowest_eigenvector, make_operator
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import sample_of
 from stiction.methods.equilibrium.strength import present_pieces
 from stiction.methods.equilibrium.transforms.bracket import Bracket
 from stiction.methods.equilibrium.transforms.plane import PlaneSearch, plane_onset

@@ -8,14 +8,14 @@ from rigs import LoadSteps, plain_rig
 
 import stiction as st
 from stiction.elasticity.rig import on_cells
-from stiction.methods.equilibrium.contact.path import (
+from stiction.methods.equilibrium.contact_path import (
     LOAD,
     N_BORDERED_AGAIN,
     N_STACKED,
     Status,
     follow,
 )
-from stiction.methods.equilibrium.contact.stages import (
+from stiction.methods.equilibrium.slider import (
     Friction,
     begin_push,
     forces_of,

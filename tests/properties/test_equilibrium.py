@@ -7,7 +7,7 @@ from setups import exact_onset, make_problem, turns
 
 import stiction as st
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.solver import sample_of
 
 NODES = 96
 ANGLE = turns(NODES)

@@ -9,7 +9,7 @@ from setups import LENGTH, RATE, exact_onset, make_problem, smooth_noise
 import stiction as st
 from stiction.elasticity.operator import make_operator
 from stiction.methods.criterion.average import _between_nodes
-from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.state import Outcome
 from stiction.methods.equilibrium.transforms import plane as program
 from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import least_equilibrium

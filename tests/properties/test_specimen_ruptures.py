@@ -7,9 +7,8 @@ from specimens import crooked, rough
 
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureSearch
-from stiction.methods.equilibrium.endings import Outcome
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search, sample_of
+from stiction.methods.equilibrium.state import Outcome
 from stiction.methods.equilibrium.strength import present_pieces
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)

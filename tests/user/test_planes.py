@@ -11,8 +11,7 @@ from setups import exact_onset
 import stiction as st
 from stiction.cli.pages import write_report
 from stiction.methods.equilibrium import solver
-from stiction.methods.equilibrium.endings import Outcome, PathStatus
-from stiction.methods.equilibrium.state import Jump
+from stiction.methods.equilibrium.state import Jump, Outcome, PathStatus
 from stiction.methods.equilibrium.transforms import plane as search
 from stiction.methods.equilibrium.transforms.relaxation import Relaxed
 

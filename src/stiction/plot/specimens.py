@@ -14,7 +14,7 @@ from stiction.base.errors import InputError
 from stiction.base.model import check
 from stiction.base.units import unit_for
 from stiction.inference.curves import Curves
-from stiction.methods.equilibrium.contact.solver import SliderSolver
+from stiction.methods.equilibrium.slider import SliderSolver
 from stiction.plot.axes import named, need, new_figure, problem_of, with_unit
 from stiction.plot.fields import chosen_row, strength_of
 from stiction.plot.style import ACCENT, COLUMN, INK, PALE, QUIET, paper_style, series

@@ -58,11 +58,12 @@ length is constant, the compiler can vectorise without run-time checks for overl
 
 Example by hand
 ---------------
-A line of two nodes has one mode with memory. Let |k| c_s = 1/s, with a single pair s = -1 and w = 1.
-A step of h = log 2 has E = 1/2 and B = 1 - E = 1/2. At a slip rate of 1 m/s, (2) is psi = 1 -
-exp(-t) metres: 1/2 after a step, and 3/4 after two. The explicit steps store y = psi/B, 1 and 3/2.
-They also store w E B y, 1/4 and 3/8. With the response w B = 1/2, the next steps end with S = 1/4 +
-1/2 = 3/4, and S = 3/8 + 1/2 = 7/8:
+A line of two nodes has one mode with memory. Let |k| c_s = 1/s, with a
+single pair s = -1 and w = 1. A step of h = log 2 has E = 1/2 and B =
+1 - E = 1/2. At a slip rate of 1 m/s, (2) is psi = 1 - exp(-t) metres:
+1/2 after a step, and 3/4 after two. The explicit steps store y = psi/B,
+1 and 3/2, and w E B y, 1/4 and 3/8. With the response w B = 1/2, the
+next steps end with S = 1/4 + 1/2 = 3/4, and S = 3/8 + 1/2 = 7/8:
 
 >>> import numba
 >>> from stiction.elasticity.operator import make_transform

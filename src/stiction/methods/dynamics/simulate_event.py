@@ -30,10 +30,9 @@ from stiction.methods.dynamics.save import (
 )
 from stiction.methods.dynamics.specimens import DynamicEvent, RuptureSearch, refuse_overstress
 from stiction.methods.dynamics.summary import SPEEDS, front_speeds, rate_spectrum
-from stiction.methods.equilibrium.endings import PathStatus
 from stiction.methods.equilibrium.events import event_table, event_variables, moment_of
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import SamplePath, follow_to_sliding
+from stiction.methods.equilibrium.solver import SamplePath, follow_to_sliding, sample_of
+from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import present_pieces, residual_nodes
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, study_attributes, to_dataset

@@ -41,8 +41,8 @@ from stiction.methods.dynamics.memory import grown_memory
 from stiction.methods.dynamics.state import Phase, RuptureState
 from stiction.methods.dynamics.summary import energy_balance
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.endings import PathStatus
-from stiction.methods.equilibrium.sample import refused, sample_of
+from stiction.methods.equilibrium.solver import refused, sample_of
+from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import StaticSample, exceeds
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
@@ -55,7 +55,7 @@ _MAX_TRIALS = 5
 
 def static_search(problem: Problem) -> DenseSearch | None:
     """Return the search for equilibria of a problem, or `None` for planes and curved laws."""
-    if problem.interface.is_plane or refused(problem.friction):
+    if problem.interface.is_plane or refused(problem):
         return None
     return DenseSearch(problem)
 

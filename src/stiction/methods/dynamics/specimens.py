@@ -38,12 +38,16 @@ from stiction.methods.dynamics.waves import Waves, block_at_rest, wave_steps
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.jump import jump
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.endings import Outcome, PathStatus, Route
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.method import Equilibrium
-from stiction.methods.equilibrium.sample import refused
-from stiction.methods.equilibrium.solver import OnsetSolver, SamplePath
-from stiction.methods.equilibrium.state import EquilibriumState, Jump
+from stiction.methods.equilibrium.solver import OnsetSolver, SamplePath, refused
+from stiction.methods.equilibrium.state import (
+    EquilibriumState,
+    Jump,
+    Outcome,
+    PathStatus,
+    Route,
+)
 from stiction.methods.equilibrium.strength import StaticSample
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
@@ -75,7 +79,7 @@ def refusals(method: Any, problem: Problem) -> list[str]:
         for name, value in vars(method).items()
         if name not in OPTIONS and value != getattr(usual, name)
     ]
-    return reasons + refused(problem.friction)
+    return reasons + refused(problem)
 
 
 def variables(method: Any, problem: Problem) -> dict[str, Variable]:

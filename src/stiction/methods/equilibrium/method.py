@@ -8,15 +8,10 @@ from pydantic import Field
 
 from stiction.base.model import INTERNAL_MEMBERS, Flag, Listed, Number, Real, model
 from stiction.base.variables import Variable
-from stiction.methods.equilibrium.contact.solver import (
-    OF_SLIDERS,
-    SliderSolver,
-    push_variables,
-    refused_laws,
-)
 from stiction.methods.equilibrium.events import event_variables, of_samples
-from stiction.methods.equilibrium.sample import pieces_of, refused
-from stiction.methods.equilibrium.solver import OnsetSolver, make_search
+from stiction.methods.equilibrium.slider import OF_SLIDERS, SliderSolver, push_variables
+from stiction.methods.equilibrium.solver import OnsetSolver, make_search, refused
+from stiction.methods.equilibrium.strength import pieces_of
 from stiction.problem.problem import Problem
 from stiction.problem.results import along, onset_variables, position
 from stiction.problem.sample import Sample
@@ -153,9 +148,7 @@ class Equilibrium(Listed):
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
-        reasons = refused(problem.friction)
-        if isinstance(problem.specimen, Slider):
-            reasons = reasons or refused_laws(problem)
+        reasons = refused(problem)
         if problem.friction.plateau and problem.interface.is_plane:
             reasons.append(
                 "friction.strength: begins with a plateau, which is followed on lines only. Let it"

@@ -27,18 +27,18 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import RealArray, check, check_memory, describe
 from stiction.base.variables import Variable, force_variables, forces
-from stiction.methods.equilibrium.contact.solver import SliderSolver
 from stiction.methods.equilibrium.events import (
     elongation_of,
     event_table,
     event_variables,
     travel_of,
 )
-from stiction.methods.equilibrium.sample import sample_of
+from stiction.methods.equilibrium.slider import SliderSolver
 from stiction.methods.equilibrium.solver import (
     SamplePath,
     follow_to_sliding,
     make_search,
+    sample_of,
     warn_of_signs,
 )
 from stiction.methods.equilibrium.state import EquilibriumSearch, EquilibriumState, at_rest

@@ -34,16 +34,17 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.endings import Outcome, PathStatus
 from stiction.methods.equilibrium.events import ArrestedEvent, event_table, event_variables
 from stiction.methods.equilibrium.patches import Mask, critical_patch, patches_of
-from stiction.methods.equilibrium.sample import refused, sample_of
 from stiction.methods.equilibrium.state import (
     EquilibriumSearch,
     EquilibriumState,
+    Outcome,
+    PathStatus,
     multiplier_of,
 )
 from stiction.methods.equilibrium.strength import (
+    Pieces,
     StaticSample,
     all_breakable_slip,
     make_sample,
@@ -53,8 +54,10 @@ from stiction.methods.equilibrium.strength import (
 )
 from stiction.methods.equilibrium.transforms.plane import PlaneSearch
 from stiction.problem.checks import warn_if_coarse
+from stiction.problem.friction.parameters import Linear, Polygon
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
+from stiction.problem.specimen import Slider
 
 MIN_NODES_IN_NUCLEATION_LENGTH = 8.0
 """Fewest nodes in a nucleation length without a warning, which gives the expected error."""
@@ -142,9 +145,38 @@ def follow_to_sliding(
     return SamplePath(first or state, state, peak, events, known, arrival, sliding)
 
 
+def refused(problem: Problem) -> list[str]:
+    """Return the reasons why the law of a problem cannot be followed, or an empty list."""
+    law = problem.friction
+    if not isinstance(law.parameters, Linear | Polygon):
+        return [
+            f"friction: {type(law).__name__} is curved, but equilibria are followed along straight"
+            " pieces. Use st.PiecewiseWeakening.from_law(friction, pieces=32) or, between"
+            " half-spaces, st.Rupture(...)"
+        ]
+    if isinstance(problem.specimen, Slider) and not law.linear:
+        return [
+            "friction: the strength of a slider falls linearly with slip. Use"
+            " st.LinearWeakening(weakening_rate=...)"
+        ]
+    return []
+
+
+def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
+    """Return one sample or all samples of a batch, in the form that kernels need."""
+    initial = rows.initial_stress[row]
+    shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
+    excess = (rows.strength[row] - initial).reshape(shape)
+    residual = (rows.residual_strength[row] - initial).reshape(shape)
+    # Copy the rate: numba would compile each kernel again for a
+    # read-only array, as laws return.
+    weakening_rate = rows.weakening_rate[row].reshape(shape).copy()
+    return make_sample(excess, residual, rows.load_profile.flatten(), weakening_rate, pieces)
+
+
 def make_search(problem: Problem, gap: float = 1e-6) -> EquilibriumSearch:
     """Return the programme that finds equilibria for a problem, or raise an `InputError`."""
-    if reasons := refused(problem.friction):
+    if reasons := refused(problem):
         raise InputError(reasons)
     return PlaneSearch(problem, gap) if problem.interface.is_plane else DenseSearch(problem)
 

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.jit import jit, jit_inside
+from stiction.problem.friction import FrictionLaw
+from stiction.problem.friction.parameters import Polygon
 
 CONSTANT_STRENGTH_RTOL = 1e-11
 """Smallest fall of strength, as a fraction of the mean strength, with which a node counts as
@@ -47,6 +49,17 @@ class Pieces(NamedTuple):
 
 
 LINEAR = Pieces(np.array([1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0]), 1.0, 0.5)
+
+
+def pieces_of(law: FrictionLaw) -> Pieces:
+    """Return the pieces of a law for which `solver.refused` returns no reason."""
+    parameters = law.parameters
+    if not isinstance(parameters, Polygon):
+        return LINEAR
+    u, f = parameters.slip, parameters.fraction
+    steep = np.append(-np.diff(f) / np.diff(u), 0.0)
+    starts, first = f + steep * u, law.initial_slope
+    return Pieces(u[1:].copy(), starts, steep / first, first, law.integral)
 
 
 class StaticSample(NamedTuple):

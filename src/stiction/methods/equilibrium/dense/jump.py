@@ -89,7 +89,7 @@ from stiction.methods.equilibrium.dense.stable_path import (
     NEGATIVE_RATE_RTOL,
     ends_sliding,
 )
-from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.state import Outcome
 from stiction.methods.equilibrium.strength import (
     StaticSample,
     piece_at,

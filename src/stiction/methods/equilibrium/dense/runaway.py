@@ -48,8 +48,8 @@ from stiction.methods.equilibrium.dense.cholesky import (
     forward_substitute,
     row_start,
 )
-from stiction.methods.equilibrium.endings import Outcome
 from stiction.methods.equilibrium.patches import main_patch
+from stiction.methods.equilibrium.state import Outcome
 from stiction.methods.equilibrium.strength import (
     StaticSample,
     step_to_corner,

@@ -40,13 +40,20 @@ from stiction.methods.equilibrium.dense.linear_program import (
 )
 from stiction.methods.equilibrium.dense.runaway import Runs, runs_away, runs_of
 from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
-from stiction.methods.equilibrium.endings import Outcome, PathStatus, Route
 from stiction.methods.equilibrium.patches import count_patches
-from stiction.methods.equilibrium.sample import pieces_of
-from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest, multiplier_of
+from stiction.methods.equilibrium.state import (
+    EquilibriumState,
+    Jump,
+    Outcome,
+    PathStatus,
+    Route,
+    at_rest,
+    multiplier_of,
+)
 from stiction.methods.equilibrium.strength import (
     StaticSample,
     exceeds,
+    pieces_of,
     present_pieces,
     step_to_corner,
 )

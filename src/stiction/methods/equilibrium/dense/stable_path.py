@@ -93,7 +93,7 @@ from stiction.elasticity.stiffness import entry, mean_relief
 from stiction.methods.equilibrium.dense import cholesky
 from stiction.methods.equilibrium.dense.cholesky import SlipState
 from stiction.methods.equilibrium.dense.linear_program import stress_tolerance
-from stiction.methods.equilibrium.endings import PathStatus
+from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16

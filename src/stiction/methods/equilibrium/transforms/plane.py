@@ -41,10 +41,19 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.elasticity.operator import Operator, inner, make_operator
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.endings import Outcome, PathStatus
-from stiction.methods.equilibrium.sample import pieces_of
-from stiction.methods.equilibrium.state import EquilibriumState, Jump, at_rest
-from stiction.methods.equilibrium.strength import StaticSample, all_breakable_slip, exceeds
+from stiction.methods.equilibrium.state import (
+    EquilibriumState,
+    Jump,
+    Outcome,
+    PathStatus,
+    at_rest,
+)
+from stiction.methods.equilibrium.strength import (
+    StaticSample,
+    all_breakable_slip,
+    exceeds,
+    pieces_of,
+)
 from stiction.methods.equilibrium.transforms.bracket import Bracket, TooSmallError, bisect
 from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (

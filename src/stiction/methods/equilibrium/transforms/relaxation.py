@@ -71,7 +71,7 @@ from stiction.elasticity.operator import (
     residual_of,
     solve_inside,
 )
-from stiction.methods.equilibrium.endings import Outcome
+from stiction.methods.equilibrium.state import Outcome
 from stiction.methods.equilibrium.strength import (
     Present,
     StaticSample,

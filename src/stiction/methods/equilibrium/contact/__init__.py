@@ -1,1 +1,0 @@
-"""Equilibria of a slider whose pressure depends on load and slip."""

@@ -1,0 +1,374 @@
+"""Sliders on a base: press them, push them, and return onsets, events and paths.
+
+Problem
+-------
+A `Rig` gives the stiffness K, and the forces T F and T_p N of the push F and the normal force N
+(N/m). Pressing and push are paths of `contact_path`. The load is N in the first, and the push in
+the second.
+
+Algorithm
+---------
+The algorithm is our own (`press`, `begin_push`).
+
+1. Pressing alone causes shear, because the two bodies expand differently. Each cell has the sign s
+   of its shear T_p. With the slip s d, K becomes s K s. If no cell exceeds its strength and each
+   edge is pressed, the forces are T_p N.
+2. Otherwise begin at a small part of N. All strengths are zero without N. The nodes beyond their
+   strength are on E, edges on top. Follow the path to N. Slip nearby may then load a cell against
+   its sign beyond its strength. Change the sign of such cells, and press again.
+3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
+   weakening. Edges that are open begin in S.
+4. Instabilities and arrests alternate until the slider slides (`SliderPath.follow`). The first
+   instability is the first of them during the push. Static friction is the largest force.
+
+Results
+-------
+Loads and forces are divided by the length of the interface: the mean shear stress, Pa. The load
+D is the push that the machine would exert without slip. Slip and travel count from the beginning
+of the push, and opening is the present opening. The travel of the push is U = F/C + T'x (`Rig`),
+without the constant part from the pressing.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stiction.base.arrays import Array
+from stiction.base.errors import InputError, warn_accuracy, warn_of_samples
+from stiction.base.variables import Variable
+from stiction.elasticity.rig import Rig, on_cells
+from stiction.methods.equilibrium import contact_path
+from stiction.methods.equilibrium.contact_path import Contact, Motion, Status, follow
+from stiction.methods.equilibrium.events import (
+    elongation_of,
+    event_variables,
+    patch_measures,
+    tabulate,
+)
+from stiction.methods.equilibrium.patches import critical_patch, patches_of
+from stiction.methods.equilibrium.solver import refused
+from stiction.problem.checks import warn_if_coarse
+from stiction.problem.interface import Interface
+from stiction.problem.problem import Problem
+from stiction.problem.sample import Sample
+
+OF_SLIDERS = {
+    "open_fraction": Variable("1", "part of the interface that is open before it slides")
+}
+WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
+"""Variables of events that are defined for a pressure that does not change."""
+STRENGTH_STEP = 1e-7
+"""Rise of a friction coefficient in a difference quotient."""
+MIN_NODES = 16
+"""Nodes in a nucleation length without a warning about the ends of the slider."""
+COARSE = (
+    "stress is singular at the ends of the slider. At 17 nodes, twice as many move static friction"
+    " by up to 0.04 % and the first instability by up to 0.5 %"
+)
+WARNINGS = (
+    "the path was not followed to its end in {samples}: static friction is a lower bound",
+    "the slider topples before it slides in {samples}: static friction is the force at which it"
+    " topples. Push lower",
+    "no patch becomes unstable in {samples}: the machine is so stiff that the slider slides stably,"
+    " and first_instability is NaN",
+)
+"""Warnings about exceptional samples."""
+FIRST_PRESSING = 1e-3
+"""Fraction of the normal force at which a pressing that slips begins."""
+REVERSE_RTOL = 1e-9
+"""Excess of shear against the sign of a cell that is round-off, in mean normal forces of a cell."""
+MIN_TURNING = 1e-6
+"""Opening over slip of a slider that topples, in the motion that does not end."""
+
+
+class Friction(NamedTuple):
+    """Friction coefficients of the cells (n,), and the fall of their strength with slip, Pa."""
+
+    peak: Array
+    residual: Array
+    weakening: Array
+
+
+class Pressed(NamedTuple):
+    """A slider after the pressing."""
+
+    forces: Array  # (m,): shear force of cells, and tension of edges, N/m
+    moved: Array  # (m,): slip with its sign, and opening, m
+    friction: Friction  # the peak is the residual where it has been reached
+
+
+def make_contact(
+    K: Array, T: Array, friction: Friction, overstress: Array, moved: Array, relief: float = 0.0
+) -> Contact:
+    """Return a slider at rest, in which open edges are in S.
+
+    `overstress` and `moved` are taken over. Where the strength is mu_r N, `friction.peak` must
+    equal `friction.residual`. With a machine, the force falls by `relief` T'x (Pa).
+    """
+    n, m = len(friction.peak), len(moved)
+    if relief > 0.0:
+        K = K + relief * np.outer(T, T)
+    columns, load, normal, normal_load = K.T.copy(), T.copy(), on_cells(K[n:]), on_cells(T[n:])
+    difference = friction.peak - friction.residual
+    weakening = np.where(difference > 0.0, friction.weakening, 0.0)
+    columns[:, :n] += friction.peak * normal.T
+    columns.flat[: n * (m + 1) : m + 1] -= weakening
+    load[:n] += friction.peak * normal_load
+    inverse, (inside, stack, motion) = np.empty((m, m)), np.zeros((3, m), np.int64)
+    opened = n + np.flatnonzero(moved[n:] > 0.0)
+    k = opened.size
+    inverse[:k, :k] = np.linalg.inv(columns[np.ix_(opened, opened)].T)
+    inside[:k], motion[opened] = opened, Motion.STABLE
+    counts = np.zeros(4, np.int64)
+    counts[contact_path.N_INSIDE] = k
+    return Contact(
+        columns, load, relief * T, normal, normal_load, difference, weakening, overstress, moved,
+        inverse, inside, stack, motion, counts, np.zeros(3), *np.empty((4, m)),
+    )  # fmt: skip
+
+
+def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
+    """Steps 1 and 2: return a slider under a normal force (N/m)."""
+    linear, n = T_p * force, len(friction.peak)
+    strength = friction.peak * on_cells(-linear[n:])
+    if np.all(linear[n:] < 0.0) and np.all(np.abs(linear[:n]) < strength):
+        return Pressed(linear, np.zeros_like(linear), friction)
+    # 1. The same with slip along the shear.
+    sign = np.where(linear < 0.0, -1.0, 1.0)
+    sign[n:] = 1.0
+    # 2. A sign may change once for each cell.
+    for _ in range(n + 1):
+        overstress = T_p * sign * (FIRST_PRESSING * force)
+        overstress[:n] -= FIRST_PRESSING * strength
+        moved = np.zeros_like(overstress)
+        state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
+        beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
+        state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
+        state.counts[contact_path.N_STACKED], state.loads[contact_path.LOAD] = (
+            beyond.size,
+            FIRST_PRESSING * force,
+        )
+        while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
+            pass
+        if status != Status.AT_TARGET:
+            break
+        forces = forces_of(state, friction)
+        excess = overstress[:n] - 2.0 * forces[:n]  # of -f over the strength
+        against = excess > REVERSE_RTOL * force / n
+        if not against.any():
+            present = friction._replace(peak=friction.residual + state.difference)
+            return Pressed(forces * sign, moved * sign, present)
+        sign[:n][against] *= -1.0
+    raise InputError(
+        "friction_coefficient: the slider does not come to rest while it is pressed. Check the"
+        " coefficients and the weakening rate"
+    )
+
+
+def forces_of(state: Contact, friction: Friction) -> Array:
+    """Return the shear force of each cell, and the tension of each edge (m,), N/m."""
+    n, forces = len(friction.peak), state.overstress.copy()
+    coefficient = friction.residual + state.difference
+    forces[:n] += coefficient * on_cells(-forces[n:]) - state.weakening * state.moved[:n]
+    return forces
+
+
+def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Contact:
+    """Step 3: return the slider before the push. Its slip adds to the slip of the pressing."""
+    peak, residual, weakening = start.friction
+    moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
+    overstress[:n] -= peak * on_cells(-start.forces[n:])
+    overstress[:n] += np.where(peak > residual, weakening * moved[:n], 0.0)
+    return make_contact(K, T, start.friction, overstress, moved, relief)
+
+
+class PushState(NamedTuple):
+    """A slider under a load D and a force F (N/m), with arrays over cells, then edges (m,)."""
+
+    load: float
+    force: float
+    moved: Array  # slip of the push, and opening, m
+    forces: Array  # shear force, and tension of edges, N/m
+    direction: Array  # (n,): rate of slip
+    residual: bool  # whether a cell has reached its residual strength
+
+
+class Push(NamedTuple):
+    """The push of a sample until it slides. Without an instability, `first` is None.
+
+    `last` is the last equilibrium, and `peak` the largest force (N/m). `events` holds the states
+    before and after each. `known` is false if the path was not followed to its end.
+    """
+
+    first: PushState | None
+    last: PushState
+    peak: float
+    events: list[tuple[PushState, PushState]]
+    known: bool
+    topples: bool
+
+
+class SliderPath:
+    """A slider on its path, which only goes on."""
+
+    def __init__(self, rig: Rig, relief: float, friction: Friction, force: float) -> None:
+        start = press(rig.K, rig.T_p, friction, force)
+        self.contact = begin_push(rig.K, rig.T, start, relief)
+        self.friction, self.before = friction, np.abs(start.moved)
+        self.before[len(friction.peak) :] = 0.0
+
+    def move(self, target: float = np.inf) -> int:
+        """Go on to a load (N/m), an instability or an arrest. Return the `Status`."""
+        return follow(self.contact, target)
+
+    def state(self) -> PushState:
+        """Return a copy of the present state."""
+        contact, law = self.contact, self.friction
+        direction = np.maximum(contact.rate[: len(law.peak)], 0.0)
+        at_residual = bool(((contact.difference == 0.0) & (law.peak > law.residual)).any())
+        moved, forces = contact.moved - self.before, forces_of(contact, law)
+        load, force, _ = contact.loads.tolist()
+        return PushState(load, force, moved, forces, direction, at_residual)
+
+    def follow(self) -> Push:
+        """Follow the path until the slider slides."""
+        contact, events, first = self.contact, [], None
+        while (status := self.move()) == Status.UNSTABLE:
+            last = self.state()
+            first = first or last
+            if (status := self.move()) != Status.ARRESTED:
+                break
+            events.append((last, self.state()))
+        unstable = contact.counts[contact_path.N_STACKED] > 0  # otherwise it slides stably
+        last, known = last if unstable else self.state(), status == Status.SLIDING
+        rate, n = np.abs(contact.rate), len(self.friction.peak)
+        turns = bool(rate[n:].max() > MIN_TURNING * rate[:n].max())
+        peak = float(contact.loads[contact_path.PEAK])
+        return Push(first, last, peak, events, known, known and unstable and turns)
+
+
+def push_variables(interface: Interface) -> dict[str, Variable]:
+    """Return the variables of the events of a slider."""
+    variables = event_variables(interface).items()
+    return {name: known for name, known in variables if name not in WITH_FIXED_PRESSURE}
+
+
+class SliderSolver:
+    """Solver for samples of a slider by `Equilibrium` with given options. It is thread-safe."""
+
+    def __init__(self, problem: Problem, options: Any = None) -> None:
+        if reasons := refused(problem):
+            raise InputError(reasons)
+        rig, machine = problem.rig, problem.specimen.machine  # type: ignore[union-attr]
+        self.relief = rig.C / (1.0 + rig.C / machine) if machine > 0.0 else 0.0
+        self.problem, self.options, self.rig = problem, options, rig
+        self.length = problem.interface.measure
+
+    def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
+        """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
+        warn_if_coarse(self.problem, rows.steepest_weakening_rate, MIN_NODES, COARSE)
+        pushes = [self.path(rows, row).follow() for row in range(rows.samples)]
+        table = [self._values(rows, row, push) for row, push in enumerate(pushes)]
+        flags = [(not push.known, push.topples, push.first is None) for push in pushes]
+        for text, samples in zip(WARNINGS, np.transpose(flags), strict=True):
+            warn_of_samples(text, samples)
+        return {name: np.array([values[name] for values in table]) for name in table[0]}
+
+    def path(self, rows: Sample, row: int, node: int = 0, step: float = 0.0) -> SliderPath:
+        """Return a sample before the push, whose friction coefficient has a step at a node."""
+        pressure, spacing = rows.normal_pressure[row], self.problem.interface.spacing
+        peak, residual = rows.strength[row] / pressure, rows.residual_strength[row] / pressure
+        peak[node] += step
+        friction = Friction(peak, residual, rows.weakening_rate[row] * spacing)
+        force = float(pressure.mean()) * self.length
+        return SliderPath(self.rig, self.relief, friction, force)
+
+    def _values(self, rows: Sample, row: int, push: Push) -> dict[str, Any]:
+        interface, first, last = self.problem.interface, push.first, push.last
+        n = interface.size
+        direction = np.zeros(n) if first is None else first.direction
+        slip = np.zeros(n) if first is None else first.moved[:n]
+        patch = critical_patch(direction, interface)
+        values: dict[str, Any] = {
+            "critical_load": last.load / self.length,
+            "critical_stress": push.peak / self.length,
+            "first_instability": np.nan if first is None else first.force / self.length,
+            "certificate_gap": np.nan,
+            "critical_position": patch.centre[0],
+            "critical_patch_length": patch.area,
+            "sliding_position": critical_patch(last.direction, interface).centre[0],
+            "slip_patches": patches_of(slip, interface),
+            "arrested_events": len(push.events),
+            "residual_reached": last.residual,
+            "open_fraction": float(np.trapezoid(last.moved[n:] > 0.0) / n),
+        }
+        if self.options.slip:
+            values["slip"] = slip
+        if self.options.sensitivity:
+            # Between events paths are straight, so a small step gives the exact derivative.
+            values["sensitivity"] = np.full(n, np.nan)
+            for node in range(n if first else 0):
+                path = self.path(rows, row, node, STRENGTH_STEP)
+                path.move()
+                rise = (path.state().force - first.force) / self.length  # type: ignore[union-attr]
+                step = STRENGTH_STEP * rows.normal_pressure[row, node]
+                values["sensitivity"][node] = rise / step
+        if most := self.options.events:
+            values |= self.event_table(push, most)
+        return values
+
+    def values_at(self, state: PushState) -> dict[str, Any]:
+        """Return the mean stress (Pa), both travels (m), and profiles (m, Pa) at the nodes."""
+        n, spacing = self.problem.interface.size, self.problem.interface.spacing
+        stress, travel = state.force / self.length, state.force / self.rig.C
+        travel += float(self.rig.T @ state.moved)
+        return {
+            "mean_stress": stress,
+            "travel": travel,
+            "crosshead_travel": travel + elongation_of(self.problem, stress),
+            "slip": state.moved[:n],
+            "stress": state.forces[:n] / spacing,
+            "pressure": on_cells(-state.forces[n:]) / spacing,
+            "opening": 0.5 * (state.moved[n:-1] + state.moved[n + 1 :]),
+        }
+
+    def event_table(self, push: Push, most: int | None = None) -> dict[str, Array]:
+        """Return the variables of events as arrays, padded with NaN to `most` events."""
+        measured, interface = [], self.problem.interface
+        for before, after in push.events[:most]:
+            start, end = self.values_at(before), self.values_at(after)
+            drop, added = start["stress"] - end["stress"], end["slip"] - start["slip"]
+            measured.append(patch_measures(self.problem, before.direction, added, drop) | {
+                "event_load": before.load / self.length,
+                "event_stress": start["mean_stress"],
+                "event_stress_drop": start["mean_stress"] - end["mean_stress"],
+                "event_travel": start["travel"],
+                "event_crosshead_travel": start["crosshead_travel"],
+                "event_travel_step": end["travel"] - start["travel"],
+            })  # fmt: skip
+        return tabulate(measured, push_variables(interface), most)
+
+    def at_loads(self, rows: Sample, loads: Array) -> dict[str, Array]:
+        """Return values of `equilibrium_path` at rising loads, Pa."""
+        # The path to sliding gives all events, and a second path the states at the loads.
+        push, path = self.path(rows, 0).follow(), self.path(rows, 0)
+        end = push.last.load
+        if not push.known:
+            warn_accuracy(f"the path was not followed beyond {end / self.length:g} Pa")
+        sliding, state, states = loads * self.length > end, path.state(), []
+        for load in loads[~sliding]:
+            while (status := path.move(load * self.length)) <= Status.ARRESTED:
+                state = path.state()
+                if status == Status.AT_TARGET:
+                    break
+            states.append(self.values_at(state))  # if it slides at this load, just before
+        after = {name: np.nan * value for name, value in self.values_at(push.last).items()}
+        table = states + [after] * int(sliding.sum())
+        starts = [before.load / self.length for before, _ in push.events]
+        return {
+            **self.event_table(push),
+            **{name: np.array([values[name] for values in table]) for name in after},
+            "arrested_events": np.searchsorted(starts, loads),
+            "sliding": sliding,
+        }
