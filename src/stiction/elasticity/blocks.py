@@ -277,9 +277,8 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
         # Remove the resultant: the platens
         # are not loaded along the interface.
         traction = narrowed - narrowed.sum() / shifted.sum() * shifted
-        pressure = (
-            1.0 - top.step * top.normal((np.arange(nodes) + 0.5) * length / nodes) @ traction
-        )
+        x = (np.arange(nodes) + 0.5) * length / nodes
+        pressure = 1.0 - top.step * top.normal(x) @ traction
     scaled: Array = pressure / pressure.mean()
     return scaled
 

@@ -108,9 +108,8 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
     """
     column = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= MAX_DENSE_WIDTH:
-        values, vectors = scipy.linalg.eigh(
-            scipy.linalg.toeplitz(column), subset_by_index=[0, 0]
-        )
+        block = scipy.linalg.toeplitz(column)
+        values, vectors = scipy.linalg.eigh(block, subset_by_index=[0, 0])
         value, mode = float(values[0]), np.abs(vectors[:, 0])
         mode /= mode.sum()
     else:

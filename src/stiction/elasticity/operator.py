@@ -105,14 +105,8 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
     else:
         modes = spectrum.reshape(transform.half)
         c2c(modes, modes, transform.first_axes, False, 1.0, 1)
-        c2r(
-            modes,
-            field.reshape(transform.shape),
-            transform.last_axis,
-            False,
-            1.0 / field.size,
-            1,
-        )
+        rows = field.reshape(transform.shape)
+        c2r(modes, rows, transform.last_axis, False, 1.0 / field.size, 1)
 
 
 @jit_inside
@@ -134,6 +128,7 @@ class Operator(NamedTuple):
     inverse: Array  # (modes,): 1/(K(k) + W/2) with the mean W
     weakening_rate: Array  # (nodes,): W, Pa/m, zero at residual nodes
     spectrum: NDArray[np.complex128]  # (modes,): overwritten by each transform
+    residual: Array  # (nodes,): overwritten by `held_equilibrium.equilibrate`
     z: Array  # (nodes,): overwritten by conjugate gradients, like the next two
     direction: Array  # last direction; of negative curvature, if the solver returns it
     image: Array  # A times the direction
@@ -149,10 +144,10 @@ def make_operator(symbol: Array, W: Array | float, shape: tuple[int, ...]) -> Op
     # The preconditioner stays positive even where K - W is not.
     flat = symbol.flatten()
     spectrum, no_field = np.empty(flat.size, dtype=np.complex128), np.empty(0)
-    z, direction, image = np.empty((3, W.size))
+    workspaces = np.empty((4, W.size))
     return Operator(
-        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), W, spectrum, z,
-        direction, image, soft_mode=no_field, spring=0.0, phi=no_field,
+        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), W, spectrum,
+        *workspaces, soft_mode=no_field, spring=0.0, phi=no_field,
     )  # fmt: skip
 
 
@@ -177,10 +172,7 @@ def dot(first: Array, second: Array, count: int) -> float:
 
     A sum by numpy depends on its number of threads.
     """
-    a = zeros()
-    b = zeros()
-    c = zeros()
-    d = zeros()
+    a = b = c = d = zeros()
     t = 0
     while t + 4 * LANES <= count:
         a = multiply_add(load(first, t), load(second, t), a)
@@ -319,8 +311,8 @@ def _combine(basis: Array, weights: Array, count: int, out: Array) -> None:
 @jit_allocating
 def lowest_eigenvector(
     operator: Operator, inside: Mask, vector: Array, tolerance: float, iterations: int
-) -> tuple[float, int]:
-    """Solve (2): return the smallest eigenvalue of A on the nodes `inside` (Pa/m) and iterations.
+) -> float:
+    """Solve (2): return the smallest eigenvalue of A on the nodes `inside`, Pa/m.
 
     On entry the vector is a guess. On return it is the eigenvector,
     with unit norm and positive sum, and is zero outside the set. The
@@ -328,8 +320,7 @@ def lowest_eigenvector(
     """
     nodes = vector.size
     basis = np.empty((3, nodes))  # x, the preconditioned residual, the last direction
-    images = np.empty((3, nodes))  # A times these
-    work = np.empty(nodes)
+    images, work = np.empty((3, nodes)), np.empty(nodes)  # A times these
     # The norm of a small guess may underflow. Scaling by a power of two
     # does not change its digits.
     exponent = math.frexp(largest_inside(vector, inside))[1]
@@ -340,14 +331,12 @@ def lowest_eigenvector(
     restrict(images[0], inside)
     value = inner(basis[0], images[0])
     count = 2
-    taken = 0
-    while taken < iterations:
+    for _ in range(iterations):
         # 1.
         set_scaled(work, 1.0, images[0])
         add_scaled(work, -value, basis[0])
         if np.sqrt(inner(work, work)) <= tolerance:
             break
-        taken += 1
         # 2.
         filtered(operator, operator.inverse, work, basis[1])
         restrict(basis[1], inside)
@@ -386,4 +375,4 @@ def lowest_eigenvector(
     for i in range(nodes):
         total += basis[0, i]
     set_scaled(vector, -1.0 if total < 0.0 else 1.0, basis[0])
-    return value, taken
+    return value

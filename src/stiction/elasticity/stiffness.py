@@ -100,16 +100,10 @@ def add_four(
 
 @jit
 def apply_circular(
-    entries: CircularEntries,
-    nodes: Array,
-    count: int,
-    values: Array,
-    halves: Array,
-    product: Array,
+    K: CircularEntries, nodes: Array, count: int, values: Array, halves: Array, product: Array
 ) -> None:
     """Multiply by K of a line, as `apply` does."""
-    strip = entries.strip
-    half = halves.shape[1]
+    strip, half = K.strip, halves.shape[1]
     for parity in range(2):
         # 1.
         target = halves[1 - parity]
@@ -140,7 +134,7 @@ def apply_circular(
         product[2 * q] = halves[0, q]
         product[2 * q + 1] = halves[1, q]
     for t in range(count):
-        product[nodes[t]] += entries.column[0] * values[t]
+        product[nodes[t]] += K.column[0] * values[t]
 
 
 @jit
@@ -163,23 +157,18 @@ def _apply_rows(
 
 @jit
 def _apply_rows_outside(
-    entries: DenseEntries,
-    nodes: Array,
-    count: int,
-    values: Array,
-    is_slipping: Array,
-    product: Array,
+    K: DenseEntries, nodes: Array, count: int, values: Array, is_slipping: Array, product: Array
 ) -> None:
     """Write K times a field at the nodes that do not slip, run by run."""
     # Runs of nodes at rest alternate with runs of slipping nodes, which
     # are skipped.
     end = ZERO
-    while end < entries.n_nodes:
+    while end < K.n_nodes:
         start = end
-        while end < entries.n_nodes and is_slipping[end] == is_slipping[start]:
+        while end < K.n_nodes and is_slipping[end] == is_slipping[start]:
             end += 1
         if not is_slipping[start]:
-            _apply_rows(entries, nodes, count, values, start, product[start:end])
+            _apply_rows(K, nodes, count, values, start, product[start:end])
 
 
 def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> Any:

@@ -58,8 +58,7 @@ def _count_fast(W: Array, threshold: float, length: Array) -> None:
     """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
     # Twice around the circle from the end, so that runs across the
     # first node are complete.
-    n = W.shape[0]
-    run = 0.0
+    n, run = W.shape[0], 0.0
     for q in range(2 * n - 1, -1, -1):
         i = q if q < n else q - n
         run = run + 1.0 if W[i] >= threshold else 0.0

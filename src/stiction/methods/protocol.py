@@ -210,9 +210,8 @@ def seconds_per_sample(problem: Problem, method: Method) -> float:
 
 def batch_size(problem: Problem, method: Method) -> int:
     """Return the number of samples in a batch: half a second of work, but at most 512 samples."""
-    return max(
-        1, min(MAX_BATCH_SAMPLES, int(BATCH_SECONDS / seconds_per_sample(problem, method)))
-    )
+    count = int(BATCH_SECONDS / seconds_per_sample(problem, method))
+    return max(1, min(MAX_BATCH_SAMPLES, count))
 
 
 def variables_of(

@@ -260,7 +260,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
     # The weakest window of each sample: its load, its first node, and
     # its number of nodes.
     load, start, width, relief = np.zeros((4, sample.samples))
-    allowed, blocks = np.empty(problem.interface.size), problem.blocks
+    work, blocks = np.empty(problem.interface.size), problem.blocks
     for weakening_rate, rows in _weakening_rates(sample):
         # 1.
         windows = blocks.windows(weakening_rate, weakening_rate)
@@ -272,9 +272,7 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
         for i in rows:
             # 2.
             W, profile = sample.weakening_rate[i], sample.load_profile
-            load[i], c, start[i] = weakest_window(
-                excess[i], profile, W, windows, np.inf, allowed
-            )
+            load[i], c, start[i] = weakest_window(excess[i], profile, W, windows, np.inf, work)
             if not np.isfinite(load[i]):
                 raise InputError(
                     "interface.extent: no part of it becomes unstable by itself, so the local"

@@ -131,9 +131,9 @@ def slides(
         intact = np.flatnonzero(slip < critical)
         # A run of residual nodes lies between two neighbours among the
         # intact nodes.
-        run = (
-            np.diff(intact, append=intact[:1] + nodes).max(initial=0) if intact.size else nodes
-        )
+        run = nodes
+        if intact.size:
+            run = np.diff(intact, append=intact[:1] + nodes).max(initial=0)
         if run > crack or load.mean() >= strength.mean():
             return True
         # 3.

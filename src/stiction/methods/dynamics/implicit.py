@@ -157,9 +157,7 @@ def _assemble(
 
 
 @jit_inside
-def _effect(
-    state: RuptureState, setting: Setting, u: Array, impedance: float, attempt: _Attempt
-) -> Any:
+def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) -> Any:
     """Step 4: return (largest weakening of a node, total slip, Z <V>) due to slip increments u.
 
     Weakening is a fraction of tau_p - tau_r. Creep at the residual
@@ -167,14 +165,13 @@ def _effect(
     """
     nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
-    scale = state.diagnostics[0].run.scale
+    scale, impedance = state.diagnostics[0].run.scale, setting.grid.impedance
     largest, total, radiated = 0.0, 0.0, 0.0
     smallest_drop, fast_slip = _SMALL_DROP * scale, STEADY_STRESS * scale * size / impedance
     for i in range(u.size):
         if slip[i] < residual_slip[i] and u[i] > 0.0:
-            lost = node_strength(setting, i, slip[i]) - node_strength(
-                setting, i, slip[i] + u[i]
-            )
+            lost = node_strength(setting, i, slip[i])
+            lost -= node_strength(setting, i, slip[i] + u[i])
             largest = max(largest, lost / max(nodes.peak[i] - nodes.residual[i], smallest_drop))
         elif u[i] > fast_slip and residual_slip[i] > 0.0:
             largest = max(largest, u[i] / residual_slip[i])
@@ -285,9 +282,7 @@ def implicit_steps(
         # 4. Keep the step, or try half its size.
         largest, total, radiated = 0.0, 0.0, 0.0
         if solved:
-            largest, total, radiated = _effect(
-                state, setting, u, setting.grid.impedance, attempt
-            )
+            largest, total, radiated = _effect(state, setting, u, attempt)
         if not np.isfinite(total):
             reason = Reason.NOT_FINITE
             break

@@ -55,11 +55,7 @@ _STOPPED_SHARE = 0.1  # slip rate, over `unstable_slip_rate`, above which an int
 _REACHED_SHARE = 1e-12  # of the strength: excess of a node that has just reached it
 _STEPS_BETWEEN_CHECKS = 1000  # steps after which a run checks whether it has ended
 
-_ENDINGS: dict[int, str] = {
-    Reason.ALL_SLID: "sliding",
-    Reason.DROPPED: "onset",
-    Reason.AT_REST: "rest",
-}
+_ENDINGS = {Reason.ALL_SLID: "sliding", Reason.DROPPED: "onset", Reason.AT_REST: "rest"}
 NO_RECORD = StepRecord(np.empty(0, STEP), np.empty((0, 0), STATION))
 
 
@@ -96,9 +92,8 @@ class Run:
     def strength_after(self, slip: Floats) -> Floats:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
-        strength: Floats = strengths(
-            law, nodes.peak, nodes.residual, nodes.weakening_rate, slip
-        )
+        peak, residual, W = nodes.peak, nodes.residual, nodes.weakening_rate
+        strength: Floats = strengths(law, peak, residual, W, slip)
         return strength
 
     def scale_at(self, load: float) -> float:
@@ -226,9 +221,8 @@ class Run:
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
-            _, reason = self.take_steps(
-                state, min(_STEPS_BETWEEN_CHECKS, max_steps - state.steps)
-            )
+            count = min(_STEPS_BETWEEN_CHECKS, max_steps - state.steps)
+            _, reason = self.take_steps(state, count)
             ending = self.ending(state, reason)
         return ending, reason
 

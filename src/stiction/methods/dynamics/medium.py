@@ -144,9 +144,8 @@ def largest_step(
         kx, ky = a * np.pi / spacings[0], b * np.pi / spacings[1]
         share = float(kx**2 / (kx**2 + ky**2))
         stiffness = share * static + 1.0 - share
-        limits.append(
-            _largest_kappa(_mixed(kernels, share), stiffness) / float(np.hypot(kx, ky))
-        )
+        kappa = _largest_kappa(_mixed(kernels, share), stiffness)
+        limits.append(kappa / float(np.hypot(kx, ky)))
     return min(limits)
 
 
@@ -193,6 +192,5 @@ def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
     """Return the kernel for a wave vector on a plane, with the fraction (kx/k)² of mode II."""
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
-    return ExponentialSum(
-        poles, np.concatenate(weights), max(kernel.error for kernel in kernels)
-    )
+    error = max(kernel.error for kernel in kernels)
+    return ExponentialSum(poles, np.concatenate(weights), error)

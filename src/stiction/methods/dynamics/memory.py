@@ -224,11 +224,8 @@ def advance_memory(
         e = table[table_block * size :][:size]
         for copy in range(multiplicity):
             block = table_block * multiplicity + copy
-            y = memory[block * size :][:size]
-            v, c = (
-                V_hat[block * TWO_ROWS :][:TWO_ROWS],
-                memory_sum[block * TWO_ROWS :][:TWO_ROWS],
-            )
+            y, first = memory[block * size :][:size], block * TWO_ROWS
+            v, c = V_hat[first:][:TWO_ROWS], memory_sum[first:][:TWO_ROWS]
             for j in range(TWO_ROWS):
                 c[j] = 0.0
             for p in range(pairs):
@@ -244,15 +241,13 @@ def advance_memory(
                     yr, yi = y[o + j], y[o + ENTRIES + j]
                     ar = er * yr - ei * yi + v[j]
                     ai = er * yi + ei * yr
-                    y[o + j] = ar
-                    y[o + ENTRIES + j] = ai
+                    y[o + j], y[o + ENTRIES + j] = ar, ai
                     c[j] += cr * ar - ci * ai
                     # Its imaginary part.
                     yr, yi = y[o + TWO_ROWS + j], y[o + THREE_ROWS + j]
                     ar = er * yr - ei * yi + v[ENTRIES + j]
                     ai = er * yi + ei * yr
-                    y[o + TWO_ROWS + j] = ar
-                    y[o + THREE_ROWS + j] = ai
+                    y[o + TWO_ROWS + j], y[o + THREE_ROWS + j] = ar, ai
                     c[ENTRIES + j] += cr * ar - ci * ai
 
 
@@ -418,10 +413,8 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
     pack(grid.offset, tables.slip_rate_hat, tables.packed)
     pack(grid.offset, tables.slope_hat, tables.second_packed)
     for block in range(memory.size // (FOUR_ROWS * pairs)):
-        v, a = (
-            tables.packed[block * TWO_ROWS :][:TWO_ROWS],
-            tables.second_packed[block * TWO_ROWS :][:TWO_ROWS],
-        )
+        first = block * TWO_ROWS
+        v, a = tables.packed[first:][:TWO_ROWS], tables.second_packed[first:][:TWO_ROWS]
         for p in range(pairs):
             y = memory[(block * pairs + p) * FOUR_ROWS :][:FOUR_ROWS]
             entry = block // multiplicity * pairs + p
@@ -436,20 +429,17 @@ def advance_with_ramp(grid: Grid, memory: Array, tables: ImplicitTables) -> None
                 y[ENTRIES + j] = er * yi + ei * yr + bi * v[j] + ri * a[j]
                 yr, yi = y[TWO_ROWS + j], y[THREE_ROWS + j]
                 y[TWO_ROWS + j] = er * yr - ei * yi + br * v[ENTRIES + j] + rr * a[ENTRIES + j]
-                y[THREE_ROWS + j] = (
-                    er * yi + ei * yr + bi * v[ENTRIES + j] + ri * a[ENTRIES + j]
-                )
+                yi = er * yi + ei * yr
+                y[THREE_ROWS + j] = yi + bi * v[ENTRIES + j] + ri * a[ENTRIES + j]
 
 
-def grown_memory(
-    grid: Grid, memory: Floats, slip_rate_hat: Spectrum, growth: float
-) -> Spectrum:
+def grown_memory(grid: Grid, memory: Floats, V_hat: Spectrum, growth: float) -> Spectrum:
     """Set psi = V/(growth - s |k| c_s) for a slip rate that has always grown as exp(growth t).
 
     Returns Re sum w psi for all modes.
     """
-    total = np.zeros(slip_rate_hat.size, dtype=np.complex128)
-    slip_rate, entry, pairs = slip_rate_hat[1:], grid.entry[1:], grid.poles.size
+    total = np.zeros(V_hat.size, dtype=np.complex128)
+    slip_rate, entry, pairs = V_hat[1:], grid.entry[1:], grid.poles.size
     # Place of each mode in the memory of the
     # first pair: its block, and its column.
     first = grid.offset[1:] // TWO_ROWS * pairs * FOUR_ROWS + grid.offset[1:] % ENTRIES

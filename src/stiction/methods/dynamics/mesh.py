@@ -245,9 +245,8 @@ def _limit(
     # Bound of the squared frequency of an element, then of the
     # correction on the interface.
     squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
-    stiffest = float(
-        scipy.linalg.eigvalsh(correction, subset_by_index=[len(correction) - 1] * 2)[0]
-    )
+    last = [len(correction) - 1] * 2
+    stiffest = float(scipy.linalg.eigvalsh(correction, subset_by_index=last)[0])
     squares += 2.0 * max(stiffest, 0.0) * mesh.spacing / mesh.mass[0]
     frequency = np.sqrt(squares)
     # Stability limit of the leapfrog with stiffness-proportional damping.
@@ -330,9 +329,8 @@ def _condensed(mesh: Mesh, folds: list[Array]) -> tuple[Array, Array, float]:
         compliance += moved
         kept = sp.eye(unknowns).tocsr()
     if not mesh.anti_plane:  # v of the interface
-        change, added, moved = eliminated(
-            above[size:, size:], above[size:, :size], force[size:]
-        )
+        v = slice(size, None)
+        change, added, moved = eliminated(above[v, v], above[v, :size], force[v])
         above, force = above[:size, :size] + change, force[:size] + added
         compliance += moved
     return above, force, compliance

@@ -30,6 +30,7 @@ from stiction.methods.dynamics.medium import Medium, prepare_medium
 from stiction.methods.dynamics.slow_start import first_instability, slow_start, static_search
 from stiction.methods.dynamics.state import (
     UNSTABLE_STRESS,
+    Ints,
     Nodes,
     PiecewiseLinear,
     RuptureState,
@@ -45,6 +46,7 @@ from stiction.problem.sample import Sample
 ShareUpToOne = Annotated[Real, Field(gt=0, le=1)]
 
 SLIP_STEP = 0.02  # largest slip of a weakening node in an implicit step, in units of its d_c
+NO_STATIONS = np.empty(0, dtype=np.int64)
 LOAD_STEP = 1e-3  # largest rise of the load in an implicit step, in units of the stress scale
 _EXPLICIT_STEPS_IN_IMPLICIT = 6.0  # size of the smallest implicit step
 _MIN_CALM_STEPS = 300
@@ -186,9 +188,7 @@ class Rupture(Listed):
             return specimens.refusals(self, problem)
         reasons = []
         if self.loading_rate is None and self.load_history is None:
-            reasons.append(
-                "loading_rate: give either loading_rate or load_history. Got neither"
-            )
+            reasons = ["loading_rate: give either loading_rate or load_history. Got neither"]
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
@@ -286,30 +286,24 @@ class Rupture(Listed):
 
 
 def make_run(
-    method: Rupture,
-    medium: Medium,
-    rows: Sample,
-    sample: int,
-    stations: NDArray[np.int64] | None = None,
+    method: Rupture, medium: Medium, rows: Sample, row: int, stations: Ints = NO_STATIONS
 ) -> Run:
     """Return the run for a sample. It records every step at the nodes `stations`."""
-    strength, residual = rows.strength[sample], rows.residual_strength[sample]
-    weakening, initial = rows.weakening_rate[sample], rows.initial_stress[sample]
+    strength, residual = rows.strength[row], rows.residual_strength[row]
+    W, initial = rows.weakening_rate[row], rows.initial_stress[row]
     # Unbreakable nodes have an infinite strength, and an infinite
     # residual slip.
     friction, finite = medium.problem.friction, np.isfinite(strength).ravel()
     with np.errstate(over="ignore"):
-        residual_slip = friction.reach * friction.critical_slip_of(
-            strength - residual, weakening
-        )
+        residual_slip = friction.reach * friction.critical_slip_of(strength - residual, W)
     if not np.all(np.isfinite(residual_slip.ravel()[finite])):
         raise InputError(
-            f"friction: a weakening rate of {weakening.min():.3g} Pa/m gives an infinite critical"
+            f"friction: a weakening rate of {W.min():.3g} Pa/m gives an infinite critical"
             " slip. Check the unit of the rate"
         )
-    profiles = (strength, residual, weakening, residual_slip, rows.load_profile, initial)
+    profiles = (strength, residual, W, residual_slip, rows.load_profile, initial)
     nodes = Nodes(*(np.array(values, dtype=np.float64).ravel() for values in profiles))
-    steepest = rows.part(slice(sample, sample + 1)).steepest_weakening_rate
+    steepest = rows.part(slice(row, row + 1)).steepest_weakening_rate
     load = method.load_history
     if load is None:
         load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, method.loading_rate]))
@@ -326,7 +320,7 @@ def make_run(
         turning_times=load.at[1:-1][rising[1:] != rising[:-1]],
         scale=stress_scale(nodes),
         thresholds=_thresholds(method, medium, nodes, load),
-        stations=np.empty(0, dtype=np.int64) if stations is None else stations,
+        stations=stations,
     )
     least_load = _least_load(medium, nodes, steepest)
     return Run(medium, setting, method.stop, steepest, least_load)

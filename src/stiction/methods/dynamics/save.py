@@ -121,9 +121,7 @@ TIME = Variable("s", "time from zero load", ("time",))
 _OF_STEP = ("time", "load", "mean_stress", "work")
 
 
-Place = Annotated[
-    tuple[Real, ...], BeforeValidator(lambda place: np.atleast_1d(place).tolist())
-]
+Place = Annotated[tuple[Real, ...], BeforeValidator(lambda x: np.atleast_1d(x).tolist())]
 
 Stations: TypeAlias = Converted[dict[Text, Place], Mapping[str, AnyNumbers]]
 Folder: TypeAlias = Converted[HeldPath | None, FilePath | None]
@@ -226,9 +224,8 @@ class Recorder:
         """Take up to `count` steps and record them. Return (steps taken, reason)."""
         record = StepRecord(*(rows[:count] for rows in self._record))
         taken, reason = self.run.take_steps(state, count, record)
-        self._steps.append(
-            {name: column[:taken].copy() for name, column in self._columns.items()}
-        )
+        columns = self._columns.items()
+        self._steps.append({name: column[:taken].copy() for name, column in columns})
         return taken, reason
 
     def add(self, state: RuptureState) -> None:

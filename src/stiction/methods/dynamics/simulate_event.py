@@ -98,7 +98,8 @@ def simulate_event(
         trial.run(method.max_steps)
         # A sliding event goes on until the last waves have crossed the block.
         steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
-        record = EventRecord(problem, rows, search.event(sample, before), save, trial)  # 3.
+        event, last = search.event(sample, before), trial.waves.slip.mean()
+        record = EventRecord(problem, rows, event, save, last)  # 3.
         record.add()
         for _ in range(0, steps, save.every):
             record.take_steps(save.every)
@@ -109,20 +110,15 @@ def simulate_event(
 class EventRecord:
     """Frames of an event up to now, with pictures of the block.
 
-    A trial of the event shows the amount of slip, so that the pictures
-    are spread evenly over the slip.
+    A trial of the event shows the mean slip at its end, `last` (m), so
+    that the pictures are spread evenly over the slip.
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        rows: Sample,
-        event: DynamicEvent,
-        save: Save,
-        trial: DynamicEvent,
+        self, problem: Problem, rows: Sample, event: DynamicEvent, save: Save, last: float
     ) -> None:
         self.problem, self.rows, self.event, self.save = problem, rows, event, save
-        first, last = event.waves.slip.mean(), trial.waves.slip.mean()
+        first = event.waves.slip.mean()
         self._due = [first + share * (last - first) for share in PICTURE_SHARES]
         self.frames: list[dict[str, Any]] = []
         self.pictures: list[Any] = []

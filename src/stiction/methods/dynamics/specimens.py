@@ -123,11 +123,9 @@ class DynamicEvent:
 
         Return whether a node has not slipped yet.
         """
-        taken = wave_steps(
-            self.sample, self.start, self.front, self.mesh, self.waves, count, ends
-        )
-        self.steps += taken
-        self.slides = bool((self.waves.slip > 0.0).all())
+        sample, waves = self.sample, self.waves
+        self.steps += wave_steps(sample, self.start, self.front, self.mesh, waves, count, ends)
+        self.slides = bool((waves.slip > 0.0).all())
         return not self.slides
 
     def run(self, max_steps: int) -> None:

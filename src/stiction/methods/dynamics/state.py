@@ -263,19 +263,15 @@ class Setting(NamedTuple):
 @jit_inside
 def node_strength(setting: Setting, i: int, slip: float) -> Any:
     """Return the strength of node i after some slip (m), Pa."""
-    nodes = setting.nodes
-    return strength_at(
-        setting.law, nodes.peak[i], nodes.residual[i], nodes.weakening_rate[i], slip
-    )
+    nodes, W = setting.nodes, setting.nodes.weakening_rate[i]
+    return strength_at(setting.law, nodes.peak[i], nodes.residual[i], W, slip)
 
 
 @jit_inside
 def node_line(setting: Setting, i: int, slip: float, ahead: float) -> Any:
     """Return the straight line of strength of node i, as `friction.kernels.line_at` does."""
-    nodes = setting.nodes
-    return line_at(
-        setting.law, nodes.peak[i], nodes.residual[i], nodes.weakening_rate[i], slip, ahead
-    )
+    nodes, W = setting.nodes, setting.nodes.weakening_rate[i]
+    return line_at(setting.law, nodes.peak[i], nodes.residual[i], W, slip, ahead)
 
 
 class RuptureState(NamedTuple):

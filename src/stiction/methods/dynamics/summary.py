@@ -142,9 +142,8 @@ def arrested_events(run: Run) -> list[ArrestedEvent]:
     for record in run.events:
         # The state before the event, and the state after it.
         states, radiated = [], []
-        for slip, load, work in zip(
-            record["slip"], record["load"], record["work"], strict=True
-        ):
+        ends = zip(record["slip"], record["load"], record["work"], strict=True)
+        for slip, load, work in ends:
             slip_hat = interface.transform(slip.reshape(interface.shape)).ravel()
             radiated.append(_energies(run, slip, slip_hat, work)["radiated_energy"])
             states.append(EquilibriumState(float(load), slip, np.empty(0)))

@@ -93,31 +93,25 @@ TOTALS = record(
 def block_at_rest(mesh: Mesh, slip: Array) -> Waves:
     """Return a block at rest whose interface has a given slip (m)."""
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
-    slip_rate, stress, corrected = np.zeros((3, slip.size))
-    arrival = np.full(slip.size, np.nan)
-    totals = np.zeros(1, TOTALS)
-    return Waves(
-        u, v, u_rate, v_rate, slip.copy(), slip_rate, stress, corrected, arrival, totals
-    )
+    fields, arrival = np.zeros((3, slip.size)), np.full(slip.size, np.nan)
+    return Waves(u, v, u_rate, v_rate, slip.copy(), *fields, arrival, np.zeros(1, TOTALS))
 
 
 @jit_inside
-def _force(
-    stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, force: Any
-) -> None:
+def _force(stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, F: Any) -> None:
     """Step 1: write the force on a row along an axis.
 
     x0, x1 and x2 are the displacements along the axis in the row below,
     the row, and the row above. y0, y1 and y2 are the other components.
     """
-    n = force.shape[0]
+    n = F.shape[0]
     # Coefficients in registers: of both neighbours, of the node, and of
     # the other component.
     a, b, c = stencil[0, 0], stencil[0, 1], stencil[0, 2]
     d, e, f = stencil[1, 0], stencil[1, 1], stencil[1, 2]
     g, h, k = stencil[2, 0], stencil[2, 1], stencil[2, 2]
     for i in range(n - 2):  # a single loop without branches, so that it is vectorised
-        force[i + 1] = (
+        F[i + 1] = (
             (a * (x0[i] + x0[i + 2]) + b * (x1[i] + x1[i + 2]) + c * (x2[i] + x2[i + 2]))
             + (d * x0[i + 1] + e * x1[i + 1] + f * x2[i + 1])
             + (g * (y0[i + 2] - y0[i]) + h * (y1[i + 2] - y1[i]) + k * (y2[i + 2] - y2[i]))
@@ -128,7 +122,7 @@ def _force(
         from_x += stencil[3, 0] * x0[i] + stencil[3, 1] * x1[i] + stencil[3, 2] * x2[i]
         from_y = g * y0[inner] + h * y1[inner] + k * y2[inner]
         from_y += stencil[4, 0] * y0[i] + stencil[4, 1] * y1[i] + stencil[4, 2] * y2[i]
-        force[i] = from_x + sign * from_y
+        F[i] = from_x + sign * from_y
 
 
 @jit_inside

@@ -144,14 +144,12 @@ def event_table(
     """
     # Methods that lack a variable do not ask for it, so `_measures` may
     # return more.
-    measured = [_measures(problem, rows, row, *event) for event in events[:most]]
+    measured = [_measures(problem, rows, row, event) for event in events[:most]]
     return tabulate(measured, variables, most)
 
 
 def tabulate(
-    measured: Sequence[Mapping[str, Any]],
-    variables: Mapping[str, Variable],
-    most: int | None = None,
+    measured: Sequence[Any], variables: Mapping[str, Variable], most: int | None = None
 ) -> dict[str, Array]:
     """Return the variables of measured events as arrays, padded with NaN to `most` events.
 
@@ -164,9 +162,8 @@ def tabulate(
         # After 'event', the only other dimension is 'direction'.
         components = (2,) * (len(variable.dims) - 1)
         table[name] = np.full((size, *components), np.nan)
-        table[name][:count] = np.reshape(
-            [values[name] for values in measured], (count, *components)
-        )
+        known = [values[name] for values in measured]
+        table[name][:count] = np.reshape(known, (count, *components))
     return table
 
 
@@ -180,6 +177,7 @@ def patch_measures(
     # 1. and 2. Patch and moment.
     # The centre and the extents follow the growth alone.
     interface, moment = problem.interface, moment_of(problem, added)
+    periods = (np.inf,) if interface.is_free else interface.lengths  # after which places repeat
     inside, patch = largest_patch(np.maximum(added, 0.0), interface, MIN_ADDED_SLIP)
     return {
         "event_position": patch.centre,
@@ -188,7 +186,7 @@ def patch_measures(
         else (np.nan,) * len(interface.shape),
         "event_length": patch.area,
         "event_start": patch.starts,
-        "event_end": np.mod(np.add(patch.starts, patch.extents), _periods(interface)),
+        "event_end": np.mod(np.add(patch.starts, patch.extents), periods),
         "event_extent": patch.extents,
         "event_area": patch.area,
         "event_mean_slip": added[inside].mean(),
@@ -201,16 +199,9 @@ def patch_measures(
     }
 
 
-def _measures(
-    problem: Problem,
-    rows: Sample,
-    row: int,
-    before: EquilibriumState,
-    after: EquilibriumState,
-    known: Mapping[str, Any],
-) -> dict[str, Any]:
+def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) -> dict[str, Any]:
     """Return the variables of one event."""
-    interface, law = problem.interface, problem.friction
+    (before, after, known), interface, law = event, problem.interface, problem.friction
     initial, profile = (
         float(rows.mean(values)) for values in (rows.initial_stress[row], rows.load_profile)
     )
@@ -261,11 +252,6 @@ def place_of(interface: Interface, node: int) -> list[float]:
     """Return the position of a node of the flattened interface along each direction, m."""
     entry = np.unravel_index(node, interface.shape)
     return [float(at[i]) for at, i in zip(interface.coordinates.values(), entry, strict=True)]
-
-
-def _periods(interface: Interface) -> tuple[float, ...]:
-    """Return the length in each direction after which places repeat, m, or infinity."""
-    return (np.inf,) if interface.is_free else interface.lengths
 
 
 def moment_of(problem: Problem, slip: Array) -> float:

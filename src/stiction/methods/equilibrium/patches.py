@@ -61,15 +61,13 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     entry of the field is negative. If all entries
     are positive, the run is centred at the peak.
     """
-    n = field.shape[0]
-    peak = 0
+    n, peak = field.shape[0], 0
     for i in range(n):
         if field[i] > field[peak]:
             peak = i
     # Go left from the peak to the first node of the run, and then right
     # to the last.
-    start = peak
-    length = 1
+    start, length = peak, 1
     while length < n and field[start - 1 if start else n - 1] > 0.0:
         start = start - 1 if start else n - 1
         length += 1
@@ -84,8 +82,7 @@ def main_patch(field: Array) -> tuple[int, int, float]:
         start = (peak + n // 2 + 1) % n
     # The centroid is taken along the run, so that it is defined across
     # the ends of the circle.
-    weight = 0.0
-    moment = 0.0
+    weight = moment = 0.0
     for q in range(length):
         value = field[(start + q) % n]
         weight += value

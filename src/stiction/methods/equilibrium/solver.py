@@ -59,7 +59,7 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
-MIN_NODES_IN_NUCLEATION_LENGTH = 8.0
+MIN_NODES = 8.0
 """Fewest nodes in a nucleation length without a warning, which gives the expected error."""
 ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
     1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
@@ -202,12 +202,8 @@ class OnsetSolver:
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
         """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
         warn_of_signs(self.problem)
-        warn_if_coarse(
-            self.problem,
-            rows.steepest_weakening_rate,
-            MIN_NODES_IN_NUCLEATION_LENGTH,
-            ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)],
-        )
+        errors = ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)]
+        warn_if_coarse(self.problem, rows.steepest_weakening_rate, MIN_NODES, errors)
         # One after the other, so that the result of a sample depends on
         # this sample alone.
         samples, table, flags = sample_of(rows, self.search.pieces), [], []
@@ -228,7 +224,7 @@ class OnsetSolver:
         values["critical_stress"] = rows.mean_stress(values["critical_stress"])
         values["first_instability"] = rows.mean_stress(values["first_instability"])
         values["certificate_gap"] *= rows.mean(rows.load_profile)
-        self._warn(rows, values, *np.array(flags).T)
+        self._warn(rows, values, np.array(flags))
         return values
 
     def _values(
@@ -293,15 +289,9 @@ class OnsetSolver:
         states = [event.before for event in path.events] + [path.last]
         return max(state.load - self.problem.relief(state.slip) for state in states)
 
-    def _warn(
-        self,
-        rows: Sample,
-        values: dict[str, Array],
-        known: Mask,
-        certified: Mask,
-        stopped: Mask,
-    ) -> None:
+    def _warn(self, rows: Sample, values: dict[str, Array], flags: Mask) -> None:
         """Warn about exceptional samples. `values` holds all samples, with stresses in Pa."""
+        known, certified, stopped = flags.T
         first, unproved = values["first_instability"], ~certified
         # Gaps are compared with the load. A stress of zero must not
         # divide them.

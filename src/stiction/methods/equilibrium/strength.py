@@ -132,12 +132,10 @@ def all_breakable_slip(sample: StaticSample, slip: Array) -> bool:
 
 
 @jit_inside
-def piece_at(pieces: Pieces, critical: float, slip: float) -> int:
-    """Return the piece on which a node with a given d_c is after some slip."""
-    piece = 0
-    while piece < pieces.ends.shape[0] and slip >= pieces.at_corner * (
-        pieces.ends[piece] * critical
-    ):
+def piece_at(sample: StaticSample, slip: Array, i: int) -> int:
+    """Return the piece on which node i is after some slip."""
+    piece, ends, at_corner = 0, sample.pieces.ends, sample.pieces.at_corner
+    while piece < ends.shape[0] and slip[i] >= at_corner * (ends[piece] * sample.critical[i]):
         piece += 1
     return piece
 
@@ -155,7 +153,7 @@ def start_of(sample: StaticSample, i: int, piece: int) -> float:
 @jit_inside
 def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
     """Return the strength of node i minus initial stress after some slip, Pa."""
-    piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+    piece = piece_at(sample, slip, i)
     W = sample.pieces.slopes[piece] * sample.weakening_rate[i]
     return start_of(sample, i, piece) - W * slip[i]
 
@@ -163,7 +161,7 @@ def strength_at(sample: StaticSample, slip: Array, i: int) -> float:
 @jit
 def _find_pieces(sample: StaticSample, slip: Array, present: Present) -> None:
     for i in range(slip.size):
-        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        piece = piece_at(sample, slip, i)
         present.piece[i] = piece
         present.strength[i] = start_of(sample, i, piece)
         present.weakening_rate[i] = sample.pieces.slopes[piece] * sample.weakening_rate[i]
@@ -177,19 +175,16 @@ def present_pieces(sample: StaticSample, slip: Array) -> Present:
 
 
 @jit
-def step_to_corner(
-    sample: StaticSample, slip: Array, direction: Array, longest: float
-) -> float:
+def step_to_corner(sample: StaticSample, slip: Array, direction: Array, limit: float) -> float:
     """Move slip along a direction until the first node reaches a corner, and return the step.
 
-    The step is at most `longest`. If the
+    The step is at most `limit`. If the
     step is infinite, slip does not change.
     """
-    step = longest
-    ends = sample.pieces.ends
+    step, ends = limit, sample.pieces.ends
     for i in range(slip.shape[0]):
         if direction[i] > 0.0:
-            piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+            piece = piece_at(sample, slip, i)
             if piece < ends.shape[0]:
                 step = min(step, (ends[piece] * sample.critical[i] - slip[i]) / direction[i])
     if step == np.inf:

@@ -162,30 +162,6 @@ def _forward_substitute_four(factor: Array, n_rows: int) -> None:
 
 
 @jit
-def raise_diagonal(
-    factor: Array, n_rows: int, position: int, amount: float, rotations: Array
-) -> None:
-    """Step 3: add a positive amount to the diagonal entry of A_SS at a position.
-
-    `rotations` is a workspace for the cosines and sines of the rotations.
-    """
-    cosines, sines = rotations[0], rotations[1]
-    for r in range(position, n_rows):
-        row = factor[row_slice(r, r + 1)]
-        # The entry of this row in the column a^1/2 e, after the
-        # rotations of the rows above.
-        added = math.sqrt(amount) if r == position else 0.0
-        for k in range(position, r):
-            L_rk = row[k]
-            row[k] = multiply_add(sines[k], added, cosines[k] * L_rk)
-            added = multiply_add(cosines[k], added, -sines[k] * L_rk)
-        pivot = math.sqrt(row[r] * row[r] + added * added)
-        cosines[r] = row[r] / pivot
-        sines[r] = added / pivot
-        row[r] = pivot
-
-
-@jit
 def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
     """Solve L' x = values in place, with four rows of L at a time."""
     i = n_rows
@@ -346,6 +322,26 @@ def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
 
 
 @jit
+def raise_diagonal(workspace: Workspace, n_rows: int, position: int, amount: float) -> None:
+    """Step 3: add a positive amount to the diagonal entry of A_SS at a position."""
+    factor, rotations = workspace.factor, workspace.rotations
+    cosines, sines = rotations[0], rotations[1]
+    for r in range(position, n_rows):
+        row = factor[row_slice(r, r + 1)]
+        # The entry of this row in the column a^1/2 e, after the
+        # rotations of the rows above.
+        added = math.sqrt(amount) if r == position else 0.0
+        for k in range(position, r):
+            L_rk = row[k]
+            row[k] = multiply_add(sines[k], added, cosines[k] * L_rk)
+            added = multiply_add(cosines[k], added, -sines[k] * L_rk)
+        pivot = math.sqrt(row[r] * row[r] + added * added)
+        cosines[r] = row[r] / pivot
+        sines[r] = added / pivot
+        row[r] = pivot
+
+
+@jit
 def factor_slipping(workspace: Workspace) -> int:
     """Step 4: factor A on the nodes marked by `is_slipping`. The result is as in `append`."""
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
@@ -368,7 +364,7 @@ def factor_slipping(workspace: Workspace) -> int:
         is_slipping[i] = False  # for now: only nodes without a row are left marked
         if diagonal[i] > factored_diagonal[t]:
             rise = diagonal[i] - factored_diagonal[t]
-            raise_diagonal(workspace.factor, n_kept, t, rise, workspace.rotations)
+            raise_diagonal(workspace, n_kept, t, rise)
             factored_diagonal[t] = diagonal[i]
     # Nodes that weaken no more come first. Most nodes of a growing
     # crack are such, and the rows at the top of L are kept longest.
@@ -397,27 +393,21 @@ def substitute_slipping(
 
 
 @jit_inside
-def multiply_slipping(
-    workspace: Workspace, n_slipping: int, values: Array, product: Array
-) -> None:
+def multiply_slipping(workspace: Workspace, n_slipping: int, values: Array, out: Array) -> None:
     """Multiply K by a field that has `values` in S and is zero elsewhere."""
-    apply(
-        workspace.stiffness, workspace.slipping, n_slipping, values, workspace.halves, product
-    )
+    apply(workspace.stiffness, workspace.slipping, n_slipping, values, workspace.halves, out)
 
 
 @jit_inside
-def multiply_outside(
-    workspace: Workspace, n_slipping: int, values: Array, product: Array
-) -> None:
-    """Multiply as in `multiply_slipping`, but do not change the product at the slipping nodes.
+def multiply_outside(workspace: Workspace, n_slipping: int, values: Array, out: Array) -> None:
+    """Multiply as in `multiply_slipping`, but do not change `out` at the slipping nodes.
 
     (On a line these entries are overwritten with the same product, up
     to round-off.)
     """
     apply_outside(
         workspace.stiffness, workspace.slipping, n_slipping, values, workspace.is_slipping,
-        workspace.halves, product,
+        workspace.halves, out,
     )  # fmt: skip
 
 

@@ -122,10 +122,7 @@ class StepEnd(NamedTuple):
 @jit_inside
 def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
     """Return the longest run of residual nodes on the circle, and the number of passed corners."""
-    n = slip.shape[0]
-    longest = 0
-    run = 0
-    n_corners = 0
+    n, longest, run, n_corners = slip.shape[0], 0, 0, 0
     for q in range(2 * n):  # twice around, so that a run across the first node is complete
         i = q if q < n else q - n
         residual = slip[i] > 0.0 and slip[i] >= sample.pieces.at_corner * sample.critical[i]
@@ -133,7 +130,7 @@ def _residual_runs(sample: StaticSample, slip: Array) -> tuple[int, int]:
         if q < n and residual:
             n_corners += sample.pieces.ends.shape[0]
         elif q < n and slip[i] > 0.0:
-            n_corners += piece_at(sample.pieces, sample.critical[i], slip[i])
+            n_corners += piece_at(sample, slip, i)
         longest = max(longest, run)
     return min(longest, n), n_corners
 
@@ -156,8 +153,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
     """Step 1: unmark the nodes that an elastic step would move back. Return how many remain."""
-    workspace = state.workspace
-    n_stay = n_slipping
+    workspace, n_stay = state.workspace, n_slipping
     for t in range(n_slipping):
         i = workspace.slipping[t]
         back = (state.slip[i] - workspace.solution[t]) * workspace.diagonal[i]  # Pa
@@ -265,7 +261,7 @@ def _step_with_true_pieces(
     # pieces only. In elastic steps they still slip.
     overload = workspace.rhs
     for i in range(slip.shape[0]):
-        piece = piece_at(sample.pieces, sample.critical[i], slip[i])
+        piece = piece_at(sample, slip, i)
         W = sample.pieces.slopes[piece] * sample.weakening_rate[i]
         true_pieces.is_slipping[i] = workspace.is_slipping[i]
         true_pieces.diagonal[i] = entry(workspace.stiffness, i, i) - W
@@ -318,8 +314,7 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
     n_slipping = cholesky.factor_slipping(workspace)
     if n_slipping < n_marked or n_marked == n:  # K is singular on all nodes only
         return Outcome.SLIDING
-    steps_in_row = 0
-    n_corners_before = 0
+    steps_in_row = n_corners_before = 0
     for _ in range(MAX_ELASTIC_STEPS_IN_ALL):
         # 1. and 3.
         n_before = n_slipping

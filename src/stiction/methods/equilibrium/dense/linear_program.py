@@ -90,9 +90,7 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
     """Sort nodes[:count] by rising keys[:count], both in place (Shell sort, Ciura's gaps)."""
     for gap in (1750, 701, 301, 132, 57, 23, 10, 4, 1):
         for i in range(gap, count):
-            key = keys[i]
-            node = nodes[i]
-            j = i
+            key, node, j = keys[i], nodes[i], i
             while j >= gap and keys[j - gap] > key:
                 keys[j] = keys[j - gap]
                 nodes[j] = nodes[j - gap]
@@ -129,8 +127,7 @@ def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
 def stress_tolerance(sample: StaticSample, load: float) -> float:
     """Return the overstress, Pa, that counts as round-off."""
     # Nodes with infinite strength, which cannot break, do not count.
-    total = 0.0
-    n = sample.excess.shape[0]
+    total, n = 0.0, sample.excess.shape[0]
     for i in range(n):
         if sample.excess[i] < np.inf:
             total += abs(sample.excess[i]) + abs(load) * sample.profile[i]
@@ -199,8 +196,7 @@ def _cut(
     sample, _, _, workspace, _, _ = state
     y = workspace.direction
     cholesky.singular_direction(workspace, n_factored, y)
-    excess_y = 0.0
-    p_y = 0.0
+    excess_y = p_y = 0.0
     for t in range(n_factored + 1):
         i = workspace.slipping[t]
         excess_y += y[i] * sample.excess[i]
@@ -231,6 +227,7 @@ def solve_program(
     load = min(start, top)
     tolerance = stress_tolerance(sample, top)
     slipping, is_slipping = workspace.slipping, workspace.is_slipping
+    p, excess = sample.profile, sample.excess
     # Begin without slip. The nodes of a
     # known state join at once, in any order.
     n_slipping = ZERO
@@ -265,12 +262,8 @@ def solve_program(
             break
         n_before = n_slipping
         n_slipping = cholesky.append(workspace, n_slipping, count)
-        cholesky.substitute_slipping(
-            workspace, n_before, n_slipping, sample.profile, workspace.Linv_p
-        )
-        cholesky.substitute_slipping(
-            workspace, n_before, n_slipping, sample.excess, workspace.Linv_q
-        )
+        cholesky.substitute_slipping(workspace, n_before, n_slipping, p, workspace.Linv_p)
+        cholesky.substitute_slipping(workspace, n_before, n_slipping, excess, workspace.Linv_q)
         if n_slipping == n_before + count:  # 2.
             _solve(state, load, n_slipping)
             continue
@@ -295,36 +288,27 @@ def solve_program(
 
 @jit
 def certificate(
-    sample: StaticSample,
-    slip: Array,
-    Kd: Array,
-    multiplier: Array,
-    workspace: Workspace,
-    Ky: Array,
+    sample: StaticSample, slip: Array, Kd: Array, y: Array, workspace: Workspace, Ky: Array
 ) -> float:
-    """Return the distance between rigorous bounds, Pa: (1) from slip, (2) from the multiplier.
+    """Return the distance between rigorous bounds, Pa: (1) from slip, (2) from the multiplier y.
 
-    Writes K times the multiplier y to `Ky`.
+    Writes K y to `Ky`.
     """
-    n = slip.shape[0]
-    lower = np.inf
-    excess_y = 0.0
-    count = ZERO
+    n, lower, excess_y, count = slip.shape[0], np.inf, 0.0, ZERO
     # The load of (1) is the least balance over load profile, for any slip.
     for i in range(n):
         balance = sample.excess[i] + Kd[i] - sample.weakening_rate[i] * slip[i]
         lower = min(lower, balance / sample.profile[i])
-        if multiplier[i] > 0.0:
-            excess_y += multiplier[i] * sample.excess[i]
+        if y[i] > 0.0:
+            excess_y += y[i] * sample.excess[i]
             workspace.queue[count] = i
-            workspace.solution[count] = multiplier[i]
+            workspace.solution[count] = y[i]
             count += 1
     apply(workspace.stiffness, workspace.queue, count, workspace.solution, workspace.halves, Ky)
-    p_y = 0.0
-    infeasible = 0.0
+    p_y = infeasible = 0.0
     for i in range(n):
-        p_y += multiplier[i] * sample.profile[i]
+        p_y += y[i] * sample.profile[i]
         # Round-off may leave A y slightly positive. Its effect on the
         # bound, <A y, d>, is added.
-        infeasible += max(Ky[i] - sample.weakening_rate[i] * multiplier[i], 0.0) * slip[i]
+        infeasible += max(Ky[i] - sample.weakening_rate[i] * y[i], 0.0) * slip[i]
     return max((excess_y + infeasible) / p_y - lower, 0.0)

@@ -122,8 +122,7 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
     pi a D^2/(2 G*) at each tip. The length is infinite if a node has no
     stress drop.
     """
-    stress_drop = np.inf
-    energy = 0.0
+    stress_drop, energy = np.inf, 0.0
     for i in range(sample.excess.shape[0]):
         if sample.excess[i] == np.inf:
             continue
@@ -167,8 +166,7 @@ def runs_away(
     # is known in low..high-1.
     begin = (n - length) // 2
     end = begin + length
-    low = begin
-    high = end
+    low, high = begin, end
     origin = first - begin
     if origin < 0:
         origin += n
@@ -199,10 +197,7 @@ def runs_away(
             solution[t] = max(stress[q] - K_added[q] - strength_at(sample, slip, i), 0.0)
         forward_substitute(runs.factor, ZERO, length, solution)
         back_substitute(runs.factor, length, solution)
-        run = 0
-        longest_run = 0
-        largest_slip = 0.0
-        largest_growth = 0.0
+        run, longest_run, largest_slip, largest_growth = 0, 0, 0.0, 0.0
         for t in range(length):
             i = (origin + begin + t) % n
             slip[i] += solution[t]

@@ -146,11 +146,10 @@ def _find_slipping(
     """
     sample, slip, Kd, workspace, may_stop, _ = state
     # A node of a specimen that slipped before may rest below its strength.
-    n_slipping = ZERO
-    some_rest = False
+    n_slipping, some_rest = ZERO, False
     atol = MAX_MARGIN_AT_STRENGTH * stress_tolerance(sample, load)
     for i in range(slip.shape[0]):
-        piece[i] = piece_at(sample.pieces, sample.critical[i], slip[i])
+        piece[i] = piece_at(sample, slip, i)
         q[i] = start_of(sample, i, piece[i])
         W = sample.pieces.slopes[piece[i]] * sample.weakening_rate[i]
         workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
@@ -167,13 +166,11 @@ def _find_slipping(
 @jit_inside
 def _substitute(state: SlipState, q: Array, first: int, n_slipping: int) -> None:
     """Extend L^-1 p and L^-1 (q + K d of resting nodes) by the rows first..n_slipping-1 of L."""
-    workspace = state.workspace
+    workspace, p = state.workspace, state.sample.profile
     for t in range(first, n_slipping):
         i = workspace.slipping[t]
         workspace.rhs[i] = q[i] + workspace.K_resting[i]
-    cholesky.substitute_slipping(
-        workspace, first, n_slipping, state.sample.profile, workspace.Linv_p
-    )
+    cholesky.substitute_slipping(workspace, first, n_slipping, p, workspace.Linv_p)
     cholesky.substitute_slipping(workspace, first, n_slipping, workspace.rhs, workspace.Linv_q)
 
 
@@ -186,21 +183,18 @@ def _first_to_stop(
     Rates move from `v_nodes` to `new` (in S), or, if `endless`, along
     `new` without end.
     """
-    slipping = state.workspace.slipping
-    largest = 0.0
+    slipping, largest = state.workspace.slipping, 0.0
     for t in range(n_slipping):
         largest = max(largest, abs(new[t]))
     # If rates of several nodes are zero already, the node that reverses
     # fastest stops first.
-    first = NOBODY
-    share = np.inf
+    first, share = NOBODY, np.inf
     for t in range(n_slipping):
         if new[t] < -NEGATIVE_RATE_RTOL * largest:
             v_now = v_nodes[slipping[t]]
             zero_at = v_now / ((0.0 if endless else v_now) - new[t])
             if zero_at < share or (zero_at == share and new[t] < new[first]):
-                first = t
-                share = zero_at
+                first, share = t, zero_at
     return first, share
 
 
@@ -287,8 +281,7 @@ def _next_event(
             left = max(corners[piece[i]] * sample.critical[i] - slip[i], 0.0)
             if left < step * workspace.v[t]:
                 step = left / workspace.v[t]
-                starting_node = NOBODY
-                corner = t
+                starting_node, corner = NOBODY, t
     return PathEvent(step, starting_node, corner)
 
 
@@ -345,8 +338,7 @@ def _pass_corner(
     Returns how many nodes are factored: fewer than before if a pivot failed.
     """
     sample, slip, _, workspace, _, _ = state
-    pieces = sample.pieces
-    i = workspace.slipping[corner]
+    pieces, i = sample.pieces, workspace.slipping[corner]
     slip[i] = pieces.ends[piece[i]] * sample.critical[i]
     W_before = pieces.slopes[piece[i]] * sample.weakening_rate[i]
     piece[i] += 1
@@ -354,9 +346,7 @@ def _pass_corner(
     W = pieces.slopes[piece[i]] * sample.weakening_rate[i]
     workspace.diagonal[i] = entry(workspace.stiffness, i, i) - W
     if W_before >= W:
-        cholesky.raise_diagonal(
-            workspace.factor, n_slipping, corner, W_before - W, workspace.rotations
-        )
+        cholesky.raise_diagonal(workspace, n_slipping, corner, W_before - W)
         workspace.factored_diagonal[corner] = workspace.diagonal[i]
         return n_slipping
     # The node weakens more steeply: compute L again from its row on.
@@ -371,9 +361,7 @@ def _start(
     state: SlipState, node: int, n_slipping: int, v_nodes: Array, direction: Array
 ) -> Start:
     """Steps 4 and 5 at a start: append a node to S. Nodes that bound z stop."""
-    workspace = state.workspace
-    first_changed = n_slipping
-    some_stopped = False
+    workspace, first_changed, some_stopped = state.workspace, n_slipping, False
     while True:
         workspace.queue[0] = node  # `append` reads it
         if cholesky.append(workspace, n_slipping, ONE) > n_slipping:
@@ -382,8 +370,7 @@ def _start(
         if bounding == NOBODY:
             return Start(False, n_slipping, first_changed, some_stopped)
         n_slipping = _stop(state, n_slipping, bounding, v_nodes)
-        first_changed = ZERO
-        some_stopped = True
+        first_changed, some_stopped = ZERO, True
     if state.slip[node] > 0.0:  # it rested after slip
         cholesky.apply_stiffness_to_resting_slip(state)
         first_changed = ZERO
@@ -479,8 +466,7 @@ def follow_stable_path(
                 n_slipping = n_factored
                 _keep_factored(state, n_slipping, v_nodes)
                 cholesky.apply_stiffness_to_resting_slip(state)
-                some_left = True
-                first_changed = ZERO
+                some_left, first_changed = True, ZERO
         else:
             if n_slipping == workspace.max_slipping:
                 return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)

@@ -67,10 +67,8 @@ def _lifting_part(operator: Operator, can_break: Mask, guess: Array) -> tuple[Ar
     tolerance = LIFTING_RTOL * float(operator.weakening_rate.max())
     # The eigenvector z > 0 has A z = lambda z on the part, so A z < 0
     # if lambda < 0.
-    value, _ = lowest_eigenvector(
-        operator, can_break, lifting, tolerance, MAX_EIGENVECTOR_ITERATIONS
-    )
-    if value >= 0.0:
+    most = MAX_EIGENVECTOR_ITERATIONS
+    if lowest_eigenvector(operator, can_break, lifting, tolerance, most) >= 0.0:
         raise TooSmallError
     image = np.empty_like(lifting)
     product(operator, lifting, image)
@@ -220,10 +218,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
         # Nodes whose strength is below the load alone would be
         # overloaded without slip.
         inside[:] = (slip > 0.0) | (excess < load * profile)
-        status, _ = equilibrate(
-            operator, load * profile - excess, inside, slip, bracket.residual,
-            accuracy * bracket.scale,
-        )  # fmt: skip
+        right, tolerance = load * profile - excess, accuracy * bracket.scale
+        status = equilibrate(operator, right, inside, slip, tolerance)
         if status == SOLVED:  # 2.
             low, stable = load, slip
             bracket.raise_slip(slip)
@@ -235,10 +231,8 @@ def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
             continue
         vector = np.abs(operator.direction)
         tolerance = EIGENVALUE_RTOL * float(operator.weakening_rate.max())
-        value, _ = lowest_eigenvector(
-            operator, inside, vector, tolerance, MAX_EIGENVECTOR_ITERATIONS
-        )
-        if value <= 0.0:
+        most = MAX_EIGENVECTOR_ITERATIONS
+        if lowest_eigenvector(operator, inside, vector, tolerance, most) <= 0.0:
             direction = np.maximum(vector, 0.0)
             high = min(high, bracket.raise_multiplier(vector))
     return direction

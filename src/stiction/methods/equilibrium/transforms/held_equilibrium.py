@@ -71,20 +71,16 @@ def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tup
 
 @jit
 def equilibrate(
-    operator: Operator,
-    right: Array,
-    inside: Mask,
-    slip: Array,
-    residual: Array,
-    tolerance: float,
-) -> tuple[int, int]:
-    """Solve (1) for right = load p - s + spring alpha phi. Return the status and iterations.
+    operator: Operator, right: Array, inside: Mask, slip: Array, tolerance: float
+) -> int:
+    """Solve (1) for right = load p - s + spring alpha phi. Return the status.
 
     On entry, the nodes `inside` and their slip are a guess. On return,
     they are the solution. If (1) is solved, the residual r does not
     exceed the tolerance (Pa) at any node, and on the set it is within
     twice the tolerance.
     """
+    residual = operator.residual
     # 1. Begin with the nodes that the guess overloads.
     restrict(slip, inside)
     residual_of(operator, right, slip, residual)
@@ -96,14 +92,14 @@ def equilibrate(
         status, taken = solve_inside(operator, inside, slip, residual, goal)
         iterations += taken + 1  # a revision costs a product, too
         if status == NEGATIVE_CURVATURE:
-            return status, iterations
+            return status
         # 3. and 1.
         residual_of(operator, right, slip, residual)
         joined, left = _revise(inside, slip, residual, tolerance)
         # Round-off may let the true residual exceed the residual of
         # conjugate gradients.
         if joined == 0 and left == 0 and largest_inside(residual, inside) <= 2.0 * tolerance:
-            return SOLVED, iterations
+            return SOLVED
         if left > 0:  # the slip of these nodes was set to zero
             residual_of(operator, right, slip, residual)
-    return EXHAUSTED, iterations
+    return EXHAUSTED

@@ -55,7 +55,7 @@ from stiction.methods.equilibrium.strength import (
     pieces_of,
 )
 from stiction.methods.equilibrium.transforms.bracket import Bracket, TooSmallError, bisect
-from stiction.methods.equilibrium.transforms.fold import Turn, follow_to_turn
+from stiction.methods.equilibrium.transforms.fold import follow_to_turn
 from stiction.methods.equilibrium.transforms.relaxation import (
     least_equilibrium,
     stable_equilibrium,
@@ -187,14 +187,12 @@ def plane_onset(
     coarser: Bracket | None = None
     bend = 0.0
     while True:
-        strength, load_profile, weakening, end = grids.pop()
+        strength, p, weakening, end = grids.pop()
         is_finest, shape = not grids, strength.shape
         goal = gap if is_finest else max(COARSE_GAP, gap)
         lifting = None if coarser is None else _refined(coarser.lifting[0], shape)
         try:
-            bracket = Bracket(
-                half_spaces.symbol(shape), weakening, strength, load_profile, lifting
-            )
+            bracket = Bracket(half_spaces.symbol(shape), weakening, strength, p, lifting)
         except TooSmallError:  # on a coarse grid a small extent may be smaller
             if is_finest:
                 raise
@@ -203,9 +201,7 @@ def plane_onset(
             bracket.raise_slip(slip.flatten())
         closed = False
         if coarser is not None:  # 3.
-            guess, phi = (
-                _refined(field, shape) for field in (coarser.slip, coarser.multiplier)
-            )
+            guess, phi = (_refined(x, shape) for x in (coarser.slip, coarser.multiplier))
             # Interpolation spreads both to nodes that cannot break.
             guess, phi = np.where(bracket.can_break, (guess, phi), 0.0)
             phi *= 1.0 / np.sqrt((phi**2).sum())
@@ -230,11 +226,8 @@ class PlaneSearch:
         self.widest_gap = 1.01 * gap  # round-off
 
     def _operator(self, sample: StaticSample) -> Operator:
-        return make_operator(
-            self.elastic.symbol(self.shape),
-            sample.weakening_rate.reshape(self.shape),
-            self.shape,
-        )
+        W = sample.weakening_rate.reshape(self.shape)
+        return make_operator(self.elastic.symbol(self.shape), W, self.shape)
 
     def _onset(self, sample: StaticSample, corner: Array) -> Bracket:
         """Return the onset without corners, or on a coarse grid on which a node passes a corner."""
@@ -271,10 +264,8 @@ class PlaneSearch:
     def _follow_from_rest(self, sample: StaticSample, onset: Bracket) -> EquilibriumState:
         """Follow the path from rest, at first most of the way to the onset without corners."""
         rest = at_rest(sample)
-        step = max(
-            FIRST_SHARE_OF_ONSET * (onset.lower - rest.load), FIRST_LOAD_STEP * rest.load
-        )
-        return self._follow_in_steps(sample, rest, step)
+        first = FIRST_SHARE_OF_ONSET * (onset.lower - rest.load)
+        return self._follow_in_steps(sample, rest, max(first, FIRST_LOAD_STEP * rest.load))
 
     def _follow_in_steps(
         self, sample: StaticSample, state: EquilibriumState, step: float
@@ -303,8 +294,13 @@ class PlaneSearch:
                 continue
             load_beyond = load + step
             if end is None:  # 6.
-                turn = self._turn(operator, sample, passed, load_beyond)
-                if turn is None:
+                # A rough slip may lie beyond the turn. Then start from the
+                # previous step, and so on.
+                for start, rough in reversed(passed):
+                    turn = follow_to_turn(operator, sample, start, load_beyond, rough)
+                    if turn is not None:
+                        break
+                else:
                     # The path may turn here or not: `jump` decides,
                     # along the last growth.
                     direction = slip - passed[0][1]
@@ -325,24 +321,6 @@ class PlaneSearch:
             passed = [*passed[-3:], (load, slip)]
         still = np.zeros_like(slip)
         return EquilibriumState(load, slip, still, status=PathStatus.STABLE, certified=False)
-
-    def _turn(
-        self,
-        operator: Operator,
-        sample: StaticSample,
-        passed: list[tuple[float, Array]],
-        load_beyond: float,
-    ) -> Turn | None:
-        """Step 6: follow the end of the path event by event. `None` if the end is not found.
-
-        A rough slip may lie beyond the turn. Then start from the
-        previous step, and so on.
-        """
-        for load, slip in reversed(passed):
-            turn = follow_to_turn(operator, sample, load, load_beyond, slip)
-            if turn is not None:
-                return turn
-        return None
 
     def jump(
         self, sample: StaticSample, instability: EquilibriumState, to_rest: bool = False

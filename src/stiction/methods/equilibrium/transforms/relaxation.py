@@ -126,8 +126,7 @@ def solve_pieces(
     slip = guess.copy()
     inside = (guess > 0.0) | (drive > 0.0)
     operator = operator._replace(weakening_rate=weakening_rate)
-    status, _ = equilibrate(operator, drive, inside, slip, np.empty_like(slip), tolerance)
-    return status, slip
+    return equilibrate(operator, drive, inside, slip, tolerance), slip
 
 
 def _is_definite(operator: Operator, W: Array, growth: Array, slip: Array) -> bool:

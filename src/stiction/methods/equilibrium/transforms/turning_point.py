@@ -110,10 +110,7 @@ def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | 
     inside = bracket.inside
     inside[:] = (slip > 0.0) | (excess < load * profile)
     right = load * profile - excess + (stiffness * amplitude) * phi
-    status, _ = equilibrate(
-        operator, right, inside, slip, bracket.residual, accuracy * bracket.scale
-    )
-    if status != SOLVED:
+    if equilibrate(operator, right, inside, slip, accuracy * bracket.scale) != SOLVED:
         return None
     slope = np.where(inside, guess.slope, 0.0)
     share = inner(phi, slope)
@@ -141,10 +138,8 @@ def _other_patch(bracket: Bracket) -> Array | None:
     if not vector.any():
         return None
     tolerance = PATCH_EIGENVALUE_RTOL * float(bracket.operator.weakening_rate.max())
-    value, _ = lowest_eigenvector(
-        bracket.operator, bracket.inside, vector, tolerance, MAX_PATCH_ITERATIONS
-    )
-    if value <= 0.0:
+    most = MAX_PATCH_ITERATIONS
+    if lowest_eigenvector(bracket.operator, bracket.inside, vector, tolerance, most) <= 0.0:
         bracket.raise_multiplier(vector)
     phi: Array = np.maximum(vector, 0.0)
     return phi / np.sqrt(inner(phi, phi))
@@ -159,6 +154,7 @@ def _load_at(state: Held, amplitude: float, curvature: float = 0.0) -> float:
 
 def _amplitude_between(below: Held, above: Held, is_linear: bool) -> float:
     """Step 4: guess the turning point between states with mu' > 0 and mu' < 0."""
+    width = above.amplitude - below.amplitude
     if is_linear:  # mu' is linear in a, as where many nodes join one after the other
         share = below.slope_of_force / (below.slope_of_force - above.slope_of_force)
     else:  # mu' has a single step, as where a node joins: where the two `_load_at` agree
@@ -166,11 +162,9 @@ def _amplitude_between(below: Held, above: Held, is_linear: bool) -> float:
         load_above = _load_at(above, below.amplitude)
         rise = below.slope_of_force / -below.force_by_load
         fall = above.slope_of_force / -above.force_by_load
-        share = (load_above - load_below) / (
-            (rise - fall) * (above.amplitude - below.amplitude)
-        )
+        share = (load_above - load_below) / ((rise - fall) * width)
         share = min(max(share, 0.0), 1.0)
-    return below.amplitude + share * (above.amplitude - below.amplitude)
+    return below.amplitude + share * width
 
 
 def _step_across(state: Held, step: float, last: float, curvature: float, moved: bool) -> float:
