@@ -144,10 +144,10 @@ def make_operator(symbol: Array, W: Array | float, shape: tuple[int, ...]) -> Op
     # The preconditioner stays positive even where K - W is not.
     flat = symbol.flatten()
     spectrum, no_field = np.empty(flat.size, dtype=np.complex128), np.empty(0)
-    workspaces = np.empty((4, W.size))
+    residual, z, direction, image = np.empty((4, W.size))
     return Operator(
-        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), W, spectrum,
-        *workspaces, soft_mode=no_field, spring=0.0, phi=no_field,
+        make_transform(shape), flat, 1.0 / (flat + 0.5 * typical), W, spectrum, residual, z,
+        direction, image, soft_mode=no_field, spring=0.0, phi=no_field,
     )  # fmt: skip
 
 

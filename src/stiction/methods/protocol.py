@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,9 +146,7 @@ def as_method(value: Any) -> Any:
     return value
 
 
-MethodObject: TypeAlias = Annotated[
-    Method, SkipValidation, BeforeValidator(as_method), "Method"
-]
+MethodObject = Annotated[Method, SkipValidation, BeforeValidator(as_method), "Method"]
 """Annotation of an argument that is a method; see `stiction.base.model.checked`."""
 
 

@@ -39,63 +39,6 @@ N_HALVINGS = 30
 
 
 @checked
-def energy_release_rate(
-    problem: Problem, load: Real, lengths: RealArray, *, centre: Real = 0.0
-) -> Array:
-    """Return the static energy release rate at both tips of a crack, from Bueckner's weights.
-
-    Parameters
-    ----------
-    problem : Problem
-        A line. Its load profile, initial stress and residual strength
-        give the stress drop tau_i + tau_0 p - tau_r.
-    load : float
-        tau_0, Pa.
-    lengths : (m,) array or float
-        Crack lengths, m, between 0 and the length of the interface.
-    centre : float
-        Centre of the crack, m.
-
-    Returns
-    -------
-    (m, 2) array, J/m²
-        Energy release rate at the left and the right tip. It is
-        negative if the stress drop acts against the crack at this tip.
-
-    Raises
-    ------
-    InputError
-        On a plane, with `residual_ratio`, or if a length is out of range.
-
-    Notes
-    -----
-    Between identical half-spaces G = K|K|/(2 G*), where K is the integral of the stress drop times
-    the weight of Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of
-    collinear cracks to a single crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2)
-    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict
-    the length of confined ruptures in this way. The drop is linear between the nodes.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import stiction as st
-    >>> problem = st.paper.problem(nodes=512)
-    >>> rate = energy_release_rate(problem, 1e6, [0.01, 0.02])
-    >>> bool(rate[1, 0] > rate[0, 0] > 0.0)  # J/m²
-    True
-    """
-    resting, profile = _stress_drops(problem)
-    # At the length of the period a crack meets its image.
-    flat, period = np.atleast_1d(lengths), problem.interface.measure
-    if flat.ndim != 1 or not np.all((flat > 0.0) & (flat < period)):
-        raise InputError(
-            f"lengths: must be between 0 and {period:g} m, got {describe(lengths)}"
-        )
-    drops = (resting + load * profile)[None]
-    return _release_rate(problem, _intensity_factors(problem, drops, flat, centre)[0])
-
-
-@checked
 def griffith_length(
     problem: Problem,
     load: RealArray,
@@ -109,7 +52,8 @@ def griffith_length(
     Parameters
     ----------
     problem : Problem
-        A line. See `energy_release_rate`.
+        A line. Its load profile, initial stress and residual strength
+        give the stress drop tau_i + tau_0 p - tau_r.
     load : float or (k,) array
         tau_0, Pa. Many loads at once cost little more than a single load.
     fracture_energy : float
@@ -126,19 +70,33 @@ def griffith_length(
     float or (k,) array
         Length, m. Infinite if there is no such length.
 
+    Raises
+    ------
+    InputError
+        On a plane, or with `residual_ratio`.
+
+    Notes
+    -----
+    Between identical half-spaces G = K|K|/(2 G*), where K is the integral of the stress drop times
+    the weight of Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of
+    collinear cracks to a single crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2)
+    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict
+    the length of confined ruptures in this way. The drop is linear between the nodes.
+    G is negative at a tip at which the stress drop acts against the crack.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=512)
+    >>> st.theory.griffith_length(problem, 1e6, 0.5) > st.theory.griffith_length(problem, 2e6, 0.5)
+    True
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
-        raise InputError(
-            f"load: must be a finite number or a list of them, got {describe(load)}"
-        )
-    # The factors without load and by a unit load serve every load:
-    # shape (loads, lengths, tips).
-    tau, drops = load.reshape(-1, 1, 1), _stress_drops(problem)
+        raise InputError(f"load: must be a finite number or list of them, got {describe(load)}")
+    tau = load.reshape(-1, 1, 1)
 
     def runs(lengths: Array, tau: Array) -> Any:
-        resting, unit = _intensity_factors(problem, drops, lengths, centre)
-        release_rate = _release_rate(problem, resting + tau * unit)
-        return release_rate.min(axis=-1) > fracture_energy
+        return release_rates(problem, tau, lengths, centre).min(axis=-1) > fracture_energy
 
     # 2. The lengths at which a crack is tested, and whether it runs
     # there under each load.
@@ -159,6 +117,14 @@ def griffith_length(
     critical = np.full(tau.size, np.inf)
     critical[crosses] = high
     return critical if load.ndim else float(critical[0])
+
+
+def release_rates(problem: Problem, load: Any, lengths: Array, centre: float) -> Array:
+    """Return G = K|K|/(2 G*) at both tips of cracks, J/m², with the shape (..., lengths, 2)."""
+    # The factors without load and by a unit load serve every load.
+    resting, unit = _intensity_factors(problem, _stress_drops(problem), lengths, centre)
+    factor: Array = resting + load * unit
+    return factor * np.abs(factor) / (2.0 * problem.effective_modulus)
 
 
 def _stress_drops(problem: Problem) -> Array:
@@ -200,9 +166,3 @@ def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: f
         both = np.stack((left_tip.mean(axis=-1), right_tip.mean(axis=-1)), axis=-1)
         factors.append(scale[:, None] * both)
     return np.concatenate(factors, axis=1)
-
-
-def _release_rate(problem: Problem, factor: Array) -> Array:
-    """Return G = K|K|/(2 G*), J/m²."""
-    release_rate: Array = factor * np.abs(factor) / (2.0 * problem.effective_modulus)
-    return release_rate

@@ -45,6 +45,16 @@ from stiction.problem.specimen import Slider
 
 MAX_RMS_DIFFERENCE = 0.01
 """Relative difference from the exact onset (rms) above which samples are solved by both methods."""
+COARSE_PLANE = (
+    8.0,
+    "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4",
+)
+COARSE_LINE = (
+    12.0,
+    "if the strength varies within a quarter of it, the local criterion is off by about 0.8 %"
+    " (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
+)
+"""Nodes in a nucleation length without a warning, and the error on coarser grids."""
 INSTEAD = ". Use st.Equilibrium() or st.Rupture()"
 
 OF_PLANES = {
@@ -236,15 +246,7 @@ class LocalCriterion(Listed):
                 if interface.is_plane:
                     patches = [(y.aspect, *y.extents, y.area) for y in windows]
                     patch[rows] = np.array(patches)[chosen]
-            # Arrested events are not known, so
-            # the first instability is the onset.
-            stress = sample.mean_stress(load)
-            values = {
-                "critical_load": load,
-                "critical_stress": stress,
-                "first_instability": stress.copy(),
-                "critical_position": place * interface.spacings,
-            }
+            values = _values(sample, load, load, place * interface.spacings)
             if interface.is_plane:
                 columns = patch[:, 0], patch[:, 1:3], patch[:, 3]
                 values |= zip(OF_PLANES, columns, strict=True)
@@ -286,14 +288,16 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
                 run = slice(int(start[i]), int(start[i] + width[i]))
                 drive = load[i] * sample.load_profile - excess[i]
                 relief[i] = _relief_of_patch(problem, weakening_rate, run, drive)
-    stress = sample.mean_stress(load - relief)
-    return {
-        "critical_load": load,
-        "critical_stress": stress,
-        "first_instability": stress.copy(),
-        "critical_position": (start + 0.5 * width) * spacing,
-        "critical_patch_length": width * spacing,
-    }
+    values = _values(sample, load, load - relief, (start + 0.5 * width) * spacing)
+    return values | {"critical_patch_length": width * spacing}
+
+
+def _values(sample: Sample, load: Array, relieved: Array, place: Array) -> dict[str, Array]:
+    """Return the variables of all methods. `relieved` is the load less the relief by slip, Pa."""
+    # Arrested events are not known, so the first instability is the onset.
+    stress = sample.mean_stress(relieved)
+    variables = ("critical_load", "critical_stress", "first_instability", "critical_position")
+    return dict(zip(variables, (load, stress, stress.copy(), place), strict=True))
 
 
 def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> float:
@@ -392,15 +396,8 @@ def check_law(problem: Problem) -> None:
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
     """Warn if the moving average covers too few nodes."""
-    if problem.interface.is_plane:
-        cost = "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4"
-        warn_if_coarse(problem, sample.steepest_weakening_rate, 8.0, cost)
-    else:
-        cost = (
-            "if the strength varies within a quarter of it, the local criterion is off by about"
-            " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength"
-        )
-        warn_if_coarse(problem, sample.steepest_weakening_rate, 12.0, cost)
+    nodes, cost = COARSE_PLANE if problem.interface.is_plane else COARSE_LINE
+    warn_if_coarse(problem, sample.steepest_weakening_rate, nodes, cost)
 
 
 def excess_of(sample: Sample) -> Array:

@@ -138,15 +138,11 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
 
 @jit
 def explicit_steps(
-    count: int,
-    state: RuptureState,
-    setting: Setting,
-    tables: ExplicitTables,
-    record: StepRecord,
+    n: int, state: RuptureState, setting: Setting, tables: ExplicitTables, record: StepRecord
 ) -> Any:
-    """Take up to `count` explicit steps in place. Return (steps taken, reason).
+    """Take up to `n` explicit steps in place. Return (steps taken, reason).
 
-    `stepping.phase` is EXPLICIT. `record` has at least `count` rows, or no
+    `stepping.phase` is EXPLICIT. `record` has at least `n` rows, or no
     rows to keep no record.
     """
     grid, step = setting.grid, tables.step
@@ -155,7 +151,7 @@ def explicit_steps(
     slip_rate_hat, slip_hat = tables.slip_rate_hat, state.slip_hat
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
-    while taken < count and reason == Reason.DONE and not (now.event.begun or now.event.calm):
+    while taken < n and reason == Reason.DONE and not (now.event.begun or now.event.calm):
         time = now.step.time + step
         load = value_at(setting.load, time)
         # 1. Predict.

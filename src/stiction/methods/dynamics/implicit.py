@@ -249,13 +249,9 @@ def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
 
 @jit
 def implicit_steps(
-    count: int,
-    state: RuptureState,
-    setting: Setting,
-    tables: ImplicitTables,
-    record: StepRecord,
+    n: int, state: RuptureState, setting: Setting, tables: ImplicitTables, record: StepRecord
 ) -> Any:
-    """Take up to `count` accepted implicit steps in place. Return (steps taken, reason).
+    """Take up to `n` accepted implicit steps in place. Return (steps taken, reason).
 
     The parameters are described in `explicit_steps`. `stepping.phase` is IMPLICIT.
     """
@@ -265,7 +261,7 @@ def implicit_steps(
     smallest = _JUST_BELOW * thresholds.smallest_step
     # A single return: a further return would double the time to compile.
     taken, reason = ZERO, Reason.DONE
-    while taken < count:
+    while taken < n:
         # 1. Size, time, load and ratio.
         size, step, clipped, last = _choose_size(now, setting, step)
         if size < smallest and not clipped:
@@ -299,11 +295,8 @@ def implicit_steps(
         work = _accept(state, setting, tables, attempt)
         done = TakenStep(time, size, load, work, radiated, u, tables.strength)
         stepping.implicit_steps += 1
-        stepping.two_step, stepping.previous_size, stepping.previous_radiated = (
-            1,
-            size,
-            radiated,
-        )
+        stepping.two_step, stepping.previous_size = 1, size
+        stepping.previous_radiated = radiated
         fall = finish_step(state, setting, done, record, taken)
         taken += 1
         # 6. The next size, or the end.

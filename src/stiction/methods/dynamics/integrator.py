@@ -200,7 +200,7 @@ class Run:
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
         if reason in _ENDINGS:
-            return _ENDINGS[reason]
+            return _ENDINGS[Reason(reason)]
         if self.ended(state):
             return "time"
         times, values = self.setting.load

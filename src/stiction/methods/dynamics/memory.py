@@ -308,17 +308,17 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     count, pairs, entries = blocks(grid.frequency.size), grid.poles.size, grid.frequency.size
     modes, nodes = grid.entry.size, int(np.prod(grid.transform.shape))
     table, ramp = (zeros(count * pairs * rows * ENTRIES) for rows in (4, 2))
-    *spectra, work = work_arrays(5, modes, complex)
-    transfer, strength, trial, driving, falling, u, *of_solver = work_arrays(10, nodes, float)
-    problem = SlipProblem(
-        grid.transform, *work_arrays(2, modes, float), work, trial, driving, falling, u,
-        np.zeros(nodes, dtype=np.int64), *of_solver,
-    )  # fmt: skip
+    spectra: Any = work_arrays(5, modes, complex)
+    transfer, strength, *fields = work_arrays(10, nodes, float)
+    of_problem: Any = (*fields[:4], np.zeros(nodes, dtype=np.int64), *fields[4:])
+    symbol, inverse = work_arrays(2, modes, float)
+    problem = SlipProblem(grid.transform, symbol, inverse, spectra.pop(), *of_problem)
     packed, second_packed = np.zeros((2, count * grid.multiplicity * 2 * ENTRIES))
-    return ImplicitTables(
+    arrays: Any = (
         np.zeros(1, dtype=np.int64), np.zeros(2), table, ramp, *work_arrays(2, entries, float),
-        *spectra, transfer, strength, packed, second_packed, np.empty((2, TWO_ROWS)), problem,
+        *spectra, transfer, strength, packed, second_packed, np.empty((2, TWO_ROWS)),
     )  # fmt: skip
+    return ImplicitTables(*arrays, problem=problem)
 
 
 @jit_inside

@@ -93,8 +93,9 @@ TOTALS = record(
 def block_at_rest(mesh: Mesh, slip: Array) -> Waves:
     """Return a block at rest whose interface has a given slip (m)."""
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
-    fields, arrival = np.zeros((3, slip.size)), np.full(slip.size, np.nan)
-    return Waves(u, v, u_rate, v_rate, slip.copy(), *fields, arrival, np.zeros(1, TOTALS))
+    rate, stress, corrected = np.zeros((3, slip.size))
+    arrival, totals = np.full(slip.size, np.nan), np.zeros(1, TOTALS)
+    return Waves(u, v, u_rate, v_rate, slip.copy(), rate, stress, corrected, arrival, totals)
 
 
 @jit_inside

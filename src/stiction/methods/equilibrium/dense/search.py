@@ -183,10 +183,7 @@ class DenseSearch:
         return EquilibriumState(onset.lower, onset.slip, multiplier, Kd, multiplier=multiplier)
 
     def next(
-        self,
-        sample: StaticSample,
-        state: EquilibriumState | None = None,
-        target: float = np.inf,
+        self, sample: StaticSample, state: EquilibriumState | None = None, cap: float = np.inf
     ) -> EquilibriumState:
         """Return the next instability from a state or from rest, or the state at a lower load.
 
@@ -199,7 +196,7 @@ class DenseSearch:
         if from_rest:
             for workspace in self._workspaces:
                 workspace.n_factored[0] = 0  # the rows belong to another sample
-        if target == np.inf and route != Route.EVENTS:
+        if cap == np.inf and route != Route.EVENTS:
             instability = self._next_by_programme(sample, state, from_rest)
             if instability is not None:
                 return instability
@@ -208,9 +205,9 @@ class DenseSearch:
         # The kernel moves these arrays, and the state before must stay.
         slip, Kd, direction = state.slip.copy(), state.Kd.copy(), state.direction.copy()
         # Between given loads, a path goes on although the interface slides.
-        goes_on = self.ends and target < np.inf
+        goes_on = self.ends and cap < np.inf
         slip_state = SlipState(sample, slip, Kd, self._workspaces[1], self.may_stop, goes_on)
-        end = follow_stable_path(slip_state, state.load, target, direction)
+        end = follow_stable_path(slip_state, state.load, cap, direction)
         reached = EquilibriumState(
             end.load, slip, direction, Kd, PathStatus(end.status), route,
             stopped=end.stopped or state.stopped, peak=end.peak,
