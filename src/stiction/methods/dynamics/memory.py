@@ -316,9 +316,9 @@ def implicit_tables(grid: Grid) -> ImplicitTables:
     packed, second_packed = np.zeros((2, count * grid.multiplicity * 2 * ENTRIES))
     arrays: Any = (
         np.zeros(1, dtype=np.int64), np.zeros(2), table, ramp, *work_arrays(2, entries, float),
-        *spectra, transfer, strength, packed, second_packed, np.empty((2, TWO_ROWS)),
+        *spectra, transfer, strength, packed, second_packed, np.empty((2, TWO_ROWS)), problem,
     )  # fmt: skip
-    return ImplicitTables(*arrays, problem=problem)
+    return ImplicitTables(*arrays)
 
 
 @jit_inside
