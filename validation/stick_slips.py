@@ -23,8 +23,7 @@ from scipy.special import comb
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.equilibrium.patches import line_patch
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search, sample_of
 from stiction.plot.style import ACCENT, INK, PAGE, QUIET, paper_style
 
 TABLE = Path(__file__).parent / "data" / "stick_slips" / "events.csv"
