@@ -3,15 +3,13 @@
 The exact mean and variance of the nucleation stress are computed here.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import checked
-from stiction.base.representation import Result, Row, Summary
+from stiction.base.representation import Result
 from stiction.methods.criterion.griffith import griffith_length
 from stiction.methods.criterion.local import check_law, nucleation_stress
 from stiction.methods.criterion.windows import windows_of
@@ -41,15 +39,6 @@ class NucleationStatistics(Result):
     variance: float
     strength_mean: float
     strength_variance: float
-
-    def _summary(self) -> Summary:
-        rows = [
-            Row("mean", self.mean, (), "Pa"),
-            Row("standard deviation", math.sqrt(self.variance), (), "Pa"),
-            Row("mean of the strength", self.strength_mean, (), "Pa"),
-            Row("its standard deviation", math.sqrt(self.strength_variance), (), "Pa"),
-        ]
-        return Summary("Nucleation stress at a point, exact moments", rows)
 
     @property
     def variance_ratio(self) -> float:
@@ -101,7 +90,12 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     weakening_rate = problem.friction.uniform_weakening_rate
     assert weakening_rate is not None  # checked by `stationary`
     (window,) = windows_of(problem, weakening_rate, stretches=(1.0,))
-    power = strength_spectrum(problem, strength) * np.abs(window.spectrum) ** 2
+    # The spectrum of the strength is the transform of its correlation, and
+    # a mode stands for its conjugate, too.
+    interface = problem.interface
+    power = interface.transform(strength.correlation(interface)).real / interface.size
+    power[..., 1 : interface.shape[-1] // 2] *= 2.0
+    power = np.maximum(power, 0.0) * np.abs(window.spectrum) ** 2
     mean, variance = scale * strength.mean, (scale * strength.standard_deviation) ** 2
     return NucleationStatistics(
         mean=(mean - initial) * window.total / load,
@@ -109,16 +103,6 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
         strength_mean=mean,
         strength_variance=variance,
     )
-
-
-def strength_spectrum(problem: Problem, strength: RandomField) -> Array:
-    """Return the fraction of Var[tau_p] at each wave of `Interface.transform`. The sum is 1."""
-    interface = problem.interface
-    # The spectrum is the transform of the correlation. A mode stands
-    # for its conjugate, too.
-    power = interface.transform(strength.correlation(interface)).real / interface.size
-    power[..., 1 : interface.shape[-1] // 2] *= 2.0
-    return np.maximum(power, 0.0)
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
@@ -131,21 +115,18 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     refuse_specimen(problem, "this", "sample the nucleation stress with st.monte_carlo")
     load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.quantity is None else problem.given_pressure
+    if pressure is None:
+        raise InputError("load.normal_pressure: is missing, and strength is in coefficients")
     varying = {
         "load.profile: varies": np.ptp(load) > 0.0,
         "load.initial_stress: varies": np.ptp(initial) > 0.0,
-        "load.normal_pressure: varies, and strength is in coefficients": (
-            pressure is not None and np.ptp(pressure) > 0.0
-        ),
+        "load.normal_pressure: varies, and strength is in coefficients": np.ptp(pressure) > 0.0,
         "strength: is conditioned on measured values": strength.conditions is not None,
         "friction.weakening_rate: varies or follows from the strength": (
             problem.friction.uniform_weakening_rate is None
         ),
     }
     why = "so the nucleation stress is not stationary. Sample it with st.monte_carlo instead"
-    problems = [f"{what}, {why}" for what, varies in varying.items() if varies]
-    if pressure is None:
-        problems.append("load.normal_pressure: is missing, and strength is in coefficients")
-    if problems:
+    if problems := [f"{what}, {why}" for what, varies in varying.items() if varies]:
         raise InputError(problems)
     return float(np.max(pressure)), float(np.max(load)), float(np.max(initial))

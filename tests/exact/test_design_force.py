@@ -22,7 +22,7 @@ from stiction.inference.specimens import (
     grid_of_profiles,
 )
 from stiction.random.equally_likely import EquallyLikely
-from stiction.reliability.factors import solve_specimens
+from stiction.reliability.counting import solve_specimens
 
 sys.path.append(str(Path(__file__).parents[2] / "validation"))
 import design_force_closed as closed

@@ -22,7 +22,6 @@ from typer import Argument, Option
 import stiction as st
 from stiction.base.errors import InputError, RunError, collect_warnings, printable
 from stiction.base.progress import Meter, duration, interrupted
-from stiction.problem.checks import nodes_in_nucleation_length
 
 MAX_SHOWN_LINES = 12
 """Points, failures or damaged chunks in a list."""
@@ -63,16 +62,6 @@ def _show_some(texts: Sequence[Any], prefix: str, *, err: bool = False) -> None:
         echo(f"{prefix}{text}", err=err)
     if len(texts) > MAX_SHOWN_LINES:
         echo(f"{prefix}and {len(texts) - MAX_SHOWN_LINES} more", err=err)
-
-
-def _ignore_local_style() -> None:
-    """Ignore a matplotlibrc in the current folder, because it may come from a stranger."""
-    import matplotlib
-
-    if Path(matplotlib.matplotlib_fname()).resolve().parent == Path.cwd():
-        matplotlib.rcdefaults()
-        matplotlib.use("agg")
-        warnings.warn("matplotlibrc: this file in the current folder is not used", stacklevel=1)
 
 
 # -- studies and runs ----------------------------------------------------------------------------
@@ -146,19 +135,12 @@ def run(
 
     for title, frame in tables_of(result, loaded.axes):
         echo(f"{title}\n{frame.map(shown).to_string(index=False, max_rows=48)}")
-    if (state := _state_of(out, part)).failures:
+    state, beginning = st.open_run(out).status(), f"part {part}: " if part else ""
+    echo(f"{beginning}{state.done} of {state.samples} samples in {out}")
+    if state.failures:
         echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
-
-
-def _state_of(out: Path, part: str | None) -> Any:
-    """Print how much of a run is stored, and return its state."""
-    stored = st.open_run(out)
-    state = stored.status()
-    beginning = f"part {part}: " if part else ""
-    echo(f"{beginning}{state.done} of {state.samples} samples in {out}")
-    return state
 
 
 def status(run: RunPath) -> None:
@@ -238,7 +220,6 @@ def report(
     Examples:
       stiction report run --out page.html
     """
-    _ignore_local_style()
     from stiction.cli.pages import write_report
 
     path, stored = out or run / "report.html", st.open_run(run)
@@ -303,16 +284,11 @@ def check(study: StudyFile) -> None:
 
 def description(study: Any) -> dict[str, str]:
     """Return a description of a study in a few titled lines."""
-    import pandas as pd
-
-    from stiction.ensemble.dataset import distinct
-
     points = study.experiments
     samples = f"{study.samples} (seed {study.seed})"
     if study.sweep:
         samples += f" at each of {len(points)} points: {len(points) * study.samples} in all"
-    different = distinct(points, "problem", "random", "method")
-    methods = ", ".join(dict.fromkeys(point.method.label for point in different))
+    methods = ", ".join(dict.fromkeys(point.method.label for point in points))
     lines = {"method": methods, "samples": samples}
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
         keys = " with ".join(variable.long_name for _, variable in coordinates.values())
@@ -320,31 +296,7 @@ def description(study: Any) -> dict[str, str]:
         unit = f" {variable.units}".removesuffix(" 1")
         text = f"{keys}: {len(values)} values, {values[0]} to {values[-1]}{unit}"
         lines[f"axis {number}"] = text
-    if study.profiles is not None:
-        return lines
-    pairs = [(point.problem, member) for point in different for member in point.random.members]
-    for (title, unit), column in pd.DataFrame([_numbers(*pair) for pair in pairs]).items():
-        ends = dict.fromkeys(f"{value:.5g}" for value in (column.min(), column.max()))
-        lines[title] = f"{' to '.join(ends)} {unit}".rstrip()
     return lines
-
-
-def _numbers(problem: Any, random: Any) -> dict[tuple[str, str], float]:
-    """Return key numbers for a point and its random properties, with titles and units."""
-    field = random.strength
-    unit = "Pa" if field.quantity is None else "(friction coefficient)"
-    numbers = {
-        ("mean strength", unit): field.mean,
-        ("standard deviation", unit): field.standard_deviation,
-        ("e-folding length", "m"): field.efolding_length(),
-    }
-    W = problem.friction.uniform_weakening_rate
-    if W is None:  # the nucleation length varies along the interface
-        return numbers
-    numbers["nucleation length", "m"] = problem.nucleation_length
-    steepest = W * problem.friction.steepening
-    numbers["nodes in h_n", ""] = min(nodes_in_nucleation_length(problem, steepest))
-    return numbers
 
 
 def _cost(study: Any) -> dict[str, str]:

@@ -39,27 +39,6 @@ def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
     return {name: variable for point in some for name, variable in point.variables.items()}
 
 
-def over_axes(
-    values: Mapping[str, NDArray[Any]], variables: Mapping[str, Variable], axes: GridAxes
-) -> tuple[dict[str, NDArray[Any]], dict[str, Variable], Coordinates]:
-    """Return values (points, ...) reshaped to the axes of a sweep."""
-    dims, shape = tuple(axes), tuple(len(axes[dim][dim][0]) for dim in axes)
-    arrays = {name: array.reshape(shape + array.shape[1:]) for name, array in values.items()}
-    swept = {
-        name: replace(variable, dims=dims + variable.dims)
-        for name, variable in variables.items()
-    }
-    coordinates: Coordinates = {}
-    for of_dimension in axes.values():
-        coordinates |= of_dimension
-    return arrays, swept, coordinates
-
-
-def within(numbers: NDArray[Any], ends: Any) -> bool:
-    """Return whether values are whole numbers, at least 0 and below their ends."""
-    return bool(np.all((numbers >= 0) & (numbers < ends)))
-
-
 class Gathered:
     """The results of all samples in one or more experiments, in memory.
 
@@ -90,7 +69,8 @@ class Gathered:
         # Numbers of failures may be anything in a stranger's file, so
         # they are objects.
         for points, samples in ((table.columns[POINT], table.columns[NUMBER]), failed.T):
-            if not within(points, len(self.points)) or np.any(samples < self.first):
+            known = (points >= 0) & (points < len(self.points)) & (samples >= self.first)
+            if not np.all(known):
                 return "a point or a sample is not in the study"
         variables, interface = variables_in(self.points), self.points[0].problem.interface
         sizes = dict(zip(interface.dims, interface.shape, strict=True))
@@ -99,8 +79,8 @@ class Gathered:
             if name not in variables:
                 return f"{describe(name)} is not a variable of the study"
             dims, shape = variables[name].dims[1:], table.columns[name].shape[1:]
-            known = [sizes.get(dim, size) for dim, size in zip(dims, shape, strict=False)]
-            if len(shape) != len(dims) or [*shape] != known:
+            right = [sizes.get(dim, size) for dim, size in zip(dims, shape, strict=False)]
+            if len(shape) != len(dims) or [*shape] != right:
                 return f"{name} has shape {shape} for each sample"
         return ""
 
@@ -142,16 +122,17 @@ class Gathered:
         Missing values are NaN. The attributes 'failed_samples' and
         'cut_short' state the cause.
         """
-        variables, values = variables_in(self.points), {}
-        for name in variables:
-            if name in self._arrays:
-                array, kind = self._arrays[name], self._types[name]
-                # Whole numbers and flags cannot be NaN. They remain
-                # floats if any is missing.
-                if kind.kind == "f" or not np.isnan(array).any():
-                    array = array.astype(kind, copy=False)
-                values[name] = array
-        values, variables, coordinates = over_axes(values, variables, axes)
+        variables, values, dims = variables_in(self.points), {}, tuple(axes)
+        shape = tuple(len(axes[dim][dim][0]) for dim in dims)
+        for name in [name for name in variables if name in self._arrays]:
+            array, kind = self._arrays[name], self._types[name]
+            # Whole numbers and flags cannot be NaN. They remain
+            # floats if any is missing.
+            if kind.kind == "f" or not np.isnan(array).any():
+                array = array.astype(kind, copy=False)
+            values[name] = array.reshape(shape + array.shape[1:])
+        swept = {name: replace(v, dims=dims + v.dims) for name, v in variables.items()}
+        coordinates = {k: v for of_dim in axes.values() for k, v in of_dim.items()}
         coordinates["sample"] = self.first + np.arange(self.done.shape[1]), SAMPLE
         attributes, failed, made = dict(attributes), self.failed, int(self.done.sum())
         if failed:
@@ -159,4 +140,4 @@ class Gathered:
         if made + len(failed) < self.done.size:
             attributes["cut_short"] = f"{made} of {self.done.size} samples are done"
         interface = self.points[0].problem.interface
-        return to_dataset(values, variables, coordinates, attributes, interface)
+        return to_dataset(values, swept, coordinates, attributes, interface)

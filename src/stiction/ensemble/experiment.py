@@ -90,13 +90,9 @@ class Experiment:
 
     def with_seed(self, seed: int) -> Experiment:
         """Return the same experiment with a different seed."""
-        return self._unchecked(seed=seed)
-
-    def _unchecked(self, **changes: Any) -> Experiment:
-        """Return the same experiment with changes, for which checks are not repeated."""
-        changed = copy.copy(self)
-        vars(changed).update(changes)
-        return changed
+        other = copy.copy(self)  # checks are not repeated
+        vars(other)["seed"] = seed
+        return other
 
     @property
     def given(self) -> Any:
@@ -181,10 +177,6 @@ class Experiment:
         profiles = self.random.from_draws(self.problem.interface, draws)
         return profiles_in_stress(self.problem, self.random, profiles)
 
-    def onset(self, profiles: Mapping[str, Array]) -> Values:
-        """Solve profiles (samples, *shape), given by name."""
-        return dict(self.prepare()(self.sample(profiles)))
-
     def sample(self, profiles: Mapping[str, Array]) -> Sample:
         """Return profiles by name as a sample, or raise an `InputError` if it does not fit.
 
@@ -196,7 +188,7 @@ class Experiment:
     def solve(self, draws: Array) -> tuple[dict[str, Array], Values]:
         """Return profiles and results of draws."""
         profiles = self.profiles(draws)
-        return profiles, self.onset(profiles)
+        return profiles, dict(self.prepare()(self.sample(profiles)))
 
     def prepare(self) -> Solver:
         """Return the prepared solver of the method. The next call reuses the solver."""

@@ -12,14 +12,14 @@ in Asmussen and Glynn, Stochastic Simulation (2007), chapter VII.
 Steps:
 
 1. Count many specimens for each solved field, if this costs less
-   (`factors`). Otherwise sample the tail (`tail`). The design stress is
+   (`counting`). Otherwise sample the tail (`tail`). The design stress is
    a quantile of the onset.
 2. If so many onsets lie at their lower bound that the design stress is
    the bound itself, return the bound.
 3. For the sensitivities, take the quantile at the design probability:
    from the prediction of a fit or posterior
    (`inference.specimens.Prediction`), or else from `SAMPLES_PER_END`
-   samples (`factors.solve_specimens`). All further steps use the same
+   samples (`counting.solve_specimens`). All further steps use the same
    draws, so that differences are accurate.
 4. For each family, take the quantile over the posterior given the
    family, or over the interfaces with this family.
@@ -36,6 +36,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from stiction.base.arrays import Array
@@ -51,7 +52,7 @@ from stiction.random.equally_likely import AnyRandom, Predictive, as_random
 from stiction.random.marginals import FACTOR_FAMILIES
 from stiction.random.spectra import Share
 from stiction.reliability.answer import Answer
-from stiction.reliability.factors import CHARACTERISTIC, Counts, count_tail, solve_specimens
+from stiction.reliability.counting import CHARACTERISTIC, Counts, count_tail, solve_specimens
 from stiction.reliability.solving import (
     Budget,
     Probability,
@@ -314,22 +315,15 @@ def sensitivities_of(
             rows.append((key, f"{ends[0]:.4g}", f"{ends[1]:.4g}", low, high))
     # 6. The widest range comes first.
     rows.sort(key=lambda row: -abs(row[4] - row[3]))
+    names = "source", "low", "high", "stress_at_low", "stress_at_high"
+    effects = pd.DataFrame(rows, columns=names).set_index("source").to_xarray()
+    effects.attrs = {"probability": probability, "stress": stress}
+    if len(families) > 1:
+        ratios = {name: value / reference for name, value in families.items()}
+        effects.attrs |= {f"stress by {name}": stress * r for name, r in ratios.items()}
     area = problem.area or np.nan
-    effects = xr.Dataset(
-        {
-            "low": ("source", np.array([row[1] for row in rows], dtype=str)),
-            "high": ("source", np.array([row[2] for row in rows], dtype=str)),
-        },
-        {"source": np.array([row[0] for row in rows], dtype=str)},
-        {"probability": probability, "stress": stress},
-    )
-    ratios = {
-        end: np.array([row[column] for row in rows], dtype=float) / reference
-        for end, column in (("low", 3), ("high", 4))
-    }
-    for name, unit, scale in (("stress", "Pa", stress), ("force", "N", area * stress)):
-        for end, ratio in ratios.items():
-            effects[f"{name}_at_{end}"] = "source", scale * ratio, {"units": unit}
-    for name, value in families.items() if len(families) > 1 else ():
-        effects.attrs[f"stress by {name}"] = stress * value / reference
+    for end in ("low", "high"):
+        ratio = effects[f"stress_at_{end}"].values / reference
+        effects[f"stress_at_{end}"] = "source", stress * ratio, {"units": "Pa"}
+        effects[f"force_at_{end}"] = "source", area * stress * ratio, {"units": "N"}
     return effects

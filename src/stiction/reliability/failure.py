@@ -4,13 +4,13 @@ Problem. The onset T of a random interface has the
 distribution P(T < s). Estimate the probability at
 a stress s with a given coefficient of variation.
 
-Sources. Each algorithm has its own file: `counting`, `factors`,
-`subset`, `two_level`, `tail`.
+Sources. Each algorithm has its own file: `counting`, `subset`,
+`two_level`, `tail`.
 
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
-2. Count many specimens for each solved field, if this costs less (`factors`).
+2. Count many specimens for each solved field, if this costs less (`counting`).
 3. Otherwise solve a pilot of plain samples. Count if failures are
    frequent, or if the method is too slow for chains (`counting`).
    Sample the tail if they are rare (`tail`).
@@ -40,8 +40,7 @@ from stiction.problem.problem import Problem, stress_of
 from stiction.problem.results import along, study_attributes
 from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.reliability.answer import Answer
-from stiction.reliability.counting import binomial_interval, count_failures
-from stiction.reliability.factors import count_tail
+from stiction.reliability.counting import binomial_interval, count_failures, count_tail
 from stiction.reliability.solving import (
     Budget,
     TargetCv,

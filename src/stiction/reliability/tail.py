@@ -44,10 +44,11 @@ from scipy.special import stdtrit
 from stiction.base.arrays import Array, one_blas_thread
 from stiction.base.progress import SILENT, Meter
 from stiction.ensemble.limit_state import LimitState
-from stiction.reliability.counting import CONFIDENCE
 from stiction.reliability.subset import Descent, descend, generator
 from stiction.reliability.two_level import bridge
 
+CONFIDENCE = 0.9
+"""Confidence level of every interval."""
 FREQUENT = 0.01
 """Probability above which counting needs no more evaluations than subset simulation."""
 SIZE_MARGIN = 1.1
