@@ -58,7 +58,7 @@ def simulator(
     samples : int
         Number of tests to simulate in each call.
     load_cell_error : float
-        Standard deviation of the error of a peak, Pa.
+        Standard error of a peak, Pa.
 
     Returns
     -------
@@ -68,8 +68,8 @@ def simulator(
         peaks, Pa, for an array theta with a number for each
         parameter. ``simulate(theta, first=k)`` returns the
         peaks of samples k, k + 1, ... If k >= samples, these
-        peaks are independent of the first call. All theta share
-        the samples, so peaks are smooth functions of theta.
+        peaks are independent of the first call. The samples
+        are the same for all theta, so peaks are smooth functions of theta.
 
     Raises
     ------

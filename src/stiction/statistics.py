@@ -47,7 +47,7 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
 
 
 def mean(values: Any) -> WithError:
-    """Estimate the mean of independent values (samples,), in the unit of the values."""
+    """Estimate the mean of independent values (samples,), in their unit."""
     sample = as_sample(values)
     return WithError(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
 
@@ -89,7 +89,7 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
 
     Notes
     -----
-    The number of values below the p-quantile is binomial (N, p). The ends of the interval
+    The number of values below the p-quantile is binomial (N, p). The interval ends
     are order statistics. The number lies between their ranks with a probability of 90 %
     (David and Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous
     distributions, rounded up to whole ranks.

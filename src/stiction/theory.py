@@ -1,4 +1,4 @@
-"""Theory of the local criterion and of cracks: results that do not need an ensemble.
+"""Theory of the local criterion and cracks: results that do not need an ensemble.
 
 The exact mean and variance of the nucleation stress are computed here.
 """

@@ -86,7 +86,7 @@ def test_what_survives_counts_as_survived():
     options = FIRST | {"target_cv": 0.3, "max_evaluations": 20_000}
     design = st.design_stress(problem, likely, probability=0.1, **options)
     assert design.survived == pytest.approx(lost, abs=error)
-    assert "share that survives any stress" in str(design)
+    assert "fraction that survives any stress" in str(design)
     below = np.sum(plain < np.array(design.interval["stress"])[:, None], axis=1) / plain.size
     assert below[0] - error < 0.1 < below[1] + error
     for algorithm in ("plain", "subset"):

@@ -91,7 +91,7 @@ def nearest(given: str, valid: Sequence[str]) -> str:
 
 
 def unknown_name(what: str, given: str, valid: Iterable[str]) -> str:
-    """Return the message of `unknown`, preceded by what the name stands for."""
+    """Return the message of `unknown`, preceded by the kind of the name."""
     return f"{what}: {unknown(given, valid)}"
 
 
@@ -222,7 +222,7 @@ def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     which : array of bool
         Whether the warning concerns each sample.
     sizes : array, optional
-        Size of the error of each sample.
+        Error size for each sample.
     """
     affected = [bool(flag) for flag in which]
     numbers = [number for number, flag in enumerate(affected) if flag]

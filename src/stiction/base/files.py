@@ -1,4 +1,4 @@
-"""Files that are complete or absent, archives of arrays, folders of the cache and of kernels.
+"""Files that are complete or absent, archives of arrays, and folders for cache and kernels.
 
 Files may come from strangers. Every reader in the package gets its
 bytes from `read_regular` or `content_of`, and checks the size of its

@@ -93,7 +93,7 @@ class Kinds(Mapping[str, Any]):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OneOf:
-    """Annotation of a field whose value belongs to a family of classes.
+    """Annotation for a field whose value belongs to a family of classes.
 
     `kinds` are the classes by `type`, and `default` is the type of a
     table without a `type`. `convert` maps a value to such an object. If

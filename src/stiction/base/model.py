@@ -97,7 +97,7 @@ def is_whole(value: Any, least: int) -> bool:
 
 
 def is_finite(value: Any) -> bool:
-    """Return whether a value is a finite number, and neither a string nor a Boolean."""
+    """Return whether a value is a finite number, and not a string or a Boolean."""
     with suppress(ValueError):
         return math.isfinite(as_number(value))
     return False
@@ -261,8 +261,8 @@ def explain(
 ) -> list[str]:
     """Return a message for each mistake that pydantic found in a given value.
 
-    The path in a message begins with `root`. `otherwise` stands in
-    place of an empty path. A union has an item for each of its members.
+    The path in a message begins with `root`. `otherwise` replaces
+    an empty path. A union has an item for each of its members.
     The texts of the members are joined by 'or'.
     """
     members: dict[tuple[str, str], dict[str, None]] = {}
@@ -496,7 +496,7 @@ def plain_name(hint: Any) -> str:
 
 
 def plain_signature(owner: Any, hints: Mapping[str, Any]) -> inspect.Signature:
-    """Return the signature of a function or class with the plain names of annotations.
+    """Return the signature of a function or class with plain annotations.
 
     The default shows whether an argument may be left out.
     """

@@ -12,7 +12,7 @@ unpacks data without a limit. The steps are:
    All texts together are smaller than the file.
 3. Let h5netcdf read the numbers and the lists of texts.
 
-Files of classic NetCDF contain no names of files, and scipy reads them.
+Classic NetCDF files contain no file names, and scipy reads them.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def _letters_in_attributes(item: Any, content: bytes) -> int:
 
 
 def _padded_size(dataset: Any) -> int:
-    """Return the number of values in all chunks. Chunks may extend beyond the array."""
+    """Return how many values all chunks hold. Chunks may extend beyond the array."""
     sizes = zip(dataset.shape or (), dataset.chunks or dataset.shape or (), strict=True)
     return math.prod(-(-size // chunk) * chunk for size, chunk in sizes)
 

@@ -160,7 +160,7 @@ def _key(self: Any) -> tuple[Any, ...]:
 def _comparable(value: Any) -> Any:
     """Return a value with which a given value is compared and hashed. NaN equals itself."""
     if value is None or isinstance(value, str | float):
-        return value if value == value else "nan"  # most are, and hashes stand in many calls
+        return value if value == value else "nan"  # most are, and many calls contain hashes
     if isinstance(value, np.ndarray):
         return value.shape, (value + 0.0).tobytes()  # zeros of both signs are equal
     if hasattr(value, "identical"):  # labelled arrays

@@ -336,7 +336,7 @@ def check_measured(
 
     If they are `doubted`, warn about a number that is far from all
     others and often means that a value is missing. In messages, values
-    stand as `given`, with their line in a table or their number.
+    are written as `given`, with their line in a table or their number.
     """
     shown = np.ravel(values if given is None else given)
 

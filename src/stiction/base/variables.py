@@ -15,7 +15,7 @@ class Variable:
         In SI, "1" for a pure number.
     long_name : str
     dims : tuple of str
-        The first is 'sample' for all variables of a method.
+        The first is 'sample' for all variables from a method.
     """
 
     units: str
@@ -115,7 +115,7 @@ def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
 def forces(
     values: Mapping[str, Any], area: float | None, whole_area: float | None
 ) -> dict[str, Any]:
-    """Return the forces, N, for the stresses among some values, or none without an area.
+    """Return the forces, N, for the stresses among some values. Without an area, it is empty.
 
     `area` can break, and `whole_area` is the whole interface, both in m².
     """

@@ -49,7 +49,7 @@ COMPARED_SAMPLES = 1_000
 """Samples with which measured peaks are compared."""
 
 
-# -- what commands share -------------------------------------------------------------------------
+# -- used by several commands ---------------------------------------------------------------------
 
 
 def echo(text: Any = "", *, err: bool = False) -> None:

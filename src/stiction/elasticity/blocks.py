@@ -75,7 +75,7 @@ class Pushes(NamedTuple):
     """Uniform traction on a side, over a width (m), centred at a height (m) above the interface.
 
     With two sides, each block is pushed at one end and pulled at the
-    other end, each by half of the force.
+    other end, each by half the force.
     """
 
     sides: tuple[Side, ...]
@@ -94,7 +94,7 @@ class BlockResponse(NamedTuple):
     stiffness: Array  # (n, n): K at a given force, Pa/m; symmetric, its rows sum to zero
     shear: Array  # (n,): q, shear stress of the drive, divided by its mean
     drive_stiffness: float  # C, force per unit depth divided by travel, without slip, Pa
-    # Largest relative error of q, C and K (as a share of its diagonal),
+    # Largest relative error of q, C and K (relative to its diagonal),
     # without the lattice's error
     error: float = 0.0
 
@@ -200,7 +200,7 @@ def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
     # that slip causes.
     shear, *held = top.step * (on_interface @ tractions).T
     addition = 0.5 * spacing * np.array(held)
-    # At a given force the platen moves, which takes its share of the
+    # At a given force the platen moves, which takes its part of the
     # stress away.
     addition -= 0.5 * np.outer(shear, shear) / shear.sum()
     return 0.5 * (addition + addition.T), shear, float(top.step * tractions[:, 0].sum())

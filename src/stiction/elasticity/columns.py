@@ -20,7 +20,7 @@ symbol 2i sin(k h/2)/h, so that a half-plane has the symbol E* sin(k h/2)/h of t
 
 1. Elements across (`graded`, `Elements`): their sizes are 2 h, 6 h, 18 h and so on, away from
    the surface and from both edges of a push. All integrals are exact.
-2. Terms of a cell, of an edge between two cells, and of an edge at an end, where sigma_xx = 0
+2. Terms of a cell, an edge between two cells, and an edge at an end, where sigma_xx = 0
    or -p in the half cell between the line and the end (`Columns`).
 3. A piece is a matrix with labels. `merge` adds pieces and eliminates labels by Cholesky.
 4. Cell 0 and edge 1 are a period. n - 1 periods are two copies of half of them, and one period
@@ -256,9 +256,10 @@ def block(
     """Return the stiffness of a body per unit depth, Pa, on its surface and its far side.
 
     Lengths are in m. The rows are u at the cells and v at the edges of the surface, u and v of
-    the far side if it is free, and the push, if any. The row of the push holds minus the loads of
-    a unit force. The body is longer than the surface in contact by `behind` and `ahead`. If it
-    lies on rollers, a frictionless wall holds its leading end.
+    the far side if it is free, and the push, if any. The row for the push holds
+    minus the loads by a unit force. The body is longer than the surface in
+    contact by `behind` and `ahead`. If it lies on rollers, a frictionless wall
+    holds its leading end.
     """
     columns = Columns(elements(body.height, FIRST_ELEMENT * cell, push), body, far)
     last, last_point = 2 * n_cells, len(columns.across.points) - 1

@@ -55,7 +55,7 @@ class Driven:
 
     @cached_property
     def positive(self) -> float:
-        """Largest positive off-diagonal entry of K over the diagonal. 0 if within the error."""
+        """Largest positive off-diagonal entry in K over the diagonal. 0 if within the error."""
         off = self.stiffness - np.diag(np.diag(self.stiffness))
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0
@@ -89,9 +89,9 @@ def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
 def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
     """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
 
-    The lowest eigenvalue of a block of K rises if the block shrinks.
+    If a block of K shrinks, its lowest eigenvalue rises.
     Therefore a shortest run that begins later also ends later, and a
-    single pass over the nodes finds all of them:
+    single pass over the nodes finds all:
 
     1. Lengthen the run until it is unstable.
     2. Shorten it from its end as long as it remains unstable, and keep it.
@@ -151,8 +151,8 @@ def driven(
     """Return the response of blocks with a machine. For arguments see `block_response`.
 
     If the blocks are `glued` while they are pressed, the pressure is
-    not uniform. `machine` is the stiffness of the machine per unit
-    depth (Pa), for one block, which is half of the specimen.
+    not uniform. `machine` is its stiffness per unit
+    depth (Pa), for one block, which is half the specimen.
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)

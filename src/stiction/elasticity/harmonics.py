@@ -64,7 +64,7 @@ class Sums(NamedTuple):
 class Harmonics:
     """Harmonics of a block: sums in closed form, and the reflections between its sides.
 
-    In a pressed block, the sums include half of the constant harmonic, k = 0.
+    In a pressed block, the sums include half the constant harmonic, k = 0.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Harmonics:
     max_decay : float
         Largest exponent k L of a harmonic in the remainder.
     pressed : bool
-        Whether the interface has v = 0 and s_xy = 0, instead of s_yy = 0.
+        Whether the interface has v = 0 and s_xy = 0, rather than s_yy = 0.
     """
 
     def __init__(

@@ -8,11 +8,11 @@ its Fourier series gives, for an even number n of nodes, the first column
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 
 and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice
-versa, which halves the cost of products. A window is a run of nodes on
-which the smallest eigenvalue of the block of K is at most the weakening
-rate W. If all other nodes are held, the window is unstable. Its
-eigenvector bounds the load of the first instability
-(`protocol.Windows`), and the narrowest window gives the closest bound.
+versa, which halves the cost of products. In a window, a run of nodes, the
+smallest eigenvalue of K is at most the weakening rate W. If all other nodes are
+held, the window is unstable. Its eigenvector bounds the load of the first
+instability (`protocol.Windows`), and the narrowest window gives the closest
+bound.
 
 Algorithm
 ---------
@@ -58,7 +58,7 @@ MODE_RTOL = 1e-14
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     """Return the first column of K, Pa/m, with shape (nodes,), for a period (m) and G* (Pa).
 
-    The number of nodes is even.
+    The node count is even.
     """
     scale = np.pi * modulus / length
     column = np.zeros(nodes)
@@ -143,7 +143,7 @@ def _narrowest(nodes: int, widths: Sequence[int], W: float) -> int:
 
 
 def _continuous_width(nodes: int, weakening_rate: float) -> int:
-    """Return the number of nodes in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
+    """Return the node count in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
     return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * weakening_rate), 1.0) * nodes)
 
 

@@ -114,7 +114,7 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     angle, weight = _half_arc()
     rotation = np.exp(1j * angle)
     # sqrt(1 + s^2) at s = i rotation, in a form without cancellation
-    # beside the branch point.
+    # next to the branch point.
     root = np.sqrt(2.0 * np.sin(angle)) * np.exp(1j * (0.5 * angle - 0.25 * np.pi))
     factor = rotation * weight * (2.0 / (np.pi * 1j))
     s = 1j * rotation
@@ -235,7 +235,7 @@ class _Polish:
         target = q.T @ (self.values * emphasis)
         try:
             solution = np.linalg.solve(r, target)
-        except np.linalg.LinAlgError:  # two poles have met: let the least norm share the weight
+        except np.linalg.LinAlgError:  # two poles have met: the least norm divides them
             solution = np.linalg.lstsq(r, target, rcond=1e-14)[0]
         real, imaginary = np.split(solution, 2)
         weights = real + 1j * imaginary

@@ -11,7 +11,7 @@ S. Two problems are solved without a matrix in memory:
 
 In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1).
 With a stiff spring the matrix is positive definite even if A has a
-single direction of negative curvature, close to phi. In this way,
+single direction with negative curvature, close to phi. In this way,
 states at and beyond the turning point of the load can be computed
 (`turning_point`). Kernels take flat arrays, so that the same code
 serves lines and planes.
@@ -224,7 +224,7 @@ def restrict(field: Array, inside: Mask) -> None:
 
 @jit
 def largest_inside(field: Array, inside: Mask) -> float:
-    """Return the largest absolute value of a field on a set of nodes."""
+    """Return the largest absolute value on some nodes."""
     largest = 0.0
     for i in range(field.size):
         if inside[i]:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 
 ANYWHERE = -1
-"""Stands for the first node of a window that may begin anywhere on a periodic interface."""
+"""In place of the first node of a window that may begin anywhere on a periodic interface."""
 SMALLEST_EIGENVALUE = 0.5788869418506
 """lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
 
@@ -127,7 +127,7 @@ class Elasticity(Protocol):
 
     @property
     def positive(self) -> float:
-        """Largest positive off-diagonal entry of K, as a fraction of the diagonal.
+        """Largest positive off-diagonal entry in K, as a fraction of the diagonal.
 
         If it is not zero, slip at one node can stop slip at other nodes.
         """

@@ -55,7 +55,7 @@ class Rig(NamedTuple):
 def on_cells(edges: Array) -> Array:
     """Return normal forces on cells (n, ...) from forces on edges (n + 1, ...).
 
-    A cell carries half of the forces on its edges, and the whole of the
+    A cell carries half the forces on its edges, and the whole of the
     force on an edge at an end. Sums are equal.
     """
     cells = 0.5 * (edges[:-1] + edges[1:])

@@ -4,10 +4,10 @@ Problem
 -------
 For lines and for blocks, kernels need single entries K_ij (Pa/m), and K d for a slip d that
 is zero except at some nodes. numba compiles a kernel for each type of entries
-(`CircularEntries` of a line, `DenseEntries` of blocks). `entry`, `mean_relief`, `apply` and
-`apply_outside` are placeholders whose Python bodies are never run: numba replaces them by
-the overload for the type of entries. If a type has no overload, the compilation of a kernel
-raises an error.
+(`CircularEntries` on a line, `DenseEntries` in blocks). `entry`, `mean_relief`,
+`apply` and `apply_outside` are placeholders whose Python bodies are never run:
+numba replaces them by the overload for the type of entries. If a type has no
+overload, the compilation of a kernel raises an error.
 
 Algorithm: our own
 ------------------
@@ -16,7 +16,7 @@ even nodes act only on odd nodes, and vice versa.
 
 1. For each parity, take the slipping nodes with this parity. They act
    on n/2 targets, which are the nodes with the other parity.
-2. The entries of K from a node to its targets are n/2 consecutive
+2. The entries in K from a node to its targets are n/2 consecutive
    numbers of `strip`, the odd entries of the first column three times
    over. Add them, times the slip, for four nodes at once, so that each
    target is read and written once for four nodes.
@@ -82,7 +82,7 @@ def apply_outside(
 def add_four(
     target: Array, strip: Array, places: tuple[int, int, int, int], values: tuple[float, ...]
 ) -> None:
-    """Add the contribution of four nodes to half of a product."""
+    """Add what four nodes contribute to half a product."""
     half = target.shape[0]
     p0, p1, p2, p3 = places
     z0, z1, z2, z3 = values

@@ -84,7 +84,7 @@ class Failure(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Samples at any points of a sweep, and the failures among them.
+    """Samples at any sweep points, and the failures among them.
 
     The columns are `POINT`, `NUMBER` and the variables of the method,
     with an entry for each solved sample.
@@ -141,7 +141,7 @@ def on_executor(
 
 @cache
 def versions() -> str:
-    """Return the versions of software on which the last digits of a result depend."""
+    """Return the software versions on which the last digits depend."""
     return f"stiction {__version__}, numpy {version('numpy')}, numba {version('numba')}"
 
 
@@ -184,7 +184,7 @@ def piece_size(
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
     if pace:
         size = int(PIECE_SECONDS / max(pace, 1e-9))
-    # A fair share of the remaining samples, but at least a block, which
+    # An equal part of the remaining samples, but at least a block, which
     # is drawn as a whole.
     size = min(size, max(-(-left // (2 * workers)), block))
     size = max(1, min(size, int(MAX_PIECE_BYTES / experiment.sample_bytes), span.samples))

@@ -85,7 +85,7 @@ class Gathered:
         return ""
 
     def add(self, table: Table) -> None:
-        """Put the rows of a table in their places. Ignore other samples."""
+        """Put each row of a table in its place. Ignore other samples."""
         # The folder of a run may hold more samples than are gathered.
         for failure in table.failures:
             if failure.sample - self.first < self.done.shape[1]:
@@ -117,7 +117,7 @@ class Gathered:
     def dataset(
         self, attributes: Mapping[str, Any], axes: GridAxes = MappingProxyType({})
     ) -> xr.Dataset:
-        """Return a dataset over the axes of the sweep, the samples and the nodes.
+        """Return a dataset over the sweep axes, the samples and the nodes.
 
         Missing values are NaN. The attributes 'failed_samples' and
         'cut_short' state the cause.

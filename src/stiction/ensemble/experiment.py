@@ -64,7 +64,7 @@ class Experiment:
 
     def __post_init__(self) -> None:
         random = as_random(self.random, self.seed)
-        mistakes: dict[str, None] = {}  # equally likely interfaces share them
+        mistakes: dict[str, None] = {}  # equally likely interfaces repeat them
         for member in random.members:
             mistakes |= dict.fromkeys(given_twice(self.problem, member.names, "random"))
             try:

@@ -39,7 +39,7 @@ MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
 """Most samples of each interface, and about the number of all samples, by which
 interfaces are ordered, and the standard deviations below the mean that are compared."""
 MAX_FACTORS = 8
-"""Most random factors of the strength at a node, which share a negligible probability."""
+"""Most random factors of the strength at a node, which together have a negligible probability."""
 MIN_THREAD_SECONDS = 2e-3
 """Seconds of work that justify a thread."""
 

@@ -82,8 +82,8 @@ def complete(
 ) -> None:
     """Compute missing samples, and pass each finished table to memory and to the store.
 
-    `missing` is a mask (points, samples). Warnings that several tables
-    share are issued once.
+    `missing` is a mask (points, samples). A warning that several tables
+    cause is issued once.
     """
     points, lost, total = rows.points, 0, int(missing.sum())
     label = " and ".join({point.method.label: None for point in distinct(points, "method")})
@@ -126,7 +126,7 @@ def gather(
     progress: Show = True,
     pilot: bool = True,
 ) -> xr.Dataset:
-    """Compute an ensemble at every point of a sweep. Stored samples are not computed again.
+    """Compute an ensemble at every sweep point. Stored samples are not computed again.
 
     Finished samples go to the `store`. `elsewhere`, with shape (points,
     samples), marks samples that a different job computes. See
@@ -194,7 +194,7 @@ def monte_carlo(
         one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first : int
-        Number of samples, seed, and number of the first sample.
+        How many samples, seed, and number of the first sample.
     keep : str or tuple of str
         Random fields whose profiles are kept, such as ``"strength"``.
         Other profiles are kept by options of the method, such as

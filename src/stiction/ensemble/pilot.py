@@ -3,7 +3,7 @@
 Problem. How much do the onsets from an approximate method, such as the
 local criterion, differ from the exact onsets of the same samples?
 
-Steps, at up to `MAX_PILOT_POINTS` points of a sweep:
+Steps, at up to `MAX_PILOT_POINTS` sweep points:
 
 1. Select the first samples that have an onset, and the weakest among
    the first `MAX_RANKED_SAMPLES` of them.

@@ -6,14 +6,14 @@ must be detected.
 
 Solution. ``study.json`` identifies the study, and
 ``chunks/`` holds the samples. A chunk is a table of samples
-with a mark that identifies its study. The name of a chunk
-is a digest of its content. A chunk is written completely or
-not at all. Chunks never change, and no file lists them.
+with a mark that identifies its study. A digest of its content names a chunk. A
+chunk is written completely or not at all. Chunks never change, and no file
+lists them.
 
 Limits. A digest reveals damage, but not forgery, because anyone who can
 write to the folder can write other numbers with a new digest. A folder
-may come from a stranger. If a link, a pipe, a device or a folder stands
-in place of a file, an `InputError` is raised. Content that does not fit
+may come from a stranger. If a file is a link, a pipe, a device or a
+folder, an `InputError` is raised. Content that does not fit
 the study counts as damage, even if the digest fits.
 """
 

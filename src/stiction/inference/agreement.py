@@ -25,7 +25,7 @@ Steps for a predicted sample:
 3. The p-value is the fraction of choices whose distance is at least the
    distance of the measured values.
 
-Steps for a posterior. The peaks of one campaign share the unknown parameters.
+Steps for a posterior. All peaks of a campaign have the same unknown parameters.
 
 4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of
    the posterior.
@@ -79,7 +79,7 @@ class Agreement(Result):
         the squared differences between measured and
         predicted fractions. The largest difference is
         multiplied by the square root of the number of tests.
-    p_values : dict of str to float
+    p_values : dict from str to float
         For each distance, by name: the probability of a distance at
         least as large if the prediction is right. If curves were
         compared, also the p-values of the ``number`` of precursors of a
@@ -87,7 +87,7 @@ class Agreement(Result):
         ``first_load``, the force at its first precursor, or else the
         peak.
     predicted : tuple of (values, fraction)
-        Predicted distribution function for each kind of specimen:
+        Predicted distribution function for each specimen type:
         rising values in the unit of the peaks, and the fraction of peaks
         up to each value.
     band : float
@@ -143,9 +143,9 @@ def agreement(
         has events, for example from ``Equilibrium(events=20)``,
         precursors are also compared.
     unit : str
-        Unit of the peaks and the load-cell error.
+        Unit for the peaks and the load-cell error.
     load_cell_error : float
-        Standard deviation of the error of a peak. Needed for a dataset
+        Standard error of a peak. Needed for a dataset
         only, because a posterior contains its load-cell error.
     replicates : int
         Number of simulated campaigns. A p-value is at least
@@ -162,7 +162,7 @@ def agreement(
     ------
     InputError
         If the prediction lacks the measured quantity, is a sweep, or
-        has one kind of specimen although several kinds were tested.
+        has one specimen type although several kinds were tested.
         Also if peaks differ from the prediction by a factor of fifty,
         or if the posterior was fitted to these peaks.
 
@@ -311,7 +311,7 @@ def _with_posterior(
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])
-    # All kinds of a campaign share the draw, because they share the
+    # All kinds of a campaign use the same draw, because they have the same
     # unknown parameters.
     u = posterior.u[rng.choice(len(posterior.u), POSTERIOR_POINTS)]
     chosen = rng.integers(POSTERIOR_POINTS, size=replicates)

@@ -14,10 +14,9 @@ Steps:
    from the estimate.
 2. Transform each parameter to a scale on which its error is about
    normal (`Scale`).
-3. The error of a repetition is (estimate of the
-   repetition - estimate)/width. The width is proportional
-   to the square root of the correlation length, because a
-   record contains only few correlation lengths.
+3. The error of a repetition is (its estimate - estimate)/width. The width is
+   proportional to the square root of the correlation length, because a record
+   contains only few correlation lengths.
 4. Subtract the quantiles of the error, times the width, from the
    estimate: a first interval.
 5. Repeat steps 1 and 3 for fields whose correlation length lies at

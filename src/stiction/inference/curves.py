@@ -186,7 +186,7 @@ class Curves(Sequence[Curve], Result):
 
     @property
     def unit(self) -> str:
-        """Unit of the force of all tests."""
+        """Force unit in all tests."""
         return self.tests[0].unit
 
     @property
@@ -231,8 +231,8 @@ def read_curve(
 ) -> Curves:
     """Read force against travel or time. Find the peak, precursors and plateau of each test.
 
-    A column is read if its heading, or the caller, says that it is the
-    wanted quantity; if more than one column could be it, none is read.
+    A column is read if its heading, or the caller, says that it is the wanted
+    quantity. If several columns could be it, an error lists them.
 
     Parameters
     ----------
@@ -253,12 +253,12 @@ def read_curve(
     speed : float, optional
         Speed of the crosshead, m/s. It turns time into travel.
     noise : float, optional
-        Standard deviation of a reading of the load cell, in SI. By
+        Standard deviation of a load-cell reading, in SI. By
         default it is estimated from neighbouring readings, which needs
         a load cell without a filter.
     split : {"cycles", "strokes", "tables"}, optional
-        How a record with several tests is cut: at the end of each full
-        slide of stick-slip, at each change of sign of the force in a
+        How a record with several tests is cut: where each full slide in a
+        stick-slip record ends, where the force changes its sign in a
         reciprocating test, or at remarks between tables.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`.

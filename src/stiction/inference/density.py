@@ -73,7 +73,7 @@ class Densities(NamedTuple):
 
 
 def grouped(ordered: Array) -> tuple[Array, Array]:
-    """Return the means and shares of groups of neighbouring values, which are sorted (step 3).
+    """Return the means and weights of groups of neighbouring values, which are sorted (step 3).
 
     Groups end at equal steps of a normal variable, so that every group
     in a nearly normal sample is narrow compared with the kernel. A

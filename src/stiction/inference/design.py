@@ -19,7 +19,7 @@ Steps for the information, for each design and each simulated campaign:
 
 1. Draw the parameters from the prior.
 2. Draw the peaks from the simulated onsets that also give the likelihood.
-3. Compute the posterior of the unknown parameters on a grid
+3. Compute the posterior for the unknown parameters on a grid
    (`stiction.inference.posterior`). Known parameters keep their drawn
    values. If the posterior lies between the points of a coarse grid,
    make the box smaller around the true parameters.
@@ -136,9 +136,9 @@ def design_of_tests(
     probability : float
         Probability for the design stress. Used for a fit or a posterior.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit`.
+        Standard error of a peak, in `unit`.
     unit : str
-        Unit of the peaks, as in `infer`. Use
+        Unit for the peaks, as in `infer`. Use
         "N" if the prior varies the area.
     repetitions : int
         Number of simulated campaigns for each design.
@@ -147,13 +147,13 @@ def design_of_tests(
     -------
     xarray.Dataset
         Over 'design' and 'parameter': `information` is the expected
-        divergence of the posterior of a parameter from its prior (nats,
+        divergence of the posterior for a parameter from its prior (nats,
         NaN if the parameter is known), with its `standard_error`. For a
         fit or a posterior, `width` is instead the expected width of the
         90 % interval, with its `standard_error`. Over 'design',
         `design_stress` is then the expected design stress, Pa, and 90 %
         of the designs lie between `design_low` and `design_high`. The
-        first design, 'now', stands for the present measurements.
+        first design, 'now', has only the present measurements.
 
     Raises
     ------

@@ -20,9 +20,8 @@ Steps:
    repeat both steps once with the estimated noise.
 3. Increase the variance of the marginal by the amount that removal of
    the mean and the trend takes from the values on average.
-4. The score of a family is its mean log likelihood
-   times the number of independent values (step 5),
-   minus the number of estimated parameters.
+4. A family's score is its mean log likelihood times the number of independent
+   values (step 5), minus one for each estimated parameter.
 5. Families fitted to the same values have the same mean and variance.
    The log ratio of their densities therefore begins with Hermite order
    3 in z. For N values with correlations rho_ij, the sum of the log
@@ -356,7 +355,7 @@ def ranking(
         )
     if not fitted:
         raise InputError(problems)
-    # 4. and 5. All families share the number of independent values of
+    # 4. and 5. All families use the number of independent values of
     # the likeliest family.
     independent = max(fitted, key=lambda one: one[0])[1].independent
     costs = np.array([len(one.setting.marginal.parameters(one.of_values)) for _, one in fitted])

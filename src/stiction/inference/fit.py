@@ -19,7 +19,7 @@ Steps:
    it, leave the family out and repeat from step 2.
 4. Compute intervals from the repetitions. If records come from
    different specimens, compute the intervals of mean and scatter from
-   the posterior given the levels of the records (`specimens`).
+   the posterior given the record levels (`specimens`).
 5. Compare the distances of the data from marginal and spectrum with the
    distances of the repetitions. The logarithms of these distances are
    about normal, so p-values follow from Student's distribution.
@@ -92,7 +92,7 @@ ADVICE = {
 TOLD = 2.0
 """Difference of scores above which data distinguish two families."""
 FEW_SPECIMENS = 5
-"""Fewest specimens whose scatter decides about rare failures."""
+"""Fewest specimens whose scatter determines rare failures."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence modulo 1 that fills [0, 1) evenly."""
 CONFIDENCE = 0.9
@@ -129,7 +129,7 @@ class FieldFit(WithFactors, Result):
     field : RandomField
         The fitted field, for simulations, without measurement noise and
         with the mean mode.
-    parameters : dict of str to float
+    parameters : dict from str to float
         Estimates in SI. ``efolding_length`` (m) is the lag at which the
         correlation of z falls to 1/e. ``mean`` and
         ``standard_deviation`` describe the field. ``marginal.*``,
@@ -137,7 +137,7 @@ class FieldFit(WithFactors, Result):
         a prior and a sweep. ``noise`` is the standard deviation of the
         measurement noise, and ``between`` is the coefficient of
         variation between specimens.
-    interval : dict of str to (float, float)
+    interval : dict from str to (float, float)
         90 % bootstrap interval for each parameter. The interval for the
         noise may begin at zero. Intervals for bounds of the marginal
         end outside the values. An interval that ends at an end of the
@@ -145,16 +145,16 @@ class FieldFit(WithFactors, Result):
         bounds of the marginal, a shape of 1 of 'beta' at a free bound,
         0.65 to 16 for the exponent, 0.05 to 20 for the anisotropy. With
         `between`, the intervals for ``mean`` and ``between`` come from
-        the posterior given the levels of the records.
+        the posterior given the record levels.
     repetitions : tuple of RandomField
         Fits to records simulated from `field`, which a repeated
         measurement might have given.
-    families : dict of str to Goodness
+    families : dict from str to Goodness
         Quality of the fit for each requested family. The best family
         comes first.
     independent : float
-        Number of independent values in the scores of families.
-    p_values : dict of str to float
+        Independent values on which the scores in `families` are based.
+    p_values : dict from str to float
         Probability that records with the fitted ``marginal`` and
         ``spectrum`` differ from their fits as much as the data do. A
         small probability means that the family does not fit. For
@@ -281,7 +281,7 @@ class FieldFit(WithFactors, Result):
         ends = np.cumsum([one.weight for one in self.families.values() if one.weight > 0.0])
         places = (rng.random() + EVENLY * np.arange(count)) % 1.0 * ends[-1]
         family = np.minimum(np.searchsorted(ends, places), ends.size - 1)
-        # Each family runs through its fields in a random order, and
+        # Each family uses its fields in a random order, and
         # repeats it if necessary.
         orders = [cycle(rng.permutation(len(fields))) for fields in self._likely]
         return [self._likely[number][next(orders[number])] for number in family.tolist()]
@@ -297,11 +297,11 @@ class FieldFit(WithFactors, Result):
         return grid_of_profiles(self._with_levels(self._every))[0]
 
     def profiles(self, count: int, seed: int) -> Profiles:
-        """Return likely fields and the levels of the records, for the posterior with peaks."""
+        """Return likely fields and the record levels, for the posterior with peaks."""
         return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
 
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
-        """Return fields with the levels of the records, and for each field their variances."""
+        """Return fields with the record levels, and for each field their variances."""
         truth, levels = self._estimate, self._levels
         mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
         length = truth.field(self.quantity).spectrum.efolding_length
@@ -392,11 +392,11 @@ def fit_field(
     between : bool, str or sequence of str
         Whether records come from different specimens, each of which has a factor with mean 1
         and the coefficient of variation ``between``. Names choose families of the factor
-        ('lognormal', 'normal', 'weibull'). True averages all of them.
+        ('lognormal', 'normal', 'weibull'). True averages all.
     quantity : str
         Measured quantity: 'strength', 'normal_pressure', 'friction_coefficient', ...
     bootstrap : int
-        Number of repetitions, at least 20, for each of three correlation lengths.
+        Repetitions, at least 20, for each of three correlation lengths.
     seed : int
         Seed for the repetitions.
     progress : bool or callable

@@ -1,4 +1,4 @@
-"""Infer parameters of a random interface from the peaks of repeated tests.
+"""Infer parameters of a random interface from peaks in repeated tests.
 
 Problem. Find the posterior p(theta | y) of parameters theta with a
 prior from measured peaks y.
@@ -16,9 +16,9 @@ Steps:
 2. Refuse peaks that lie beyond the bounds
    of the onset everywhere in the prior.
 3. If the method is expensive and the local criterion applies, first
-   find the posterior by the local criterion. The box of this posterior,
-   slightly widened, is the relevant part of the prior. Otherwise use
-   the whole prior.
+   find the posterior by the local criterion. The box around this posterior,
+   slightly widened, is the relevant part of the prior. Otherwise use the whole
+   prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on
    a grid (`posterior`).
 5. If the posterior reaches an end of the box, widen the box on this
@@ -75,8 +75,8 @@ from stiction.random.stresses import mean_in_stress
 LIKELY_FIELDS = 60
 """Fields within a specimen that represent all likely fields."""
 LITTLE_INFORMATION = math.log(4.0 / 3.0)
-"""Information on the scatter, nats, below which its prior decides: a uniform range would shrink
-by less than a quarter."""
+"""Information on the scatter, nats, below which its prior controls the result: a uniform range
+would shrink by less than a quarter."""
 TOLERABLE = 0.25
 """Monte Carlo error over the standard deviation of the posterior above which a note reports it."""
 NEVER = 1e-9
@@ -107,7 +107,7 @@ def infer(
     workers: Count | None = None,
     progress: Progress = True,
 ) -> Posterior:
-    """Infer parameters of the random strength from the peak stresses of repeated tests.
+    """Infer parameters of the random strength from peak stresses in repeated tests.
 
     With a fit, or without a `prior` of other parameters, the mean strength and its scatter
     between specimens are inferred. Otherwise the parameters in `prior` are.
@@ -137,7 +137,7 @@ def infer(
         Method that computes the onset. It may be left out if `random` is None: then it has no
         effect on a joint that is equal to the specimens.
     load_cell_error : float
-        Standard deviation of the error of a peak, in `unit` (SI if `Peaks` are given).
+        Standard error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
         Unit of peaks and error. Forces need an area, coefficients ("1") a normal pressure.
     samples : int, optional
@@ -183,7 +183,7 @@ def infer(
     >>> 0.5e6 < low < high < 0.75e6
     True
 
-    Profiles and peaks of one kind of surface, joined:
+    Profiles and peaks from one kind of surface, joined:
 
     >>> records = strength.sample(problem.interface, samples=3, seed=2)
     >>> fit = st.fit_field(records, problem.interface, marginal="beta", noise=0.0, bootstrap=20)
@@ -206,7 +206,7 @@ def infer(
             raise InputError("method: is needed with a random interface. Give st.Equilibrium()")
         method = Equilibrium()
     if random is None and of_parameters:
-        raise InputError("random: is None, so the prior can hold mean and between only")
+        raise InputError("random: was not given, so the prior can hold mean and between only")
     # Tests of a single length must be tests of the problem. A posterior
     # from several lengths holds for any problem.
     (length, *others), size = measured.lengths, problem.interface.measure
@@ -241,7 +241,7 @@ def infer(
 def _of_parameters(
     prior: Prior, simulation: Simulation, measured: Peaks, error: float
 ) -> Posterior:
-    """Return the posterior of the parameters in a prior (steps 2 to 5)."""
+    """Return the posterior for the parameters in a prior (steps 2 to 5)."""
     variable = variable_of(*prior.at(prior.middle), measured.unit)
     (experiment,) = experiments_at(prior, prior.middle, simulation.method)
     doubt_strengths(

@@ -1,4 +1,4 @@
-"""Likelihood of measured peaks, from simulated onsets on a grid of parameters.
+"""Likelihood of measured peaks, from simulated onsets on a parameter grid.
 
 Problem. Parameters theta of a random interface are unknown. Peaks y_j =
 T + error were measured on specimens with onset T. Compute the
@@ -198,7 +198,7 @@ def simulate(
 
 
 class Area(NamedTuple):
-    """Area of one kind of specimen, m². It is proportional to some parameters."""
+    """Area of a specimen, m². It is proportional to some parameters."""
 
     unit: float  # area if these parameters are 1
     sides: list[int]  # places of these parameters in the prior
@@ -286,7 +286,7 @@ class Likelihood:
         return result
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak for a kind of specimen at each point u (points, parameters)."""
+        """Draw a peak for a specimen type at each point u (points, parameters)."""
         rng = np.random.default_rng([seed, 1, kind])
         theta = self.prior.theta(u)
         shift, stretch = self.scales(kind, theta)
@@ -451,7 +451,7 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
 def bounds_of(
     experiment: Experiment, variable: str, negligible: float = 0.0
 ) -> tuple[float, float]:
-    """Return the least and the greatest possible peak. A `negligible` share may lie outside."""
+    """Return the least and the greatest possible peak. A `negligible` fraction may lie outside."""
     low, high = LimitState(experiment).likely_bounds(negligible)
     if variable == "critical_force":
         area = experiment.problem.area or math.nan

@@ -1,8 +1,8 @@
 """Fit marginals by maximum likelihood to values with measurement noise.
 
 Problem. Values y = x + e contain normal noise e with standard deviation
-s, and x has the distribution F from a family. Find the parameters of F
-that maximise the likelihood of y.
+s, and x has the distribution F from a family. Find the parameters of F that
+maximise the likelihood.
 
 Sources. The search uses Fisher's scoring with damping (Levenberg, 1944,
 Quarterly of Applied Mathematics 2, 164; Marquardt, 1963, SIAM Journal

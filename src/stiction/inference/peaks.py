@@ -1,4 +1,4 @@
-"""Measured peaks, validated and in SI units, with one array for each kind of specimen.
+"""Measured peaks, validated and in SI units, with one array for each specimen type.
 
 `make_peaks` is the door for all kinds of input: numbers with or without
 a unit, mappings from specimen lengths to numbers, tables of pandas, and
@@ -80,7 +80,7 @@ VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coef
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Peaks(Result):
-    """Peaks of repeated tests, by the length of the specimens.
+    """Peaks in repeated tests, by specimen length.
 
     Attributes
     ----------
@@ -95,9 +95,9 @@ class Peaks(Result):
         Normal force of each test (N), or normal stress (Pa), if
         coefficients were computed from them.
     specimens : tuple of arrays, optional
-        Name or number of the specimen of each test.
+        Name or number of each test's specimen.
     read : Reading, optional
-        File, column, unit and number of values, and what was left out.
+        File, column, unit, number of values, and what was left out.
     surfaces : int
         Number of friction surfaces that carry a slip load.
     loads : Peaks, optional
@@ -134,7 +134,7 @@ class Peaks(Result):
 
     @property
     def variable(self) -> str:
-        """Name of the measured quantity among the results of a method."""
+        """Name of the measured quantity in results."""
         return VARIABLES[self.unit]
 
     def _summary(self) -> Summary:
@@ -148,7 +148,7 @@ class Peaks(Result):
 
 
 def title_of(peaks: Peaks) -> str:
-    """Return the numbers of peaks, by the length of specimens."""
+    """Return the numbers of peaks, by specimen length."""
     pairs = zip(peaks.lengths, peaks.values, strict=True)
     kinds = [f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs]
     if peaks.loads is not None:
@@ -159,9 +159,10 @@ def title_of(peaks: Peaks) -> str:
 def by_specimen(peaks: Peaks) -> tuple[Peaks, float]:
     """Return the mean peak of each specimen, and its standard error from repeated slip loads.
 
-    The unit is a specimen: its slip loads say nothing about other specimens. Their pooled
-    coefficient of variation gives the error of a mean. If specimens have different numbers of
-    slip loads, the error is for their harmonic mean.
+    The unit is a specimen: its slip loads do not show how specimens differ.
+    Their pooled coefficient of variation gives the error in a mean. If
+    specimens have different numbers of slip loads, the error is for their
+    harmonic mean.
     """
     if peaks.specimens is None:
         return peaks, 0.0
@@ -225,7 +226,7 @@ def factor_of(unit: str, peaks: Any = None) -> float:
 
 
 def _in_si(given: Any, unit: str) -> Array:
-    """Return peaks for one kind of specimen in SI. A unit that the values carry is used."""
+    """Return peaks for one specimen type in SI. A unit that the values carry is used."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
     if si_of(stated or unit) != si_of(unit):
@@ -260,10 +261,10 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    A column is read if its heading, or the caller, says that it is the
-    wanted quantity; if more than one column could be it, none is read.
-    First plot the peaks in the order of the tests. Peaks that drift are
-    not a sample from one distribution.
+    A column is read if its heading, or the caller, says that it is the wanted
+    quantity. If several columns could be it, an error lists them. First plot
+    the peaks in the order of the tests. Peaks that drift are not a sample from
+    one distribution.
 
     Parameters
     ----------
@@ -278,14 +279,14 @@ def read_peaks(
         peak, COF, mu, Reibkraft, ... or the only column with numbers
         besides specimens, times and lengths.
     unit : str, optional
-        Unit of the peaks if the file does not state it. Forces are in N
+        Unit for the peaks if the file does not state it. Forces are in N
         or kN, friction coefficients in 1 or -.
     normal : str or float, optional
         Column of the normal force (or normal stress) of each test, or a
         number for all tests (N or Pa, or text such as "196 kN"). The
         result then holds friction coefficients, and keeps the forces.
     surfaces : int
-        Number of friction surfaces that share the force.
+        Number of friction surfaces that carry the force together.
     missing, decimal, skip, sheet
         As in `stiction.read_profile`. Tests without a peak are left out.
 

@@ -99,7 +99,7 @@ def grid_of(
 ) -> PosteriorGrid | None:
     """Return the posterior from a log density at points (points, parameters) in a box, or None.
 
-    The result is None if the density is zero at all points. If a cell
+    The result is `None` if the density is zero at all points. If a cell
     is narrower than the density, the midpoint rule converges faster
     than any power of the step.
     """
@@ -140,7 +140,7 @@ class Posterior(WithFactors, Result):
         Draws of each parameter, in the unit of the parameter.
     information : dict of float
         Kullback-Leibler divergence between the marginal
-        posterior of a parameter and its prior, nats.
+        posterior for a parameter and its prior, nats.
         Halving a uniform range gives ln 2 = 0.69.
     log_evidence : float
         Logarithm of the density of the peaks under the prior, for the
@@ -182,12 +182,12 @@ class Posterior(WithFactors, Result):
 
     @property
     def inferred(self) -> tuple[str, ...]:
-        """Keys of the parameters that measurements changed. The others were stated."""
+        """Parameter keys that measurements changed. The others were stated."""
         return self.names
 
     @property
     def families(self) -> dict[str, float]:
-        """Posterior probability of each family of the scatter between specimens, if inferred."""
+        """Posterior probability for each distribution between specimens, if inferred."""
         return {}
 
     @cached_property
@@ -253,7 +253,7 @@ class Posterior(WithFactors, Result):
 
     @cached_property
     def predicted(self) -> tuple[Array, ...]:
-        """Peaks of further tests: for each kind of specimen, one peak for each draw."""
+        """Peaks of further tests: for each specimen type, one peak for each draw."""
         kinds = range(len(self.peaks.values))
         return tuple(self.likelihood.predicted(i, self.u, self.seed) for i in kinds)
 
@@ -280,11 +280,11 @@ class SpecimenPosterior(Posterior):
 
     Attributes
     ----------
-    families : dict of str to float
-        Posterior probability of each family for the factor between specimens.
+    families : dict from str to float
+        Posterior probability for each distribution between specimens.
     agreement : Agreement or None
         Agreement of the peaks with the prediction from the profiles
-        alone. None without profiles.
+        alone. `None` without profiles.
     """
 
     grid: FactorGrid = field(repr=False, compare=False)
@@ -298,14 +298,14 @@ class SpecimenPosterior(Posterior):
 
     @property
     def inferred(self) -> tuple[str, ...]:
-        """Keys of the parameters that measurements changed. The others were stated."""
+        """Parameter keys that measurements changed. The others were stated."""
         if self.grid.profiles.levels.size or len(self.grid.profiles.fields) > 1:
             return self.names
         return MEAN_KEY, SCATTER_KEY
 
     @property
     def families(self) -> dict[str, float]:
-        """Posterior probability of each family for the factor between specimens."""
+        """Posterior probability for each distribution between specimens."""
         return self.grid.families
 
     @cached_property
@@ -429,7 +429,7 @@ class SpecimenPosterior(Posterior):
         notes = [
             *summary.notes,
             *self.assumptions,
-            f"families of the factor between specimens: {shares}",
+            f"distributions between specimens: {shares}",
         ]
         if self.agreement is not None:
             p = min(self.agreement.p_values.values())

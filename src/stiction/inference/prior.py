@@ -40,7 +40,7 @@ class Prior:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Keys of the parameters, in order."""
+        """Parameter keys, in order."""
         return tuple(self.distributions)
 
     @property

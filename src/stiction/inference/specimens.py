@@ -17,9 +17,9 @@ In the steps, x = log(m b/reference) is the log strength of one specimen:
 1. Simulate onsets T of each field at the reference mean. This is
    sufficient if T(c)/c does not depend on c. Otherwise simulate at
    `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
-2. Tabulate the likelihood of each measured number as a function of x:
-   the normal density of the logarithm of a level, or the density of
-   simulated onsets at a peak (`stiction.inference.density`).
+2. Tabulate the likelihood of each measured number over x:
+   the normal density for the logarithm of a level, or the density of simulated
+   onsets at a peak (`stiction.inference.density`).
 3. Choose `SCATTER_CELLS` values of s at equal steps of its prior
    probability, and `MEAN_CELLS` values of log m. The likelihood of a
    number at (family, s, m) is the integral of step 2 over the density
@@ -146,7 +146,7 @@ class FactorPrior(NamedTuple):
         return prior
 
     def cells(self) -> Array:
-        """Return SCATTER_CELLS values of s at equal steps of prior probability."""
+        """Return SCATTER_CELLS values of s at equal steps in prior probability."""
         low, high = self.scatter.cdf([0.0, MOST_CV])
         shares = low + (high - low) * (np.arange(SCATTER_CELLS) + 0.5) / SCATTER_CELLS
         return np.maximum(self.scatter.ppf(shares), LEAST_CV)
@@ -202,7 +202,7 @@ def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomI
 
 @dataclass(frozen=True, eq=False)
 class Onsets:
-    """Onsets divided by mean strength for one kind of specimen, by field, and their densities."""
+    """Onsets divided by mean strength for one specimen type, by field, and their densities."""
 
     at: Array  # logarithms of c over the reference, (steps,)
     ratios: Array  # T(c) over c/reference, (fields, steps, samples)
@@ -281,7 +281,7 @@ class FactorGrid:
 
     @property
     def families(self) -> dict[str, float]:
-        """Posterior probability of each family of the factor."""
+        """Posterior probability for each distribution between specimens."""
         masses = self.mass.sum(axis=(0, 2, 3)).tolist()
         return dict(zip(self.profiles.families, masses, strict=True))
 
@@ -407,11 +407,11 @@ class Tables:
     peaks: tuple[Array, ...]
 
     def of(self, peaks: Sequence[Array], kinds: Sequence[int]) -> Self:
-        """Return the tables for other peaks of some kinds of specimens."""
+        """Return the tables for other peaks of some specimen types."""
         return replace(self, peaks=tuple(peaks), onsets=tuple(self.onsets[k] for k in kinds))
 
     def ranges(self) -> list[tuple[float, float, float]]:
-        """Return the range of x to tabulate for each kind of peaks."""
+        """Return the range of x to tabulate for each kind."""
         pairs = zip(self.onsets, self.peaks, strict=True)
         return [kind.ranges(peaks, self.error) for kind, peaks in pairs if peaks.size]
 
@@ -440,7 +440,7 @@ class Tables:
         return densities
 
     def predicted(self, kind: int, u: Array, seed: int) -> Array:
-        """Draw a peak for a kind of specimen for each draw (draws, 4)."""
+        """Draw a peak of one specimen type for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
         # A further specimen has its own factor
@@ -456,7 +456,7 @@ class Tables:
     def quantile(
         self, grid: FactorGrid, probability: float, family: str | None = None
     ) -> float:
-        """Return the peak of a further specimen, of the first kind, at a probability.
+        """Return the peak of a further specimen (first kind) at a probability.
 
         The predictive distribution is the mean over field, onset and
         grid, or over the part of the grid with one `family` of the
@@ -474,7 +474,7 @@ class Tables:
     def distribution(
         self, grid: FactorGrid, family: str | None = None
     ) -> tuple[Callable[[float], float], tuple[float, float]]:
-        """Return the probability below the logarithm of a peak, and a range of logarithms."""
+        """Return the probability below a log peak, and a range of log peaks."""
         if family is not None:
             place = self.profiles.families.index(family)
             mass = np.zeros_like(grid.mass)
@@ -508,7 +508,7 @@ class Tables:
 
 
 class Prediction(NamedTuple):
-    """Distribution of the onset of one further specimen, from a posterior on a grid."""
+    """Distribution of the onset in a further specimen, from a posterior on a grid."""
 
     tables: Tables
     grid: FactorGrid
@@ -529,7 +529,7 @@ class Prediction(NamedTuple):
         return chance(math.log(stress * self.tables.onsets[0].area))
 
     def characteristic(self, draws: Array, probability: float, confidence: float) -> float:
-        """Return the stress, Pa, above whose quantile a share `confidence` of draws lies.
+        """Return the stress, Pa, whose quantile is higher in a fraction `confidence` of the draws.
 
         Fields are uniform, and `draws` are (draws, 4).
         """
@@ -611,7 +611,7 @@ def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]
 def tables_of(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
 ) -> Tables:
-    """Return the likelihood of peaks, from simulated onsets of each kind of specimen (step 1)."""
+    """Return the likelihood of peaks, from onsets simulated for each specimen type (step 1)."""
     variable = variable_of(problem, profiles.fields[0], measured.unit)
     kinds = [
         _onsets(
@@ -633,7 +633,7 @@ def _onsets(
     error: float,
     variable: str,
 ) -> Onsets:
-    """Return the onsets of all fields for a kind of specimen. Its `peaks` need not be measured."""
+    """Return the onsets of all fields for a specimen type. Its `peaks` need not be measured."""
     method, meter, workers = simulation.method, simulation.meter, simulation.workers
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
     samples = 1 if profiles.whole else samples

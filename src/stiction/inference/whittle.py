@@ -17,18 +17,17 @@ Statistical Society B 84,
 Steps:
 
 1. Average the periodograms of all records with the same geometry (`window`).
-2. The correlation of the values is a power series in the correlation of
-   z, whose coefficients are the squared Hermite coefficients of the
-   map. White noise adds its variance at zero lag.
+2. The correlation of the values is a power series in the correlation of z. Its
+   coefficients are the map's squared Hermite coefficients. White noise adds its
+   variance at zero lag.
 3. E_k follows exactly from this correlation and the window. The
    variance is a free parameter, so that its error in a short record
    does not disturb the shape of the spectrum.
-4. Add a floor of a thousandth of the highest power to I_k
-   and E_k. A truncated spectrum has almost no power at
-   high wavenumbers, and without a floor, rounding and
-   higher orders of the map would matter there. The score
-   stays unbiased, and power below the floor has no effect.
-5. Start at the best point of a coarse grid of parameters, and climb by
+4. Add a thousandth of the highest power to I_k and E_k. A truncated spectrum
+   has almost no power at high wavenumbers, and without a floor, rounding and
+   higher orders of the map would matter there. The score stays unbiased, and
+   power below the floor has no effect.
+5. Start at the best point of a coarse parameter grid, and climb by
    scoring (`marginal_fit.climb`). Fisher's information is sum w d d^T
    with d = d log E/d theta.
 
@@ -56,7 +55,7 @@ RANGES = {
     "variance": (1e-200, 1e200),
     "exponent": (0.65, 16.0),  # above, a power law looks like a squared exponential
     "anisotropy": (0.05, 20.0),
-    # A negative share means less power at high wavenumbers than the
+    # A negative fraction means less power at high wavenumbers than the
     # field alone has, by chance. If it were cut at zero, the errors of
     # small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
@@ -85,7 +84,7 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the shares of the variance in Hermite orders 0, 1, ... The last share is the rest."""
+    """Return the fractions of the variance in Hermite orders 0, 1, ... The last one is the rest."""
     shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
@@ -115,7 +114,7 @@ def periodograms_of(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> l
 
 
 class Model(NamedTuple):
-    """Prediction of records from a spectrum, the Hermite shares of a marginal and noise.
+    """Prediction of records from a spectrum, the Hermite fractions of a marginal and noise.
 
     `end_seen` states whether the truncation of the spectrum was given.
     If not, the truncation is left out: it lies at a multiple of 1/xi_0,
@@ -132,7 +131,7 @@ class Model(NamedTuple):
 
     @property
     def noise(self) -> float:
-        """Standard deviation of the measurement noise."""
+        """Standard deviation due to measurement noise."""
         return math.sqrt(self.noise_share * self.variance)
 
     def power(self, window: RecordWindow) -> Array:
@@ -161,7 +160,7 @@ def offset(name: str) -> float:
 
 
 def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
-    """Return the name of a family of spectra and its fixed parameters, after checks."""
+    """Return the name and the fixed parameters of a spectrum family, after checks."""
     table = family_table(given)
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
@@ -179,7 +178,7 @@ class SpectrumFamily:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Names of the free parameters in the order of the vector."""
+        """Names of the free parameters, as in the vector."""
         known: dict[str, Any] = self.fixed | {"anisotropy": self.anisotropy}
         known["noise_share"] = self.noise
         absent = ("exponent",) if self.name != "power_law" else ()
@@ -188,7 +187,7 @@ class SpectrumFamily:
 
     @cached_property
     def limits(self) -> Array:
-        """Ends of the ranges on the scale of the search, with shape (parameters, 2)."""
+        """Ends of the ranges on the search scale, with shape (parameters, 2)."""
         ranges = RANGES | {"correlation_length": self.lengths}
         ends = zip(*[ranges[name] for name in self.free], strict=True)
         return np.transpose([self.vector(end) for end in ends])
@@ -199,7 +198,7 @@ class SpectrumFamily:
             n: float(v) if n == "noise_share" else offset(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
         }
-        # A known noise has a share that depends
+        # A known noise has a fraction of the variance that depends
         # on the variance of the values.
         variance = values.pop("variance")
         anisotropy = values.pop("anisotropy", self.anisotropy or 1.0)
@@ -228,7 +227,7 @@ class SpectrumFamily:
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
 
     def at_end(self, model: Model) -> dict[str, float]:
-        """Return the parameters of the spectrum that lie at an end of their range."""
+        """Return the spectrum parameters that lie at an end of their range."""
         # The scale of the search is logarithmic, so both ends count alike.
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
@@ -237,7 +236,7 @@ class SpectrumFamily:
 
 
 class Whittle(NamedTuple):
-    """The likelihood of periodograms, given the parameter vector of a family."""
+    """The likelihood of periodograms, given a parameter vector."""
 
     family: SpectrumFamily
     shares: Array
@@ -255,7 +254,7 @@ class Whittle(NamedTuple):
         return value
 
     def coarse(self) -> Array:
-        """Return the best point on a coarse grid of parameters (step 5)."""
+        """Return the best point on a coarse parameter grid (step 5)."""
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
         windows = [group.window for group in self.observed]
@@ -306,7 +305,7 @@ class Whittle(NamedTuple):
         result, information = np.zeros(at.size), np.zeros((at.size, at.size))
         for group, signal in zip(self.observed, signals, strict=True):
             expected = model.expectation(group.window, signal)
-            # If the noise is known, its share falls as the variance grows.
+            # If the noise is known, its fraction falls as the variance grows.
             slopes = {
                 "variance": expected if family.noise is None else model.variance * signal,
                 "noise_share": model.variance * (group.window.white - signal),

@@ -117,7 +117,7 @@ class RecordWindow:
         self.weights[(0,) * unit.ndim] = 0.0
 
     def products(self, weights: Array) -> Array:
-        """Return, for each lag, the sum of w_i w_j over pairs of measured points."""
+        """Return, for each lag, the sum of w_i w_j over measured pairs."""
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights
         return fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
@@ -192,7 +192,7 @@ class RecordWindow:
         return total
 
     def variance_of_mean(self, covariance: Array) -> float:
-        """Return the variance of the mean of the measured values, from the covariance."""
+        """Return the variance of the measured mean, from the covariance."""
         return float(np.sum(self.pairs * covariance) / np.sum(self.measured) ** 2)
 
     def taken_by_trend(self, covariance: Array) -> float:

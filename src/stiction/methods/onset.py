@@ -66,8 +66,8 @@ def relative_differences(stress: Array, exact: Array) -> Array:
 def doubt(method: Method, differences: Mapping[str, tuple[float, float]]) -> str | None:
     """Return a warning if the mean or scatter of a difference is above 1 %, otherwise `None`.
 
-    `differences` maps a description of samples to the mean and scatter
-    of relative differences.
+    `differences` maps a description of samples to their mean relative
+    difference and its scatter.
     """
     if not any(abs(size) > MAX_DIFFERENCE for pair in differences.values() for size in pair):
         return None
@@ -176,7 +176,7 @@ def _compare(problem: Problem, method: Method, sample: Sample, stress: Array) ->
     The exact method solves as many samples as take
     `COMPARISON_SECONDS`, at most `MAX_COMPARED`.
     """
-    # The cost decides how many samples are compared, and the quick test
+    # The cost determines how many samples are compared, and the quick test
     # whether any are.
     exact = exact_counterpart(problem, method)
     if exact is None:

@@ -56,11 +56,11 @@ class Method(Protocol):
 
     @property
     def type(self) -> str:
-        """Name of the method in study files."""
+        """Method name in study files."""
 
     @property
     def label(self) -> str:
-        """Name of the method in figures, tables and progress."""
+        """Method name in figures, tables and progress."""
 
     def variables(self, problem: Problem) -> Mapping[str, Variable]:
         """Return the variables in the solver's results. Each has 'sample' as first dimension.
@@ -69,13 +69,13 @@ class Method(Protocol):
         """
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the time, s, that a sample takes on a core, within a factor of three."""
+        """Return the time, s, that a sample takes on a core, to within a factor of three."""
 
     def supports(self, problem: Problem) -> list[str]:
         """Return the reasons why the method cannot solve a problem, or an empty list."""
 
     def prepare(self, problem: Problem) -> Solver:
-        """Return a solver for samples. Quantities that all samples share are computed here."""
+        """Compute the quantities that are the same for all samples, and return a solver."""
 
 
 class OptionalMembers:

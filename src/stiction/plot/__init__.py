@@ -7,7 +7,7 @@ the style of a printed page. `film` writes a file and returns its path.
 
 Units suit the size of the numbers, such as mm and µs, or km and s. If
 the problem has a normal pressure, friction coefficients are also drawn.
-All files share `axes`. The files `fields`, `specimens`,
+All files use `axes`. The files `fields`, `specimens`,
 `ruptures`, `distributions` and `fits` each draw one kind of result.
 """
 

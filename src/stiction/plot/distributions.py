@@ -35,7 +35,7 @@ FEWEST = 20
 """Values above which a density is estimated. Fewer values are marked separately."""
 DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
-"""Probability that stands for zero on a logarithmic scale."""
+"""Probability in place of zero on a logarithmic scale."""
 
 
 def monte_carlo(
@@ -255,7 +255,7 @@ def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        The scale at the top shows forces if the area of the interface
+        The scale at the top shows forces if the interface area
         is known, or else friction coefficients if there is a normal
         pressure. A dotted line marks the lower bound of the strength.
         For equally likely interfaces, the curve is their mean, and a

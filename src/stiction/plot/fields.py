@@ -1,4 +1,4 @@
-"""Figures of profiles along a line and maps of a plane, with onsets."""
+"""Figures of profiles along a line and maps on a plane, with onsets."""
 
 import math
 from collections.abc import Mapping

@@ -18,7 +18,7 @@ from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style
 
 SHOWN = 100
-"""Repetitions, or simulated records, behind a band that contains 90 % of them."""
+"""Repetitions, or simulated records, from which a band is drawn that contains 90 % of them."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 PER_OCTAVE = 4
@@ -42,8 +42,7 @@ def fit(result: FieldFit) -> NDArray[Any]:
         fit, (c) correlation, with the effect of the window, and (d)
         spectrum. The bands come from records that were simulated from
         the fitted field. In (a) and (b) they contain 90 % of the fits
-        to such records. In (c) and (d) they contain 90 % of the sets of
-        such records.
+        to such records. In (c) and (d) they contain 90 % of such sets.
     """
     rng = np.random.default_rng(0)
     estimate = result._estimate
@@ -106,7 +105,7 @@ def _powers(observed: list[Observed]) -> list[Array]:
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
     """Return the correlation in the windows at lags (m). Records are weighted by their size.
 
-    A record counts at lags up to half of its length, because its period
+    A record counts at lags up to half its length, because its period
     repeats lags beyond.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)

@@ -200,7 +200,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     draw_map(axes, interface, strength * factor, text, cmap=STRENGTH)
     since, begin = _since_onset(run, "arrival_time")
     scale, time_unit = unit_for("s", since)
-    # Beside the ends of an interface, nodes
+    # Next to the ends of an interface, nodes
     # creep long after the front has passed.
     after = since[since > 0.0]
     latest = scale * float(np.quantile(after, FRONT_SHARE)) if after.size else 0.0

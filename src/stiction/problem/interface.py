@@ -167,7 +167,7 @@ class Interface(Listed):
         first is the period along x, the direction of load and slip, and
         the second is the period along y.
     nodes : int or (int, int)
-        Number of nodes in each direction, even and at least 8, at most
+        Node count in each direction, even and at least 8, at most
         2^24 in all. Powers of two are fastest.
     width : float, optional
         Width of a line, m, which turns its stresses into forces, N. A
@@ -336,7 +336,7 @@ class Interface(Listed):
 
     @cached_property
     def is_free(self) -> bool:
-        """Whether the interface ends, as in a specimen, instead of being periodic."""
+        """Whether the interface ends, as in a specimen, rather than being periodic."""
         return self.ends == "free"
 
     @cached_property
@@ -358,7 +358,7 @@ class Interface(Listed):
 
     @cached_property
     def shape(self) -> tuple[int, ...]:
-        """Number of nodes in each direction, which is the shape of a profile."""
+        """Node count in each direction, which is the shape of a profile."""
         return self.nodes if isinstance(self.nodes, tuple) else (self.nodes,)
 
     @cached_property
@@ -373,12 +373,12 @@ class Interface(Listed):
 
     @cached_property
     def axes(self) -> tuple[int, ...]:
-        """Axes of the nodes of profiles (..., *shape), counted from the last."""
+        """Axes of the nodes in profiles (..., *shape), counted from the last."""
         return tuple(range(-len(self.shape), 0))
 
     @cached_property
     def size(self) -> int:
-        """Total number of nodes."""
+        """Total node count."""
         return math.prod(self.shape)
 
     @cached_property
@@ -429,7 +429,7 @@ class Interface(Listed):
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
-        """Components of the wave vectors of `transform`, rad/m.
+        """Components of the wave vectors in `transform`, rad/m.
 
         They broadcast to the shape of a transformed profile: (n//2 + 1,) on a line, (nx,
         1) and (1, ny//2 + 1) on a plane.
@@ -449,7 +449,7 @@ class Interface(Listed):
 
     @property
     def in_plane_share(self) -> Array:
-        """Fraction of mode II, (kx/k)², at each wave vector of a plane. The rest is mode III.
+        """Fraction of mode II, (kx/k)², at each wave vector on a plane. The rest is mode III.
 
         The constant mode counts as mode II. On a line the fraction is 1,
         because the problem sets the mode.

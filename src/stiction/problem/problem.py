@@ -55,7 +55,7 @@ class Problem(Listed):
         In-plane or anti-plane shear. A plane is in-plane along x and
         anti-plane along y.
     specimen : Blocks or Slider, optional
-        Finite bodies instead of half-spaces. Their drive determines the
+        Finite bodies rather than half-spaces. Their drive determines the
         load profile. The interface ends with the blocks or the slider
         (`interface.ends` is "free"). tau_0 is the mean stress that the
         drive would cause without slip. `solid` is a slider's material.
@@ -231,7 +231,7 @@ class Problem(Listed):
 
     @property
     def has_machine(self) -> bool:
-        """Whether a machine of finite stiffness drives the specimen. Slip then lowers its force."""
+        """Whether an elastic machine drives the specimen. Slip then lowers its force."""
         return self.specimen is not None and self.specimen.drive.stiffness > 0.0
 
     def released_stress(self, slip: Array) -> Array:
@@ -244,7 +244,7 @@ class Problem(Listed):
     def relief(self, slip: Array) -> float:
         """Return by how much a slip (m, flattened) lowers the mean stress, Pa.
 
-        A machine of finite stiffness loses force when the interface
+        A machine with finite stiffness loses force when the interface
         slips, and nodes beyond the extent take over stress. The mean
         covers the nodes that can break, and is divided by the mean of
         their load profile.

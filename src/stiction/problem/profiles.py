@@ -176,8 +176,8 @@ def read_profile(
 ) -> xr.DataArray:
     """Read a profile along the interface from a file or a labelled array, in SI units.
 
-    A column is read if its heading, or the caller, says that it is the
-    wanted quantity; if more than one column could be it, none is read.
+    A column is read if its heading, or the caller, says that it is the wanted
+    quantity. If several columns could be it, an error lists them.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def read_profile(
     skip : int
         Number of lines or rows to pass over before the headings.
     sheet : int or str
-        Number (from 0) or name of the sheet of a workbook.
+        Number (from 0) or name of a sheet in the workbook.
     interface : Interface, optional
         Map the profile to the nodes x_i = i L/n, modulo L. Points may have any
         order, and no point may be missing. Without an interface, missing values stay

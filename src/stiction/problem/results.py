@@ -56,7 +56,7 @@ def onset_variables(interface: Interface) -> dict[str, Variable]:
 
 
 def coordinate(interface: Interface, dim: str) -> tuple[NDArray[Any], Variable]:
-    """Return the values and the meaning of a dimension of the interface."""
+    """Return the values and the meaning of an interface dimension."""
     if dim == DIRECTION:
         return np.array(interface.dims), Variable("", "direction of a component", (DIRECTION,))
     what = f"position along {dim}" if interface.is_plane else "position along the interface"

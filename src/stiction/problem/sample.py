@@ -9,7 +9,7 @@ L/n, and the profile stops at its ends. The steps are:
    the points from the nodes, as a fraction of the spacing, and warn
    about it. Number the node of each point. Refuse points that do not
    lie on nodes, and two different values at a node.
-2. Check shape and values (`as_rows`): (samples, *shape), none missing.
+2. Check shape and values (`as_rows`): (samples, *shape), without gaps.
 3. Check that each value is given once (`given_twice`).
 4. Fill in what the problem gives, check that the profiles fit together,
    and return a `Sample` (`made`).
@@ -99,7 +99,7 @@ class Sample(Result, _Profiles):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of nodes in each direction."""
+        """Node count in each direction."""
         return self.load_profile.shape
 
     @property
@@ -343,8 +343,8 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
 def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     """Return messages about values that profiles or random properties would replace.
 
-    There are also messages about values that are given in neither
-    place. In the messages, `owner` stands before the names.
+    There are also messages about values that are missing in both places. In the
+    messages, `owner` precedes the names.
     """
     twice = [
         f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"

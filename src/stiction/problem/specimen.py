@@ -66,7 +66,7 @@ class Platen(Listed):
     Parameters
     ----------
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks,
+        Machine stiffness between the grips of the two blocks,
         N/m. 0 is a dead load (the force is controlled).
         ``float("inf")`` is a rigid machine (the travel is controlled).
     mass : float
@@ -81,24 +81,24 @@ class Platen(Listed):
 
 @model(kw_only=True)
 class Pusher(Listed):
-    """A uniform traction on a side of a slider, or on one or both sides of each of two blocks.
+    """A uniform traction on a side of a slider, or on one or both sides of two blocks.
 
     The top faces of pushed blocks lie on rollers.
 
     Parameters
     ----------
     height : float
-        Height of the middle of the pusher above the interface, m. The
+        Height of the pusher's middle above the interface, m. The
         pusher may be anywhere on the side, up to the top and down to
         the interface.
     width : float
         Extent of the pusher along the side, m.
     side : {"left", "right", "both"}
         The trailing side, from which slip is driven. Two pushers (of
-        blocks only) share the force equally. This is the shear of a lap
+        blocks only) each apply half the force. This is the shear of a lap
         joint. Its bending, and its change of pressure, are not modelled.
     stiffness : float
-        Stiffness of the machine between the grips of the two blocks, or
+        Machine stiffness between the grips of the two blocks, or
         behind the slider, N/m (see `Platen`).
     mass : float
         Mass, kg, that moves with the pushers of a block (see `Platen`).
@@ -164,7 +164,7 @@ class Blocks(Listed):
     Parameters
     ----------
     height : float
-        Height of each block, m. Its length is the length of the interface.
+        Height of each block, m. Its length is the interface length.
     thickness : float, optional
         Depth, m, which turns stresses into forces, N. A machine of
         finite stiffness needs it.
@@ -269,7 +269,7 @@ class Slider(Listed):
     Parameters
     ----------
     height : float
-        Height of the slider, m. Its length is the length of the interface.
+        Height of the slider, m. Its length is the interface length.
     thickness : float, optional
         Depth, m, which turns stresses into forces, N. A machine of
         finite stiffness needs it.
@@ -320,7 +320,7 @@ class Slider(Listed):
 
     @property
     def machine(self) -> float:
-        """Stiffness of the machine per unit depth, Pa."""
+        """Machine stiffness per unit depth, Pa."""
         return self.drive.stiffness / (self.thickness or 1.0)
 
     @property
@@ -400,7 +400,7 @@ class Slider(Listed):
         """Return the local pressure of the pressing over its mean, for peak slips and energies.
 
         Refuse friction coefficients (samples, nodes) for which the path
-        is not defined. Coupling must not let the slip of a node shear
+        is not defined. Coupling must not let the slip at a node shear
         other nodes forwards, and the slider must not topple before it
         slides.
         """

@@ -5,7 +5,7 @@ Problem
 A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard
 normal a. The property is v(x) = F^-1(Phi(z(x))) with the marginal F. Values v_k
 were measured at places x_k, with normal errors of standard deviation `noise`.
-With phi_k = phi(x_k), the posterior of the draws has a density proportional to
+With phi_k = phi(x_k), the posterior for the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
@@ -34,7 +34,7 @@ Intelligence 17, 2001), followed by an estimate of the skewness that Gaussians m
    With the rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1
    + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
    densely. If some p_k are negative, V is turned so that P is diagonal in it, and
-   s^2 stands for the eigenvalues of P^-1 - 1, which may be negative.
+   s^2 are the eigenvalues of P^-1 - 1, which may be negative.
 4. Remove the Gaussian of each place from the posterior. The result,
    called the cavity, is the mean and variance of z_k given all other
    values (`_from_others`).
@@ -49,7 +49,7 @@ Intelligence 17, 2001), followed by an estimate of the skewness that Gaussians m
 The algorithm departs from Minka in three points. All places are updated
 at once. If the Gaussians have no posterior (P is not positive
 definite), b and p are reduced by a common factor. In step 4 each place
-keeps at least half of the precision that it has without measurements.
+keeps at least half the precision that it has without measurements.
 """
 
 from collections.abc import Iterator
@@ -81,7 +81,7 @@ MAX_ERRORS_OUTSIDE = 4.0  # errors by which a measured value may lie beyond a bo
 MAX_Z = 37.0  # largest z whose tail of the normal distribution is a float
 HALF_WIDTH = 8.0  # half a range, in standard deviations
 RANGE_NODES = 49  # across a range
-MIN_END_FALL = 18.0  # fall of a log density from its peak to the ends of a complete range
+MIN_END_FALL = 18.0  # drop of a log density from its peak to the ends of a complete range
 MAX_NARROWINGS = 6  # of a range around a peak, each to two of its intervals at least
 MIN_HALF_RANGE = 1e-12
 LOG_OF_IMPOSSIBLE = -1e9  # lowest logarithm of a likelihood
@@ -156,7 +156,7 @@ Points = Annotated[Any, BeforeValidator(_points), PlainSerializer(_table)]
 
 @model
 class Conditions:
-    """Measured values and their standard error, in the unit of the field."""
+    """Measured values and their standard error, in the field's unit."""
 
     profile: Points
     noise: Positive
@@ -207,7 +207,7 @@ class Measured(NamedTuple):
     phi: Array  # (places, dimension)
 
     def by_marginal(self, of_places: Array) -> Iterator[tuple[Any, Array]]:
-        """Yield the marginal of each property, with its part of an array (places, ...)."""
+        """Yield each property's marginal, with its part of an array (places, ...)."""
         marginals, counts = zip(*self.properties, strict=True)
         return zip(marginals, np.split(of_places, np.cumsum(counts)[:-1]), strict=True)
 
@@ -295,7 +295,7 @@ class Conditioning(NamedTuple):
 
     regression: Regression
     # Largest errors over all places: of the mean of z in standard
-    # deviations, and of the standard deviation as a share of it.
+    # deviations, and of the standard deviation, as a fraction.
     error: tuple[float, float]
     misfit: float  # squared, of values and of draws at the mean of the posterior
     points: int

@@ -3,7 +3,7 @@
 `EquallyLikely` is the only protocol for random inputs, so that one search
 for failures covers all members. For several members:
 
-1. Collect the draws of all members. Members share a draw for the same
+1. Collect the draws of all members. Members use one draw for the same
    property and mode (`_shared`).
 2. A first draw, mapped to a uniform number, selects the member
    (`EquallyLikely.member`).
@@ -46,7 +46,7 @@ MEMBER_STREAM = Stream(2000, SAMPLES_PER_BLOCK, FIRST_DRAW)
 """Stream of the draw that selects a member."""
 
 FORM_SHARES = np.array([0.05, 0.5, 0.95])
-"""Shares whose quantiles over the mean tell marginals apart."""
+"""Probabilities whose quantiles over the mean tell marginals apart."""
 FIRST_MEMBERS, MAX_MEMBERS = 1_000, 8_000
 """Number of members drawn from a source at first, and at most."""
 
@@ -95,9 +95,9 @@ else:
 class EquallyLikely:
     """One random interface, or several that are equally likely: the random input of every method.
 
-    Of several, the first draw of a sample selects the member. Members
-    share the other draws: a property and a mode have the same draw in
-    every member. If a sample changes its member, its profiles keep
+    If there are several, the first draw of a sample selects the member. The
+    other draws are the same for all members: a property and a mode have one draw.
+    If a sample changes its member, its profiles keep
     their form. A single member has no such draw, and its draws are
     those of the interface.
     """
@@ -148,7 +148,7 @@ class EquallyLikely:
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
-        """Number of the kind of each member. Members with equal fields are of the same kind."""
+        """Kind of each member, as a number. Members with equal fields are of the same kind."""
         return _numbered([tuple(member.properties.items()) for member in self.members])[1]
 
     @cached_property

@@ -56,8 +56,8 @@ from stiction.random.synthesis import FACTORS, NAMES, Modes, draws_of, layout, m
 MAY_BE_COEFFICIENTS = ("strength", "residual_strength", "initial_stress")
 FACTOR = "between."  # begins the name of a factor among profiles, if its property is not random
 # Limits of warnings
-MAX_UNRESOLVED = 0.01  # share of the variance that the grid does not resolve
-MAX_MEAN_SHARE = 0.075  # share of the variance that the mean mode would hold
+MAX_UNRESOLVED = 0.01  # fraction of the variance that the grid does not resolve
+MAX_MEAN_SHARE = 0.075  # fraction of the variance that the mean mode would hold
 MAX_CORRELATION_ERROR = 0.01
 
 
@@ -116,7 +116,7 @@ class RandomField(Listed):
 
     @property
     def mean(self) -> float:
-        """Mean of the field, in its unit (Pa for strength)."""
+        """Field mean, in its unit (Pa for strength)."""
         return float(self.marginal.distribution.mean())
 
     @property
@@ -140,7 +140,7 @@ class RandomField(Listed):
         Parameters
         ----------
         profile : xarray.DataArray over x (m), on a plane over x and y
-            Values at any places, in the unit of the field. NaN is missing.
+            Values at any places, in the field's unit. NaN is missing.
         noise : float
             Standard deviation of the measurement error, in this unit.
         """
@@ -170,7 +170,7 @@ class RandomField(Listed):
     def sample(
         self, interface: Interface, *, samples: int = 1, seed: int = 0, first: int = 0
     ) -> Array:
-        """Return sampled profiles (samples, *shape) in the unit of the field.
+        """Return sampled profiles (samples, *shape) in the field's unit.
 
         Sample i depends on the seed and on i only. An `AccuracyWarning`
         says if the grid is too coarse for the spectrum, or the interface
@@ -225,7 +225,7 @@ class RandomField(Listed):
 
     def _map_coefficients(self) -> Array:
         coefficients = hermite_coefficients(self.marginal)
-        # The last coefficient stands for the
+        # The last coefficient represents the
         # terms that the expansion leaves out.
         error = float(coefficients[-1] ** 2 / np.sum(coefficients[1:] ** 2))
         if error > MAX_CORRELATION_ERROR:
@@ -411,7 +411,7 @@ class RandomInterface(Listed):
 
     @property
     def matrix(self) -> Array:
-        """Correlation matrix of the properties, in the order of `names`."""
+        """Correlation matrix of the properties, in the order `names`."""
         matrix = np.eye(len(self.names))
         for first, coefficients in (self.correlation or {}).items():
             for second, rho in coefficients.items():

@@ -17,7 +17,7 @@ with the orthonormal Hermite polynomials h_m of a standard normal Z.
 
 Algorithm of the mapping (`from_normal`): our own
 -------------------------------------------------
-1. Reduce the marginal to scale 1, so that all multiples share a table
+1. Reduce the marginal to scale 1, so that all multiples use the same table
    (`_standard`).
 2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4],
    with slopes by central differences of fourth order. Check every piece
@@ -65,7 +65,7 @@ PIECES_PER_UNIT = 256
 """Number of pieces per unit of z."""
 TABLE_RTOL = 2e-10  # at three points of a piece, so that 1e-9 holds everywhere
 MIN_TERMS, MAX_TERMS, HERMITE_STEP = 40, 1000, 0.0025
-MAX_REST = 1e-6  # share of the variance for which the last coefficient may stand
+MAX_REST = 1e-6  # fraction of the variance that the last coefficient may represent
 
 
 def quantile_of_normal(distribution: Any, z: Array) -> Array:
@@ -139,7 +139,7 @@ def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
         axis=1
     )
     # A NaN slope marks the piece, and the
-    # piece before it, which shares the node.
+    # piece before it, which has the same node.
     result = table.copy()
     result[:-1][wrong, 1] = np.nan
     result.flags.writeable = False

@@ -32,7 +32,7 @@ class Marginal(Listed):
 
     A class may also define ``of_normal(z)``, which returns
     F^-1(Phi(z)) in closed form and replaces the tables in
-    `mapping`. Marginals of the class share tables if
+    `mapping`. Marginals of the class use the same tables if
     `_scipy_family` is their family in scipy, and `distribution`
     is this family with shapes, `low` and scale in this order.
     """
@@ -72,7 +72,7 @@ def frozen(family: Any, *args: float) -> Any:
     """Return a frozen distribution from a family in scipy, with given shapes, loc and scale.
 
     scipy generates the documentation of each new frozen distribution,
-    which takes a millisecond. A copy shares the documentation.
+    which takes a millisecond. A copy has the same documentation.
     """
     distribution = copy(_frozen_once(family))
     distribution.args = args
@@ -161,7 +161,7 @@ class Lognormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field, above `low`, and coefficient of variation
+        Field mean, above `low`, and coefficient of variation
         (standard deviation / mean).
     low : float
         Lower bound, by default 0.
@@ -232,7 +232,7 @@ class TruncatedNormal(_ByMoments):
     Parameters
     ----------
     mean, cv : float
-        Mean of the field and coefficient of variation (standard
+        Field mean and coefficient of variation (standard
         deviation / mean), both after truncation. The scatter must be
         below the scatter of an exponential distribution or, with two
         bounds, of a uniform distribution.

@@ -26,7 +26,7 @@ from stiction.problem.sample import constants_of, pressing_of
 from stiction.problem.specimen import UNFIT_FOR_SLIDER, Slider
 from stiction.random.fields import FACTOR, RandomInterface
 
-# Shares of the strength at or below the residual strength: the largest
+# Fractions of the strength at or below the residual strength: the largest
 # without a warning, and the largest that is accepted.
 MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
 # Numbers of equally likely values of a random residual strength, and of

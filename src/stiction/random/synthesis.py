@@ -22,12 +22,12 @@ Modes (`make_modes`)
    selects its draws (`_numbers`).
 2. Keep the wave vectors up to the truncation.
 3. Compute (2). The mean mode k = 0 is a single wave
-   vector, and every other mode stands for k and -k.
+   vector, and every other mode represents k and -k.
    The mean mode therefore takes half of g(0).
 
 Draws (`Stream.draw`)
 ---------------------
-4. On a line, 256 samples form a block that shares a generator, because a generator
+4. On a line, 256 samples form a block with one generator, because a generator
    for each sample would cost more than the sample. On a plane, a sample
    has so many modes that it forms a block by itself. The generator
    depends on the seed, the property and the number of the block.
@@ -183,7 +183,7 @@ def make_modes(
     power = np.zeros(kept.size)
     power[1:] = spectrum.density(wavenumbers[ranks], dimensions)
     if mean_mode:
-        # A mode j >= 1 stands for k and -k, the mean mode for a single
+        # A mode j >= 1 represents k and -k, the mean mode for a single
         # wave vector.
         power[0] = 0.5 * float(np.ravel(spectrum.density(np.zeros(1), dimensions))[0])
     total = power.sum()
@@ -230,7 +230,7 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
 
 
 def block_of(dimensions: int) -> int:
-    """Return how many samples share a generator, on a line (1 dimension) or a plane (2)."""
+    """Return how many samples use the same generator, on a line (1 dimension) or a plane (2)."""
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 
@@ -238,13 +238,13 @@ class Stream(NamedTuple):
     """The draws for a property, or for a factor between specimens, among all draws in a sample."""
 
     number: int  # number of the stream; never changes
-    block: int  # samples that share a generator
+    block: int  # samples with the same generator
     numbers: NDArray[np.int64]  # of the draws in the stream, rising
     columns: slice = slice(None)  # of the vector of all draws
     of_property: Any = None  # those `columns` that are modes of the property itself
 
     def places_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the columns of some draws of the stream."""
+        """Return the columns of some draws in the stream."""
         return self.columns.start + np.searchsorted(self.numbers, numbers)
 
     def draw(self, seed: int, first: int, samples: int) -> Array:

@@ -36,7 +36,7 @@ class Answer(Result):
     stress, probability : float
         Stress, Pa, and probability of an onset below this stress. One
         is given, and the other is estimated.
-    interval : dict of str to (float, float)
+    interval : dict from str to (float, float)
         90 % interval of each estimated number by name, due to the error
         of the computation: ``probability``, or ``stress`` (Pa),
         ``force`` (N) and ``friction_coefficient`` of a design.
@@ -76,7 +76,7 @@ class Answer(Result):
         Mean pressure, Pa, and `stress` over
         it. NaN without a normal pressure.
     area, force : float
-        Area of the interface, m², and `stress` times the area, N. NaN
+        Interface area, m², and `stress` times the area, N. NaN
         if the area is unknown: give ``Blocks(thickness=...)``, or
         ``Interface(width=...)`` for a line.
     failing_profiles : xarray.Dataset
@@ -89,7 +89,7 @@ class Answer(Result):
         the largest first. `low` and `high` are the settings at both
         ends. `force_at_low` and `force_at_high`, N, and `stress_at_low`
         and `stress_at_high`, Pa, are the designs there. Attributes
-        ``stress by ...`` hold the stress for each family of the factor
+        ``stress by ...`` hold the stress for each distribution between specimens
         between specimens. ``sensitivities.to_dataframe().to_csv(path)``
         writes a file, and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
@@ -189,7 +189,7 @@ class Answer(Result):
 
     @property
     def force(self) -> float:
-        """`stress` times the area of the interface, N, or NaN if the area is unknown."""
+        """`stress` times the interface area, N, or NaN if the area is unknown."""
         return self.stress * self.area
 
     @property
@@ -204,7 +204,7 @@ class Answer(Result):
 
     @property
     def by_family(self) -> dict[str, float]:
-        """Stress, Pa, for each family of the factor between specimens, if several are likely."""
+        """Stress, Pa, for each distribution between specimens, if several are likely."""
         start = "stress by "
         families = self.sensitivities.attrs.items()
         return {name.removeprefix(start): v for name, v in families if name.startswith(start)}
@@ -314,7 +314,7 @@ class Answer(Result):
             Row("part of it by the list of interfaces", self.members_cv or math.nan),
             Row("90 % of interfaces are between", low, self.band),
             Row("95 % of interfaces have at most", high if math.isnan(low) else math.nan),
-            Row("share that survives any stress", self.survived or math.nan),
+            Row("fraction that survives any stress", self.survived or math.nan),
             Row("reliability index", self.reliability_index),
             Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
             Row(
@@ -341,7 +341,7 @@ class Answer(Result):
 def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
     """Return what moves a design: each source, its ends, and the design at both ends, in words.
 
-    A family of the factor between specimens has a single design.
+    A distribution between specimens has a single design.
     """
     effects, (unit, scale) = design.sensitivities, design._demand
     if not effects.sizes.get("source"):
@@ -355,7 +355,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
         for row in effects.to_dataframe().itertuples()
     ]
     families = design.by_family.items()
-    return rows + [("family of the factor", name, "", words(v), "") for name, v in families]
+    return rows + [("scatter between joints", law, "", words(v), "") for law, v in families]
 
 
 def unseen_batch(specimens: int) -> list[str]:

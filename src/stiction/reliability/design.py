@@ -1,9 +1,9 @@
-"""The design stress, and its change with the family of the factor and with assumed constants.
+"""The design stress, and its change with assumed distributions and constants.
 
 Problem. Estimate the stress below which the interface slides with a
 given probability. Its interval contains the error of the computation.
 Assumptions have a larger effect: constants in the problem that were not
-measured, and the family of the factor between specimens. How large is
+measured, and the distribution between specimens. How large is
 this effect?
 
 Source. The method is local sensitivities with common random numbers, as
@@ -80,7 +80,7 @@ CONSTANTS = (
     "specimen.drive.height",
 )  # fmt: skip
 """Dotted keys of the constants that may be assumed, if they are numbers in a problem."""
-FAMILY = "family of the factor"
+FAMILY = "distribution between specimens"
 
 
 @checked

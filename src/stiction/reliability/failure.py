@@ -67,7 +67,7 @@ from stiction.reliability.tail import (
 )
 
 PILOT_SAMPLES = 1_000
-"""Number of plain samples that decide about the algorithm."""
+"""Number of plain samples by which the algorithm is chosen."""
 NEGLIGIBLE_PROBABILITY = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
@@ -294,7 +294,7 @@ def _by_counting(
 ) -> Answer:
     """Return the answer from plain Monte Carlo that begins with sample `start`.
 
-    Samples of a pilot are not used, because their failures decide
+    Samples of a pilot are not used, because their failures determine
     whether to count.
     """
     count, counted = count_failures(

@@ -139,7 +139,7 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
 
 
 def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
-    """Return the largest number of evaluations in all rounds of a call."""
+    """Return the most evaluations in all rounds of a call."""
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return max_evaluations or int(
         min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))
@@ -281,7 +281,7 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 def exact_doubts(point: TailPoint) -> list[str]:
     """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
 
-    These are some of the lowest samples on both sides of the stress.
+    These are low samples on both sides of the stress.
     Failures are counted, because in a tail a small change of stress may
     multiply the probability.
     """

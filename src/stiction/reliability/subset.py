@@ -20,8 +20,8 @@ Steps. A level is the set of z with g(z) below its ceiling.
    ceiling is the lowest value that does not go on. If this value is
    below the requested threshold, take the threshold. If it is at the
    floor of g, take the number just above the floor.
-3. The probability of the next level is the probability of this level
-   times the fraction of its samples strictly below the ceiling.
+3. The next level's probability is the probability of this level times the
+   fraction of its samples strictly below the ceiling.
 4. Stop if the threshold, the floor or the requested
    probability is reached. The walk is incomplete if it
    stops because no sample goes on, after `MOST_LEVELS`
@@ -37,7 +37,7 @@ Steps. A level is the set of z with g(z) below its ceiling.
    from their first ancestors (`ancestral_variance`).
 
 Departures. Only samples strictly below the ceiling go on. The product
-of the shares is then unbiased, although the levels are chosen from the
+of the fractions is then unbiased, although the levels are chosen from the
 samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). If the
 lowest values are all equal, the next higher value is the ceiling. All
 chains move together, and the step size is adapted to their acceptance
@@ -74,16 +74,16 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     """Return the squared cv of an estimate by subset simulation, from the ancestors of failures.
 
     Families that descend from different first samples evolve
-    independently. There are N = `samples` first samples. The shares w_i
-    of the families among the failures therefore measure the error, v =
+    independently. There are N = `samples` first samples. The fractions w_i
+    of the failures in each family therefore measure the error, v =
     sum (w_i - 1/N)^2. It is computed in three steps:
 
     1. Sum the squared fractions, and subtract 1/N.
     2. If all samples fail, v is zero. Use at least (2/N)^2, as if two
        more samples had not failed. This bounds the error as the
        binomial distribution does.
-    3. With k families of equal size, v is 1/k, but the variance of a
-       mean of k values needs 1/(k - 1). Therefore return v/(1 - v).
+    3. With k families of equal size, v is 1/k, but the variance of a mean over
+       k values needs 1/(k - 1). Therefore return v/(1 - v).
     """
     if ancestors.size == 0:
         return math.inf
@@ -113,11 +113,11 @@ class Population(NamedTuple):
     members: NDArray[np.int64]  # (samples,), number of the interface of each
     # (samples, dimension), or an object that draws them again. Empty for early levels.
     draws: Any = NO_DRAWS
-    acceptance: float = 1.0  # share of Metropolis steps
+    acceptance: float = 1.0  # fraction of Metropolis steps
     step: float = FIRST_STEP  # b at the end
 
     def light(self) -> Self:
-        """Return the population without draws, which take nearly all of the memory."""
+        """Return the population without draws, which take nearly all memory."""
         return self._replace(draws=NO_DRAWS)
 
 
@@ -145,7 +145,7 @@ class Descent(NamedTuple):
     evaluations: int
     complete: bool
     first_stage_evaluations: int = 0
-    last: float = 1.0  # share of the failures to which the guide leads
+    last: float = 1.0  # fraction of the failures to which the guide leads
     last_variance: float = 0.0  # squared coefficient of variation of its estimate
     walked: tuple[Array, Array] | None = None  # draws and values of failures
 

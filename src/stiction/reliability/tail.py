@@ -28,7 +28,7 @@ Steps:
    subset simulation.
 6. The stress at a probability follows from p(s) by bisection. The
    interval of the stress ends at the two stresses that belong to the
-   ends of the interval of p. If no sample is so low, the lower end is
+   interval ends of p. If no sample is so low, the lower end is
    the least possible stress.
 """
 
@@ -56,7 +56,7 @@ SIZE_MARGIN = 1.1
 DEEPER = 0.3
 """Fraction of a probability to which repetitions go on for the lower end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
-"""Number of plain samples that decide about a guide."""
+"""Number of plain samples by which a guide is judged."""
 LEAST_SHARE_PICKED = 0.9
 """Fraction of the weakest of them that a guide must pick."""
 RESOLVED = 3
@@ -253,7 +253,7 @@ class Tail(NamedTuple):
     def stress_interval(
         self, probability: float, cv: float, lowest: float
     ) -> tuple[float, float]:
-        """Return the stresses at the ends of the interval of the probability (step 6)."""
+        """Return the stresses at the interval ends of the probability (step 6)."""
         least, highest = self.extent
         if not math.isfinite(cv):
             return lowest, highest
@@ -296,7 +296,7 @@ class TailPoint:
 
     @cached_property
     def members(self) -> Array:
-        """Probability of each of the equally likely interfaces. Empty for a single interface."""
+        """Probability of each equally likely interface. Empty for a single interface."""
         if not self.state.several:
             return np.zeros(0)
         lows, highs = np.array(self.state.bounds_of_members()).T
@@ -417,9 +417,9 @@ def _repetitions(
 ) -> list[Descent]:
     """Repeat subset simulation until the tail is precise enough.
 
-    With a `guide`, each repetition uses two levels. If less than the
-    share `poor` of the samples that the guide selects fails, stop after
-    the first repetition.
+    With a `guide`, each repetition uses two levels. Stop after
+    the first repetition if fewer than a fraction `poor` of the samples that the
+    guide selects fail.
     """
     sizes = TWO_LEVELS if guide else sizes
 

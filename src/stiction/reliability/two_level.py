@@ -28,8 +28,8 @@ Steps:
    fraction of the later states with L < b is the last factor. `_covered`
    estimates its error, with one observation for each family of walkers.
 4. Take this level if the last factor is at least `LAST_FACTOR`.
-   Otherwise repeat from step 2 at the next, less rare level, as far as
-   evaluations and levels with draws allow.
+   Otherwise repeat from step 2 at the next, less rare level, until
+   evaluations or levels with draws are used up.
 
 Failures that L misses, and that no short walk reaches,
 are never found. Therefore `stiction.reliability.tail`
@@ -65,7 +65,7 @@ def _covered(
     # Walkers of one ancestor are alike, so each family is one observation.
     _, group = np.unique(families, return_inverse=True)
     sums = np.bincount(group, weights=covered.mean(axis=0) - last) / (walkers * last)
-    # A family of share w pulls the mean: its square is (1 - 2 w + sum
+    # A family of weight w pulls the mean: its square is (1 - 2 w + sum
     # w^2) of that about the truth.
     shares = np.bincount(group) / walkers
     squares = shares * shares

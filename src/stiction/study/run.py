@@ -127,7 +127,7 @@ class StoredRun:
         Parameters
         ----------
         only : sequence of str, optional
-            Names of the variables to read. By default all variables.
+            Variables to read. By default all variables.
 
         Warns
         -----
@@ -158,12 +158,12 @@ class StoredRun:
         events : bool
             Whether a table (.csv) has a row for each
             event, as in `stiction.external.event_table`,
-            instead of a row for each sample.
+            rather than a row for each sample.
 
         Raises
         ------
         InputError
-            If the suffix is neither .nc nor .csv, or if `events` is
+            If the suffix is not .nc or .csv, or if `events` is
             true and the run has no events.
         StoreError
             If the file cannot be written.

@@ -162,7 +162,7 @@ class Question:
         return {name: value for name, value in vars(self).items() if value is not None}
 
     def check(self, point: Experiment) -> None:
-        """Refuse a question that a point of a sweep cannot answer."""
+        """Refuse a question that a sweep point cannot answer."""
         if self.force is not None:
             stress_of(point.problem, "reliability.force", self.force)
         if self.friction_coefficient and not point.pressure > 0.0:
@@ -194,7 +194,7 @@ else:
 
 @model(kw_only=True)
 class _Parts(Listed):
-    """The parts of a study at a point of a sweep. Each part is valid by itself."""
+    """The parts of a study at a sweep point. Each part is valid by itself."""
 
     problem: Problem
     random: RandomOfStudy | None = None
@@ -214,7 +214,7 @@ class Study(_Parts):
     random : RandomInterface, RandomField, list of them, FieldFit or Posterior
         As in `stiction.monte_carlo`.
     profiles : mapping of arrays, optional
-        Given profiles instead of random properties, as in `onset`. In a
+        Given profiles rather than random properties, as in `onset`. In a
         study file, also files or tables {file, ...} for `read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed, first, keep
@@ -290,7 +290,7 @@ class Study(_Parts):
 
     @property
     def points(self) -> list[Point]:
-        """The points of the sweep, in order. Without a sweep, there is one point without values."""
+        """The sweep points, in order. Without a sweep, there is one point without values."""
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
@@ -334,7 +334,7 @@ class Study(_Parts):
 
     @property
     def axes(self) -> GridAxes:
-        """The axes of the sweep as dimensions of the result."""
+        """The sweep axes as dimensions of the result."""
         taken = {*variables_in(self.experiments), "sample", "x", "y"}
         fields = {} if self.profiles else self.experiments[0].random.properties
         coefficients = [name for name, field in fields.items() if field.quantity]
@@ -374,7 +374,7 @@ class Study(_Parts):
         part : str, optional
             Part to compute in a job, such as "3/100", in the same folder.
 
-        Returns an `xarray.Dataset` over the axes of the sweep and
+        Returns an `xarray.Dataset` over the sweep axes and
         'sample', with NaN for failed and missing samples. Errors are as
         in `stiction.monte_carlo`. A `StoreError` says why `out` cannot
         be used, such as a different study in it.

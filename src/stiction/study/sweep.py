@@ -29,7 +29,7 @@ Axis: TypeAlias = dict[str, list[Any]]
 
 
 class Point(NamedTuple):
-    """A point of a sweep: its number, and the value of every swept key."""
+    """A sweep point: its number, and the value of every swept key."""
 
     number: int
     values: dict[str, Any]

@@ -96,7 +96,7 @@ class Cache(FunctionCache):
 
 
 class _Flags(Flags):
-    """Options of a compilation, compared by those that were set: numba compares all of them."""
+    """Options of a compilation, compared by those that were set: numba compares all."""
 
     def values(self) -> dict[str, Any]:
         given: dict[str, Any] = self._values

@@ -56,7 +56,7 @@ def averages(
 
     Strength minus initial stress s (Pa) has shape (samples, *shape),
     and the load profile p has shape (*shape). An average is infinite if
-    the window reaches beyond the extent of the interface.
+    the window reaches beyond the interface extent.
     """
     # Both averages are convolutions with the weights.
     load = interface.transform(profile)

@@ -107,17 +107,16 @@ class LocalCriterion(Listed):
     ellipses. `critical_aspect`, `critical_patch_extent` (m, along x and
     y) and `critical_patch_area` (m²) describe the critical ellipse.
 
-    On a specimen each position has its own nucleation length: the
-    length of the shortest run of nodes on which the stiffness of the
-    blocks is unstable. The eigenvector is the weight.
-    `critical_patch_length` (m) is the nucleation length at the critical
-    position. With a machine, stable slip lowers the mean stress below
+    On a specimen each position has its own nucleation length: the length of the
+    shortest run of nodes on which the blocks are unstable. The eigenvector is
+    the weight. `critical_patch_length` (m) is the nucleation length at the
+    critical position. With a machine, stable slip lowers the mean stress below
     `critical_load`. The returned stresses include an estimate of this
-    reduction, for the critical patch alone. The slip of other patches
-    is unknown, so the stresses are too high. In six set-ups in mode II,
-    stresses and `critical_load` were too high by 0.2 to 5 %. A pusher
-    near the interface causes events long before the interface slides.
-    `critical_stress` is then far too low.
+    reduction, for the critical patch alone. The slip of other patches is
+    unknown, so the stresses are too high. In six set-ups in mode II, stresses
+    and `critical_load` were too high by 0.2 to 5 %. A pusher near the interface
+    causes events long before the interface slides. `critical_stress` is then
+    far too low.
 
     Examples
     --------
@@ -211,7 +210,7 @@ class LocalCriterion(Listed):
         return rms_difference(problem, sample, stress) > MAX_RMS_DIFFERENCE
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables of the solver's results."""
+        """Return the variables in the solver's results."""
         variables = onset_variables(problem.interface)
         if problem.interface.is_plane:
             extent = position(problem.interface, OF_PLANES["critical_patch_extent"])
@@ -219,7 +218,7 @@ class LocalCriterion(Listed):
         return variables if problem.specimen is None else variables | OF_SPECIMENS
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, Array]]:
-        """Return a solver for samples of a problem.
+        """Return a solver for the samples of a problem.
 
         Raises an `InputError` if the weakening rate varies along the
         interface, or if a critical patch does not fit on it.

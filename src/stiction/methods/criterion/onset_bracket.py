@@ -13,7 +13,7 @@ wider brackets show how large the error is.
 
 Algorithm
 ---------
-The off-diagonal entries of K are not positive, and strength falls with slip.
+The off-diagonal entries in K are not positive, and strength falls with slip.
 Therefore the slip of the least equilibrium can be increased step by step from zero,
 and never has to be reduced (R. Chandrasekaran, Opsearch 7, 1970, for linear
 problems). `slides` starts from d = 0:

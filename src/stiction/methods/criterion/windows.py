@@ -19,8 +19,8 @@ K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights for the nodes
 1. Start with a small box of nodes, made periodic with the stiffness
    between its own nodes. A block of a Toeplitz matrix is a block of a
    circulant matrix, so the problem on an ellipse of at most half the
-   length of the box stays the same. The cost depends on the size of the
-   ellipse, not of the plane.
+   length of the box stays the same. The cost depends on the ellipse, not on the
+   plane.
 2. Find by bisection the smallest ellipse in the box whose lowest
    eigenvalue is at most W (`_smallest_unstable`), with LOBPCG
    (`elasticity.operator`).
@@ -42,7 +42,7 @@ the least and the greatest strength. The steps are:
 
 1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
 2. The midpoint rule gives the transform of g (`multiplier`).
-3. The weights of nodes inside the patch are samples of g. The weights at the ends
+3. Nodes inside the patch have samples of g as weights. The weights at the ends
    of the patch are fitted to the transform, by least squares among
    weights that are not negative (`grid_weights`).
 """
@@ -168,7 +168,7 @@ def around(w: Array, nodes: int) -> Array:
 # paper's strength nine shapes from 0.8 to 2 lower the bound by less
 # than 0.05 % more.
 STRETCHES = (2.0 / 3.0, 5.0 / 6.0, 1.0, 6.0 / 5.0, 3.0 / 2.0)
-EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, as a share of W
+EIGENVECTOR_RTOL = 1e-9  # residual of an eigenvector, relative to W
 MAX_ELLIPSE_ITERATIONS = 500
 MIN_BOX_NODES = 32  # along each side of the box that is searched first
 RADIUS_RTOL = 1e-9  # distances of nodes that are equal by symmetry differ by round-off

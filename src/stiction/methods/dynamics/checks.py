@@ -21,7 +21,7 @@ FAST_RISE = 1e-3
 above which arrested events depend on the rate of loading."""
 MISSED_PERCENT = 2.0
 """Distance of a first instability from equilibrium, %, from which there is a warning."""
-# Shares of the stress scale:
+# Fractions of the stress scale:
 _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
 
@@ -132,7 +132,7 @@ def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
 
 
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
-    """Return the rise of the load while shear waves cross the nucleation length, and its rate.
+    """Return the load rise while shear waves cross the nucleation length, and its rate.
 
     The rise is a fraction of the stress scale, and the rate is in Pa/s.
     Both are zero without arrested events.

@@ -32,7 +32,7 @@ set (M. Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13,
 4. Repeat from step 2 until no node changes.
 
 Departures: the search ends without a result after too many iterations,
-or at a direction of negative curvature (a patch is then unstable at
+or at a direction with negative curvature (a patch is then unstable at
 this step size). With a curved law, a node counts as changed only if its
 strength changes by more than a bound.
 """
@@ -45,7 +45,7 @@ from stiction.elasticity.operator import convolve
 from stiction.methods.dynamics.state import Setting, SlipProblem, node_line, node_strength
 
 _MAX_CG, _MAX_NEWTON = 400, 60  # iterations
-_MIN_CURVATURE = 1e-10  # of p (M - W) p as a share of p M p
+_MIN_CURVATURE = 1e-10  # of p (M - W) p relative to p M p
 _JOINING = 10.0  # stress above the strength with which a node joins, in units of the accuracy
 
 

@@ -6,12 +6,12 @@ Waves carry away the unbalanced stress, so the mean stress on the interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
 
-<p> and <tau_i> are means over the nodes that can break, so that nothing
-beyond an extent has an effect. If the interface has an extent, the nodes
-beyond take over stress without any waves. Then (1) includes the stress
-that they take over (`whole_stress`), and results do not (`mean_stress`).
-<V> and the mean strength refer to a period of two extents
-(`Thresholds.period_nodes`), or to the true period if it is shorter.
+<p> and <tau_i> are means over the nodes that can break. Nodes beyond an extent
+have no effect. If the interface has an extent, the nodes beyond take over
+stress without any waves. Then (1) includes the stress that they take over
+(`whole_stress`), and results do not (`mean_stress`). <V> and the mean strength
+refer to a period of two extents (`Thresholds.period_nodes`), or to the true
+period if it is shorter.
 
 An instability is slip that the load does not drive: after a maximum of
 <tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
@@ -21,7 +21,7 @@ relevant fall is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
 
-It counts only if the mean strength of all nodes has fallen as far as
+It counts only if the mean strength of all nodes has fallen as much as
 <tau> ever did since the maximum. Slipping nodes carry their strength,
 and static stress transfer only takes load off them (the sum of K d over
 them is not negative). So the sum of (1) over them says that Z <V> grows
@@ -57,9 +57,8 @@ Algorithm, after each step of a run (`observe`)
 6. Slip is fast while a node slips at `Thresholds.unstable_slip_rate`
    and the mean slip rate is above `PULSE_SHARE` of its largest. An event
    of the table ends when `Thresholds.settling_time` has passed since its
-   last fast slip, and its instability ends with it. Neither the size of
-   a step, nor creep under the load, nor an echo of a periodic image
-   moves this end.
+   last fast slip, and its instability ends with it. The size of a step, creep
+   under the load and an echo of a periodic image do not move this end.
 
 This has two consequences. A maximum without such a fall, for example
 the largest load or the stress that returns when slip ends, is not an
@@ -86,8 +85,8 @@ from stiction.methods.dynamics.state import (
 )
 
 MAX_DROP_RATIO = 3.0  # largest tau_p - tau_r that counts, relative to the drop by the load
-# Shares of the stress scale:
-EVENT_DROP = 1e-4  # fall of the mean stress that begins an event
+# Fractions of the stress scale:
+EVENT_DROP = 1e-4  # drop of the mean stress that begins an event
 STEADY_STRESS = 1e-2  # Z V of creep whose waves implicit steps may smear
 _AT_MAXIMUM = 1e-5  # distance from its maximum at which the mean stress counts as being there
 
@@ -203,7 +202,7 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 def finish_step(
     state: RuptureState, setting: Setting, taken: TakenStep, record: StepRecord, row: int
 ) -> Any:
-    """Update diagnostics, arrivals and the record. Return the fall of the mean stress, Pa.
+    """Update diagnostics, arrivals and the record. Return the drop of the mean stress, Pa.
 
     If the record has no rows, it stays empty.
     """

@@ -65,14 +65,14 @@ from stiction.methods.dynamics.state import (
 
 LARGEST_STEP = 1e20  # s
 _ROUND_OFF_SHARE = 1e-14  # of the largest stress: ten times the error of the transforms
-# Shares of the stress scale:
+# Fractions of the stress scale:
 _SOLVED_STRESS = 1e-9  # stress at which a step counts as solved
 _SMALL_DROP = 0.1  # a node with a smaller tau_p - tau_r is not resolved to `slip_step`
 _FREE_LOAD_RISE = 5e-7  # rise of the load in a step with any acceleration
 _NOTICED_RADIATION = 1e-7  # Z <V> from which its growth in a step is limited
 _MAX_ACCELERATION = 1.3  # largest factor of this growth
 # Sizes are powers of sqrt(2) times the smallest size, up to round-off,
-# which must not decide.
+# which must have no effect.
 _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 

@@ -48,7 +48,7 @@ from stiction.methods.dynamics.state import (
 )
 from stiction.problem.friction.kernels import strengths
 
-# Shares of the stress scale:
+# Fractions of the stress scale:
 _OVERSTRESS = 1e-6  # stress above the strength from which a run begins with explicit steps
 _RESTING_STRESS = 1e-9  # Z V below which the interface rests
 _STOPPED_SHARE = 0.1  # slip rate, over `unstable_slip_rate`, above which an interface slides on
@@ -214,7 +214,7 @@ class Run:
         return "rest" if self.stop != "time" and resting else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
-        """Continue to the end of the run, or to `max_steps` in total. Return (ending, `Reason`).
+        """Continue to the run's end, or to `max_steps` in total. Return (ending, `Reason`).
 
         The ending is `None` if the run has not ended. The reason is
         then NOT_FINITE or DONE.
@@ -301,7 +301,7 @@ class Run:
 
     @property
     def cut_short(self) -> bool:
-        """Whether the end of the run cut the last event short."""
+        """Whether the run's end cut the last event short."""
         return bool(self.events) and not self.events[-1]["settled"]
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:

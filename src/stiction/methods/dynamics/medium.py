@@ -101,7 +101,7 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
 def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     """Return stiffness and memory on the modes of the interface.
 
-    On a plane a wave vector has the share a = (kx/k)² of mode II and b
+    On a plane a wave vector has the fraction a = (kx/k)² of mode II and b
     = 1 - a of mode III (P. Geubelle and J. Rice, 1995), in K and in the
     memory (G k/2)[a C_II + b C_III] * V.
     """

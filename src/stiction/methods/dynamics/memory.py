@@ -125,7 +125,7 @@ def offsets(half: tuple[int, ...]) -> tuple[Ints, Ints, int]:
         copy, multiplicity = np.zeros_like(entry), 1
     else:
         # Row r and row n - r have opposite kx,
-        # and share an entry as two copies.
+        # and use an entry as two copies.
         row = np.arange(half[0])
         folded = np.minimum(row, half[0] - row)
         entry = (folded[:, None] * half[1] + np.arange(half[1])[None, :]).ravel()
@@ -213,8 +213,8 @@ def advance_memory(
 ) -> None:
     """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
-    `e` has four rows for each pair: the real and imaginary parts of E,
-    and of w E B.
+    `e` has four rows for each pair: the real and imaginary parts of E and w E
+    B.
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):
@@ -234,7 +234,7 @@ def advance_memory(
                 # of constant length, so that the
                 # compiler vectorises the loop.
                 for j in range(ENTRIES):
-                    # E and w E B of the pair, which both signals share.
+                    # E and w E B of the pair, which both signals use.
                     er, ei = e[o + j], e[o + ENTRIES + j]
                     cr, ci = e[o + TWO_ROWS + j], e[o + THREE_ROWS + j]
                     # The real part of the slip rate.
@@ -394,7 +394,7 @@ def fading_memory(grid: Grid, memory: Array, tables: ImplicitTables) -> None:
         for j in range(TWO_ROWS):
             tables.packed[block * TWO_ROWS + j] = sums[0, j]
             tables.second_packed[block * TWO_ROWS + j] = sums[1, j]
-    # The tables do not hold the shares of the modes on a plane: weight
+    # The tables do not hold the fractions of the modes on a plane: weight
     # the two sums here.
     for q in range(1, tables.memory_sum.size):
         o, share = grid.offset[q], grid.mode_two[grid.entry[q]]

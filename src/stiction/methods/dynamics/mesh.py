@@ -227,11 +227,11 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return each row's fraction of a uniform traction. The interface takes no share."""
+    """Return each row's fraction of a uniform traction. The interface takes no part."""
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
-    # The row above the interface takes the share of the interface.
+    # The row above the interface takes the part of the interface.
     share[1] += share[0]
     share[0] = 0.0
     return share / share.sum()
@@ -257,7 +257,7 @@ def _limit(
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
     """Return the stiffness of an element row, for u and v at the lower and then the upper nodes."""
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
-    # Elements share nodes with their neighbours. Both matrices select
+    # Neighbouring elements have common nodes. Both matrices select
     # the nodes of a side.
     columns = [sp.csr_matrix(left), sp.csr_matrix(right)]
     stiffness = sp.csr_matrix((4 * nodes, 4 * nodes))

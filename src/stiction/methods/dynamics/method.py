@@ -124,7 +124,7 @@ class Rupture(Listed):
     Raises
     ------
     InputError
-        If an option is out of range.
+        If an option is outside the range.
 
     Notes
     -----
@@ -134,7 +134,7 @@ class Rupture(Listed):
     Values of events that did not happen are NaN, with a warning.
     `rupture_speed` is the largest apparent speed and can exceed all wave
     speeds. Use `median_rupture_speed` as the speed of a rupture.
-    Energies and `seismic_moment` are values at the end of the run. See
+    Energies and `seismic_moment` are values at the run's end. See
     docs/guide/ruptures.md for the definitions of instabilities, events and
     their ends, and for the error by fast loading. A node never slips
     backwards (Breitenfeld and Geubelle, 1998).
@@ -207,7 +207,7 @@ class Rupture(Listed):
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables of the solver's results."""
+        """Return the variables in the solver's results."""
         if problem.specimen is not None:
             return specimens.variables(self, problem)
         variables = onset_variables(problem.interface) | scalars(problem.interface)
@@ -220,7 +220,7 @@ class Rupture(Listed):
         return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver for samples of a problem. The memory kernel is fitted once."""
+        """Return a solver for the samples of a problem. The memory kernel is fitted once."""
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.search(problem))
         medium, loading_rate = self.medium(problem), self.loading_rate

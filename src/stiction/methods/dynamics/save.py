@@ -140,7 +140,7 @@ class Save(Listed):
         frame follows after a tenth as many implicit steps, at least
         one. Steps shorten as slip accelerates, so that frames are dense
         in time around the onset.
-    stations : mapping of str to float or (float, float)
+    stations : mapping from str to float or (float, float)
         Names and places of stations, x or on a plane (x, y), m. Slip,
         slip rate and shear stress (traction) are recorded after every
         step at the node nearest to the place.

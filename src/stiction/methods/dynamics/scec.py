@@ -58,7 +58,7 @@ def write_scec(
     ------
     InputError
         If the run has no stations or lacks a variable, if stations
-        share a node, or if the normal stress is positive.
+        have the same node, or if the normal stress is positive.
 
     Examples
     --------

@@ -91,8 +91,8 @@ def simulate_rupture(
         relative to the stress at which the event began.
         `block_velocity` over ('snapshot', 'height', 'x') is the
         velocity along x in the upper block (m/s) at a few times. The
-        lower block is its mirror image and moves the opposite way. The
-        table of events holds all events of the path that came to rest.
+        lower block is its mirror image and moves the opposite way. The table
+        holds all events on the path that came to rest.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def _record_to_end(
 
 
 def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
-    """Return the spectrum of the highest instability, up to the next one or the end of the run."""
+    """Return the spectrum of the highest instability, up to the next one or the run's end."""
     moment_rate = dataset["moment_rate"].values
     time, onset = dataset["step_time"].values, float(state.now.results.onset_time)
     later = [float(event["time"]) for event in run.events if event["time"] > onset]

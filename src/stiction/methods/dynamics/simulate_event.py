@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Shares of an event's slip at which the velocities of the whole block are kept."""
+"""Fractions of an event's slip at which the velocities of the whole block are kept."""
 OVER_TIME = over(
     "time",
     machine_stress=("Pa", "force of the machine per area of interface"),
@@ -164,7 +164,7 @@ class EventRecord:
                 "drive_travel": 2.0 * now["travel"],
             }
         )
-        # Pictures at given shares of the slip show the event better
+        # Pictures at given fractions of the slip show the event better
         # than at equal times.
         while self._due and self._due[0] <= waves.slip.mean():
             self._due.pop(0)

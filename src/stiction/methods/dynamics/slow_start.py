@@ -47,9 +47,9 @@ from stiction.methods.equilibrium.strength import StaticSample, exceeds
 from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
-_MAX_ERROR = 2e-5  # share of the stress scale: a fifth of the fall that counts as an event
+_MAX_ERROR = 2e-5  # fraction of the stress scale: a fifth of the drop that counts as an event
 _CROSSINGS = 10.0  # times shear waves cross h_n between the first trial and the onset
-_RATE_SHARE = 0.25  # share of the distance to the onset over which the mean rate is measured
+_RATE_SHARE = 0.25  # fraction of the distance to the onset over which the mean rate is measured
 _MAX_TRIALS = 5
 
 
@@ -61,7 +61,7 @@ def static_search(problem: Problem) -> DenseSearch | None:
 
 
 def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
-    """Return the mean stress of the first instability in equilibrium, Pa. NaN if there is none."""
+    """Return the mean stress of the first instability in equilibrium, Pa. NaN without it."""
     if np.any(rows.strength[number] <= rows.initial_stress[number]):  # overstressed
         return np.nan
     state = search.next(sample_of(rows, search.pieces, number))

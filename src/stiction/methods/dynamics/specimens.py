@@ -56,7 +56,7 @@ from stiction.problem.specimen import Slider
 OPTIONS = ("courant", "arrival", "max_steps", "events")
 """Options of `Rupture` with an effect on specimens. The others need a load that rises in time."""
 LOAD_RISE = 1e-5
-"""Rise of the drive in an event, as a fraction of the mean fall of strength."""
+"""Rise of the drive in an event, as a fraction of the mean strength drop."""
 INITIAL_GROWTH = 1e-3
 """Largest growth of the slip at the start, as a fraction of d_c."""
 RESTING_SLIP = 1e-4
@@ -150,7 +150,7 @@ def begin(
 ) -> DynamicEvent:
     """Step 1: return an event that is about to run.
 
-    `arrival` is the slip, in units of d_c,
+    `arrival` is the slip, over d_c,
     at which a front counts as arrived.
     """
     can_break = np.isfinite(sample.excess)

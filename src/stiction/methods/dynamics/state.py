@@ -212,7 +212,7 @@ class Thresholds(NamedTuple):
     load_step: float  # largest rise of the load in a step, in units of the stress scale
     smallest_step: float  # of implicit steps, s; below it explicit steps take over
     unstable_slip_rate: float  # slip rate, m/s, that only an instability reaches
-    front_share: float  # slip at which a front arrives, as a share of `Nodes.residual_slip`
+    front_share: float  # slip at which a front arrives, as a fraction of `Nodes.residual_slip`
     curved: bool  # whether the law is not linear; a linear law's pieces are met to the bit
     explicit_only: bool
 
@@ -226,9 +226,9 @@ class Grid(NamedTuple):
     stiffness: Array  # (2, modes): static stiffness K(k) and G|k|/2, Pa/m; zero for the mean
     entry: Ints  # (modes,): entry of the tables that a mode uses
     offset: Ints  # (modes,): place of its real part in packed arrays, see `memory`
-    multiplicity: int  # modes that share an entry of the tables: 2 on a plane, kx and -kx
+    multiplicity: int  # modes with the same entry of the tables: 2 on a plane, kx and -kx
     frequency: Array  # |k| c_s of each entry, rad/s
-    mode_two: Array  # share of mode II, (kx/k)²; 1 on a line of either mode
+    mode_two: Array  # fraction of mode II, (kx/k)²; 1 on a line of either mode
     poles: Spectrum  # of the sums of exponentials: first the pairs that weigh with `mode_two`,
     weights: Spectrum  # then, on a plane, the pairs of mode III, which weigh with 1 - mode_two
     split: int  # number of pairs that weigh with `mode_two`

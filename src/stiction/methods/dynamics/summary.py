@@ -9,7 +9,7 @@
    strength. The distance of two nodes on a line over the difference of
    their arrival times is an apparent speed (`rupture_speed`). Each
    speed is a mean over a window of two or half a nucleation length.
-4. The spectrum is the Fourier integral of the moment rate of one event
+4. The spectrum is the Fourier integral of an event's moment rate
    (`rate_spectrum`).
 """
 
@@ -124,7 +124,7 @@ def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[s
     # Unbreakable nodes have infinite strength and dissipate no energy.
     drop = np.where(np.isfinite(nodes.peak), nodes.peak - nodes.residual, 0.0)
     fracture = friction.dissipated(slip, drop, nodes.weakening_rate)
-    share = np.full(grid.transform.half, 2.0)  # a mode stands for its conjugate, too
+    share = np.full(grid.transform.half, 2.0)  # a mode includes its conjugate
     share[..., 0] = share[..., -1] = 1.0  # modes without a conjugate
     power = share.ravel()[1:] * grid.stiffness[0, 1:] * np.abs(slip_hat[1:]) ** 2
     strain = float(0.5 * np.sum(power) * grid.cell / np.prod(grid.transform.shape))
@@ -223,7 +223,7 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
 def front_speeds(
     interface: Interface, axis: int, arrival: Floats, nucleation: float
 ) -> dict[str, float]:
-    """Return the speeds of a front along a line of nodes, m/s, or NaN, by the names of `SPEEDS`.
+    """Return the speeds of a front along a line of nodes, m/s, or NaN, by name as in `SPEEDS`.
 
     `arrival` (s) holds the times along this axis, and `nucleation` is
     the nucleation length (m).
@@ -246,8 +246,8 @@ def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
 
     `arrival` (s) is periodic, and NaN at nodes that the front did not
     reach. The speed is a mean over `window` (m). It is NaN unless the
-    arrival is strictly monotone over the window. This excludes the
-    birth of patches and the meeting of fronts.
+    arrival is strictly monotone over the window. This excludes places where
+    patches begin or fronts meet.
     """
     # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))

@@ -5,7 +5,7 @@ Problem
 Solve M u'' + M alpha u' + K (u + theta u') = forces for the block of `mesh`, starting from a static
 state. M are the masses, alpha the attenuation (`Mesh.attenuation`) and theta the viscous time of
 the grid (`Mesh.viscous_time`). Displacements are counted from the static state. In the upper block
-u is half of the slip at y = 0. The lower block is its mirror image, so the normal stress does not
+u is half the slip at y = 0. The lower block is its mirror image, so the normal stress does not
 change.
 
 Algorithm (`wave_steps`)
@@ -234,7 +234,7 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
     """
     now, step, last = waves.totals[0], mesh.step, waves.u.shape[1] - 1
     # The pusher moves as the mean of the pushed nodes, weighted by
-    # their shares of the force.
+    # their parts of the force.
     mobility = speed = 0.0
     for j in range(gains.shape[0]):
         for side, i in ((0, 0), (1, last)):

@@ -5,8 +5,8 @@ Problem
 The interface has n cells, which slip by d >= 0 (m), and n + 1 edges, which open by w >= 0 (m).
 With x = (d, w), stiffness K (Pa), a load that has risen by D (N/m) and its forces T at rest, the
 shear force of a cell is (D T - K x)_a, and the force that presses an edge is P_b = -(D T - K x)_b.
-N_a is the normal force on a cell: half of P at both of its edges, but the whole of P at the
-two ends of the slider. Written N = Q P, the law of a cell is
+N_a is the normal force on a cell: half P at both its edges, but the whole P at
+the two ends of the slider. Written N = Q P, the law of a cell is
 
     strength_a = mu_a N_a - W_a d_a,                                                          (1)
 
@@ -107,7 +107,7 @@ class Kind(IntEnum):
 
 
 class Kink(NamedTuple):
-    """The nearest kink. `step` is a rise of the load, or of the slip of e."""
+    """The nearest kink. `step` is the rise of the load or of the slip of e."""
 
     step: float
     node: int

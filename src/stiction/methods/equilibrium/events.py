@@ -18,9 +18,9 @@ The table holds these measures:
    second is the mean of K delta weighted by delta. The third is
    twice the energy that the slip releases beyond friction at the
    residual strength, over the integral of delta. Waves and
-   weakening share this energy. If the stress comes to rest at
+   weakening divide this energy. If the stress comes to rest at
    the residual strength at a constant load, the third equals the
-   second. In a rupture both shares of the energy are known. They
+   second. In a rupture both parts of the energy are known. They
    contain the work of the load, which rises during the event.
 4. The fracture energy is the energy dissipated above the residual strength.
 5. Methods with inertia also give the duration of an event. Between
@@ -48,7 +48,7 @@ from stiction.problem.results import per_area, position
 from stiction.problem.sample import Sample
 
 OF_SPECIMENS = {
-    "event_stress_drop": Variable("Pa", "fall of the mean interface stress", ("event",)),
+    "event_stress_drop": Variable("Pa", "drop of the mean interface stress", ("event",)),
     "event_travel": Variable("m", "travel of the drives before the event", ("event",)),
     "event_crosshead_travel": Variable(
         "m", "travel of the machine's far ends before the event", ("event",)
@@ -210,8 +210,8 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
     stress_before = before.load - problem.relief(before.slip)
     stress_after = after.load - problem.relief(after.slip)
     # 3. and 4. Stress drops and fracture energy. Waves and weakening
-    # share what the mean of the stress before and after, at a constant
-    # load, does on the slip beyond the residual strength.
+    # divide the work that the mean of the stresses before and after, at
+    # a constant load, does on the slip beyond the residual strength.
     drop, residual = problem.released_stress(added), rows.residual_strength[row]
     # `above` is the stress before the event, less the residual strength.
     above = rows.initial_stress[row] + before.load * rows.load_profile - residual
@@ -249,7 +249,7 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
 
 
 def place_of(interface: Interface, node: int) -> list[float]:
-    """Return the position of a node of the flattened interface along each direction, m."""
+    """Return a node's position along each direction, m. The interface is flattened."""
     entry = np.unravel_index(node, interface.shape)
     return [float(at[i]) for at, i in zip(interface.coordinates.values(), entry, strict=True)]
 

@@ -91,7 +91,7 @@ class Equilibrium(Listed):
     `sliding_position` (m), which differs from `critical_position` only after an arrested
     event.
 
-    Arrest is decided in equilibrium. Inertia may carry a rupture
+    Arrest is computed in equilibrium. Inertia may carry a rupture
     further. There is no upper bound, and `certificate_gap` is NaN, if a
     law steepens and a node passes a corner before the first
     instability, or if a node of a specimen stops before the first
@@ -185,7 +185,7 @@ class Equilibrium(Listed):
         return certain, certain
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables of the solver's results."""
+        """Return the variables in the solver's results."""
         interface = problem.interface
         # On planes, positions and extents have
         # a component along each direction.
@@ -204,7 +204,7 @@ class Equilibrium(Listed):
         return variables
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver for samples of a problem."""
+        """Return a solver for the samples of a problem."""
         if isinstance(problem.specimen, Slider):
             return SliderSolver(problem, self)
         return OnsetSolver(problem, self, make_search(problem, self.tolerance))

@@ -1,6 +1,6 @@
-"""Number, position and extent of patches of slipping nodes on a line or plane.
+"""Number, position and extent of slipping patches on a line or plane.
 
-Nodes on a plane are connected if their cells share an edge (four
+Nodes on a plane are connected if their cells have a common edge (four
 neighbours), also across the borders. In these functions, `interface` is
 an `Interface`. Kernels do not depend on the file that defines it.
 
@@ -28,8 +28,8 @@ Mask = NDArray[np.bool_]
 MIN_PATCH_WEIGHT = 0.1
 """Fraction of the largest weight above which a node of a plane belongs to the critical patch.
 
-At the border of a patch y falls off over a few nodes. Half or twice the
-share changes areas by a sixth to a quarter, and no other result.
+At the border of a patch y falls off over a few nodes. Half or twice this
+fraction changes areas by a sixth to a quarter, and no other result.
 """
 
 
@@ -46,7 +46,7 @@ class Patch(NamedTuple):
 
 
 def count_patches(slip: Array) -> int:
-    """Return the number of runs of slipping nodes on a circle."""
+    """Count the runs of slipping nodes on a circle."""
     # A run starts where a node slips and its left neighbour does not.
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])

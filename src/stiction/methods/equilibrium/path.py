@@ -153,14 +153,13 @@ def equilibrium_path(
         `stiction.external.event_table` returns the events as a table.
 
         On specimens, `load` is the mean stress that the drive would
-        cause without slip. `travel` is the sum of the travels of both
-        drives (m). `crosshead_travel` (m) adds the deformation of the
-        machine, force over stiffness, and is NaN under a dead load.
-        Events also have `event_stress_drop` (fall of the mean stress,
-        Pa), `event_travel` and `event_crosshead_travel` before the
-        event (m), and `event_travel_step` (m). With a thickness, width or area, mean
-        stresses are also given as forces: `force`, `event_force` and
-        `event_force_drop` (N).
+        cause without slip. `travel` is the travel of both drives together (m).
+        `crosshead_travel` (m) adds the deformation of the machine, force over
+        stiffness, and is NaN under a dead load. Events also have
+        `event_stress_drop` (drop of the mean stress, Pa), `event_travel` and
+        `event_crosshead_travel` before the event (m), and `event_travel_step`
+        (m). With a thickness, width or area, mean stresses are also given as
+        forces: `force`, `event_force` and `event_force_drop` (N).
 
         On a slider, `pressure` (Pa) and `opening` (m) at the nodes
         are added. Slip and travel count from the beginning of the push.

@@ -68,7 +68,7 @@ ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
 }
 MIN_PEAK_HEIGHT = 0.02
 """A peak that is hardly higher than the stress of sliding gets a warning. This is its smallest
-height above the mean residual strength, as a fraction of the fall of strength."""
+height above the mean residual strength, as a fraction of the strength drop."""
 OF_INSTABILITY = {
     "first_instability", "critical_position", "critical_patch_length", "critical_patch_extent",
     "critical_patch_area",
@@ -257,7 +257,7 @@ class OnsetSolver:
             values["certified"] = first.certified
         else:
             values["critical_patch_length"] = patch.area
-        # Behind a stiff machine, or within a short
+        # If the machine is stiff, or within a short
         # extent, an interface can slide without any
         # instability. Then there is no critical patch.
         stable = first.status == PathStatus.STABLE
@@ -330,7 +330,7 @@ class OnsetSolver:
             stopped & np.isfinite(first),
         )
         # Compare the peak with the stress of sliding, on the scale of
-        # the fall of strength.
+        # the strength drop.
         residual = rows.mean(rows.residual_strength)
         falls = (rows.strength - rows.residual_strength).reshape(rows.samples, -1)
         falls = falls[:, np.isfinite(falls[0])]
@@ -338,8 +338,8 @@ class OnsetSolver:
         above /= np.maximum(np.median(falls, axis=1), 1e-300)
         warn_of_samples(
             "all but the last nodes are at their residual strength before the peak in {samples}:"
-            " static friction then equals the mean residual strength, to {worst:.2g} of the fall of"
-            " strength, and depends on little else",
+            " static friction then equals the mean residual strength to {worst:.2g} of the strength"
+            " drop, and depends on little else",
             values["residual_reached"] & (above < MIN_PEAK_HEIGHT),
             above,
         )
@@ -368,7 +368,7 @@ def _sensitivity(
     if pieces.steepens and not state.certified:
         return np.full(state.slip.size, np.nan)
     # The search's derivative is by the present piece continued to zero
-    # slip, which is share tau_p + (1 - share) tau_r. The chain rule
+    # slip, f tau_p + (1 - f) tau_r with f = `share`. The chain rule
     # gives the derivative by tau_p.
     share = pieces.starts[present_pieces(sample, state.slip).piece]
     gradient: Array = search.gradient(sample, state)

@@ -22,7 +22,7 @@ from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Polygon
 
 CONSTANT_STRENGTH_RTOL = 1e-11
-"""Smallest fall of strength, as a fraction of the mean strength, with which a node counts as
+"""Smallest strength drop, as a fraction of the mean strength, with which a node counts as
 weakening. A smaller fall is within the round-off of K d: an instability
 of such nodes adds no slip
 and never ends."""
@@ -40,7 +40,7 @@ class Pieces(NamedTuple):
     slopes: Array  # (M + 1,): -f' on each piece, over `first_slope`; to 0 (residual)
     first_slope: float  # -f' on the first piece that falls
     area: float  # integral of f
-    at_corner: float = 1.0 - 1e-12  # a node with this share of a corner's slip is beyond it
+    at_corner: float = 1.0 - 1e-12  # a node with this fraction of a corner's slip is beyond it
 
     @property
     def steepens(self) -> bool:
@@ -65,7 +65,7 @@ def pieces_of(law: FrictionLaw) -> Pieces:
 class StaticSample(NamedTuple):
     """Strength profile, as arrays (nodes,). Rate and d_c are 0 at nodes with constant strength.
 
-    Beyond the extent of the interface, excess and d_c are infinite.
+    Beyond the interface extent, excess and d_c are infinite.
     """
 
     excess: Array  # tau_p - tau_i, Pa
@@ -142,7 +142,7 @@ def piece_at(sample: StaticSample, slip: Array, i: int) -> int:
 
 @jit_inside
 def start_of(sample: StaticSample, i: int, piece: int) -> float:
-    """Return the strength of node i minus initial stress, Pa, for a piece continued to zero slip.
+    """Return the strength at node i minus initial stress, Pa, for a piece continued to zero slip.
 
     The first piece gives tau_p, and the last piece gives tau_r.
     """

@@ -31,7 +31,7 @@ from stiction.problem.friction.parameters import Linear
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:
-    """Stand for the `line_at` of a law. The type of its parameters selects the compiled version."""
+    """Represent the `line_at` of a law. The type of its parameters selects the compiled version."""
     raise NotImplementedError
 
 

@@ -101,7 +101,7 @@ class FrictionLaw(Listed):
         """The part of the law for kernels: its own type of NamedTuple, with f."""
 
     def area(self, u: Any) -> Array:
-        """Return the integral of f from 0 to u, where u is slip in units of d_c, with any shape.
+        """Return the integral of f from 0 to u, where u is slip over d_c, with any shape.
 
         Up to the `reach`, cubic Hermite pieces through f and f' are
         integrated (relative error about 1e-12 for a smooth f). Beyond
@@ -116,7 +116,7 @@ class FrictionLaw(Listed):
         return np.asarray(area.reshape(np.shape(u)))
 
     def slip_at(self, fraction: float) -> float:
-        """Return the first slip u, in units of d_c, at which f has fallen to a fraction in [0, 1].
+        """Return the first slip u, over d_c, at which f has fallen to a fraction in [0, 1].
 
         The result is `math.inf` if f stays above the fraction. The slip
         is found by bisection.
@@ -133,7 +133,7 @@ class FrictionLaw(Listed):
         return below
 
     def fraction(self, u: Any) -> Array:
-        """Return f(u), where u is slip in units of d_c, with any shape."""
+        """Return f(u), where u is slip over d_c, with any shape."""
         f = self.parameters.f
         return np.vectorize(lambda slip: f(slip)[0], otypes=[float])(u)
 
@@ -373,7 +373,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     @cached_property
     def steepening(self) -> float:
-        """Ratio of the slope of the steepest piece to the slope of the first that falls."""
+        """Slope of the steepest piece over the slope of the first that falls."""
         return float(self._pieces[0].max()) / self.initial_slope
 
     @property
@@ -411,9 +411,8 @@ class PiecewiseWeakening(FrictionLaw):
     def from_law(cls, law: FrictionLaw, pieces: Pieces) -> PiecewiseWeakening:
         """Approximate a law by linear pieces. `pieces` is their number, at least 2.
 
-        The corners lie on the curve of the law, at equal
-        steps of strength. If the law never reaches its
-        residual strength, the last piece dissipates the
+        The corners lie on the curve of the law, at equal strength steps. If the
+        law never reaches its residual strength, the last piece dissipates the
         same energy as the remaining part of the law.
 
         Examples

@@ -14,7 +14,7 @@ class Parameters(Protocol):
         """-f'(0), positive. It is a field."""
 
     def f(self, u: float) -> tuple[float, float]:
-        """Return f(u) and -f'(u) at a slip u >= 0 in units of d_c. Numba compiles it."""
+        """Return f(u) and -f'(u) at a slip u >= 0 over d_c. Numba compiles it."""
 
 
 class Linear(NamedTuple):
@@ -37,7 +37,7 @@ class Exponential(NamedTuple):
 
 
 class Polygon(NamedTuple):
-    """Corners of f: the slip u in units of d_c rises from 0 to 1, and f falls from 1 to 0."""
+    """Corners of f: the slip u over d_c rises from 0 to 1, and f falls from 1 to 0."""
 
     slip: Array
     fraction: Array

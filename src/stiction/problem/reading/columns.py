@@ -79,7 +79,7 @@ Wanted = str | int | None
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A column of a table, or a variable of labelled data."""
+    """A column of a table, or a variable in labelled data."""
 
     name: str  # heading without its unit
     unit: str  # as stated, '' if it is not stated

@@ -12,7 +12,7 @@ Each reader takes these steps:
 A table is a text file or a sheet of a workbook. Its lines are split
 into cells here, and `tables.py` reads the numbers in them. For a text
 above `LARGE` bytes, both read the first lines. pandas then reads the
-other lines if all of them are alike. Otherwise the whole text is read
+other lines if all are alike. Otherwise the whole text is read
 line by line.
 """
 
@@ -103,7 +103,7 @@ def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008
 
     Semicolons, tabs, commas or blanks separate columns. Lines that
     begin with ``#`` are comments. The last line above the numbers holds
-    the names of the columns, or their units below a line of names. If
+    the column names, or their units below a line of names. If
     there is no such line, the last comment may hold the names.
     """
     content = content_of(path)
@@ -179,7 +179,7 @@ def _lines(text: str, options: Options) -> Grid:
 def _separator(lines: Sequence[str], words: set[str]) -> str:
     """Return the separator that splits most lines into equally many numbers, times and words.
 
-    If several do, the heading decides, and then the order of
+    If several do, the heading is compared first, and then the order of
     `SEPARATORS`. Blanks separate numbers with decimal commas, '0,1
     1000,5', but commas '0.1, 1000.5'.
     """
@@ -298,7 +298,7 @@ def _sheet(content: bytes, options: Options) -> Grid:
 
 
 def _cells_of(sheet: Any, size: int) -> list[Row]:
-    """Return the cells of a sheet as strings. `size` is the size of the file in bytes."""
+    """Return the cells in a sheet as strings. `size` is the size of the file in bytes."""
     most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
     sheet.reset_dimensions()  # the stated size of a sheet need not be true
     rows, width = [], 0

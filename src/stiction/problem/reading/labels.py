@@ -104,8 +104,8 @@ def column_in_si(
 def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     """Return numbers without labels, and the unit if the source states a unit.
 
-    The unit belongs to a quantity, is the attribute `units`, or stands
-    in the name of a Series.
+    The unit belongs to a quantity, is the attribute `units`, or is part
+    of the name of a Series.
     """
     stated = ""
     if is_labelled(value) and not hasattr(value, "data_vars"):

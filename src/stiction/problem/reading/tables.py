@@ -305,7 +305,7 @@ def _statistics(rows: Sequence[Row], words: set[str]) -> set[int]:
         labels.append(label.rstrip(" .:=") if has_number and _is_word(label, words) else "")
     long = {i for i, label in enumerate(labels) if re.split(r"[\s(]", label)[0] in STATISTICS}
     short = {i for i, label in enumerate(labels) if label in SHORT_STATISTICS}
-    known = long | short  # a short name counts beside another
+    known = long | short  # a short name counts next to another
     return long | {i for i in short if known & {i - 1, i + 1}}
 
 
@@ -353,11 +353,11 @@ def _decimal_mark(
 
     The number 1.020 means 1.02 in some countries
     and 1020 in others. Such a file is refused
-    unless the caller or a different cell decides.
+    unless the caller or a different cell says otherwise.
     """
-    # A cell such as 0.5 or 1.02 shows that its mark stands before decimals.
+    # A cell such as 0.5 or 1.02 shows that its mark separates decimals.
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
-    decimal: set[str] = set()  # marks that stand where a mark of thousands cannot stand
+    decimal: set[str] = set()  # marks at a place that is impossible for thousands
     cells = [(row.number, row.cells[column]) for row in rows for column in numeric]
     for mark in ".,":
         for number, cell in cells:

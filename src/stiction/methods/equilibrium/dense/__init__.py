@@ -1,4 +1,4 @@
-"""Onsets of lines and blocks, from factors of the stiffness.
+"""Onsets on lines and in blocks, from factors of the stiffness.
 
 Read `search`, which puts the parts together. Windows bound the load,
 and `linear_program` finds the load with an active set and the factor

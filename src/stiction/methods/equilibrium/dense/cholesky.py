@@ -3,7 +3,7 @@
 Problem
 -------
 K is the stiffness (Pa/m), W >= 0 the weakening rate of each node (Pa/m), A = K -
-diag(W), and S the list of the slipping nodes, in the order of the rows of L. This
+diag(W), and S the list of slipping nodes, ordered like the rows of L. This
 folder solves systems
 
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
@@ -14,7 +14,7 @@ The equilibrium is then unstable.
 
 Algorithm
 ---------
-L is updated instead of computed again (P. Gill, G. Golub, W. Murray and M.
+L is updated rather than computed again (P. Gill, G. Golub, W. Murray and M.
 Saunders, Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix
 Computations, 2013, section 6.5).
 
@@ -90,7 +90,7 @@ def row_start(row: int) -> int:
 
 @jit_inside
 def row_slice(row: int, length: int) -> slice:
-    """Return the slice of the flat array that holds the first entries of a row of L."""
+    """Return the slice of the flat array with the first entries in a row of L."""
     start = row_start(row)
     return slice(start, start + length)
 

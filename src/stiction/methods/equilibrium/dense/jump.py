@@ -27,7 +27,7 @@ The algorithm is our own. Its two types of step do not pass the least equilibriu
    definite, move towards the solution of the linear problem for these
    pieces. If not, move along z >= 0 with A z <= 0 (step 1 in
    `cholesky`). The move ends when the first node reaches the next
-   corner of its law.
+   corner in its law.
 3. After each step of either type, the resting nodes that are
    overstressed join S.
 4. Step 1 is repeated as long as nodes join or pass corners, at most
@@ -319,8 +319,8 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
         # 1. and 3.
         n_before = n_slipping
         course, n_slipping = _elastic_step(state, load, n_slipping, tolerance)
-        # 5. Behind a machine slip lowers the load, so the mean strength
-        # does not decide.
+        # 5. If a machine drives the blocks, slip lowers the load, so the mean strength
+        # is no criterion.
         dead_load = mean_relief(workspace.stiffness, sample.profile, slip) == 0.0
         run, n_corners = _residual_runs(sample, slip)
         slides = run >= unstoppable or (dead_load and unsupported(sample, load, slip))

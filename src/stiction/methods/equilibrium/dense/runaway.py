@@ -4,7 +4,7 @@ Problem
 -------
 At a load (Pa) a patch on a line became unstable. K is the stiffness (Pa/m), d is
 the slip (m), s(d) is the strength minus initial stress (Pa) and p is the load
-profile. Does slip come to rest again? `jump` decides this for any sample. Most
+profile. Does slip come to rest again? `jump` answers this for any sample. Most
 samples slide, and this test shows sliding faster. Without the test, onsets take
 three to five times as long. The test follows only the patch, as a run of nodes,
 while all other nodes are held. The result is a lower bound of the slip, because
@@ -16,9 +16,9 @@ The algorithm is our own. It uses two known results: the factor of a Toeplitz ma
 (`block_factor`) and Griffith's length (`unstoppable_length`).
 
 1. Move along the direction of the instability until a node reaches a
-   corner of its law. If no node reaches a corner, the interface slides.
+   corner in its law. If no node reaches a corner, the interface slides.
 2. Overloaded nodes next to the run join the
-   run, as far as their stress is known.
+   run, while their stress is known.
 3. Take an elastic step. With the present strengths, solve K_RR x =
    (load p - K d - s(d))_R on the run R, with the right side cut off at
    zero, and add x to the slip. Blocks of K on runs with the same length

@@ -1,6 +1,6 @@
 """Choose the algorithm for equilibria of a line or a specimen, with dense factors.
 
-1. If no node reaches a corner of its law before the next
+1. If no node reaches a corner in its law before the next
    instability, the instability follows from a linear programme
    for the present pieces of the friction law
    (`linear_program`). If very many nodes of a line slip,
@@ -103,7 +103,7 @@ class DenseSearch:
     @property
     def _workspaces(self) -> tuple[Workspace, Workspace]:
         """Workspaces of the thread, for elastic steps (and programmes) and for true pieces."""
-        # Threads share the search, but kernels overwrite the workspaces.
+        # All threads use the same search, but kernels overwrite the workspaces.
         if not hasattr(self._of_thread, "workspaces"):
             self._of_thread.workspaces = tuple(
                 make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
@@ -191,7 +191,7 @@ class DenseSearch:
         """
         state = state or at_rest(sample)
         from_rest = not state.slip.any()
-        # Behind a machine the stress may be largest before the instability.
+        # If a machine drives the blocks, the stress may be largest before the instability.
         route = Route.EVENTS if self.driven else state.route
         if from_rest:
             for workspace in self._workspaces:

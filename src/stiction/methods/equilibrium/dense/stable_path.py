@@ -3,7 +3,7 @@
 Problem
 -------
 p is the load profile, K is the stiffness (Pa/m), and d >= 0 is the slip (m). The
-strength of node i, minus its initial stress, falls with slip along straight pieces:
+strength at node i, minus its initial stress, falls with slip along straight pieces:
 s_i = q_i - W_i d_i. Slip is an equilibrium at a load (Pa) if no stress exceeds the
 strength, and if both are equal at slipping nodes:
 
@@ -40,7 +40,7 @@ method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
    by K. For (3), move v from its former value towards
    the solution. The first node whose rate reaches zero
    on the way stops. Remove it from S and solve again.
-3. Find the smallest rise of the load at which a resting node reaches
+3. Find the smallest load rise at which a resting node reaches
    its strength (a start), or a slipping node reaches a corner of its
    law. Raise the load. If any rise would overstress a node at its
    strength, the node starts at once. This ensures A v >= p.
@@ -212,7 +212,7 @@ def _move_v(
 
 @jit_inside
 def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
-    """Remove a node from S. Return the number of nodes that still slip."""
+    """Remove a node from S. Return how many nodes still slip."""
     v_nodes[state.workspace.slipping[position]] = 0.0
     n_slipping = cholesky.remove(state.workspace, n_slipping, position)
     cholesky.apply_stiffness_to_resting_slip(state)
@@ -393,7 +393,7 @@ def ends_sliding(state: SlipState) -> bool:
 def follow_stable_path(
     state: SlipState, load: float, target: float, direction: Array
 ) -> PathEnd:
-    """Follow the stable equilibria from a load to a target (Pa, not below it), as far as they go.
+    """Follow the stable equilibria from a load up to a target (Pa) or the first instability.
 
     Slip and K d of the state are updated. If the path ends unstable,
     the direction (n,) in which slip jumps is written to `direction`.
@@ -475,6 +475,6 @@ def follow_stable_path(
             if not start.bounded:
                 return PathEnd(load, peak, stopped, PathStatus.UNSTABLE)
             n_slipping, first_changed = start.n_slipping, start.first_changed
-            if ends_sliding(state):  # 6. Behind a stiff machine the interface slides stably.
+            if ends_sliding(state):  # 6. If the machine is stiff, the interface slides stably.
                 return PathEnd(load, peak, stopped, PathStatus.STABLE)
     return PathEnd(load, peak, stopped, PathStatus.GIVEN_UP)

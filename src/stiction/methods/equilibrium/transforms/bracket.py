@@ -10,7 +10,7 @@ and load profile p > 0, the onset without corners is
 Any d >= 0 gives the lower bound min (A d + s)/p. Any y >= 0 gives an
 upper bound, after a multiple of a field z > 0 with A z < 0 has been
 added to make A y <= 0. The bounds hold for any accuracy of d and y, and
-for any signs of the entries of K.
+for any signs of the entries in K.
 
 Algorithm
 ---------
@@ -21,7 +21,7 @@ which closes the bracket, and takes over if `turning_point` fails.
 1. Solve for the equilibrium at the middle of the interval, starting
    from the slip of the last stable load (`held_equilibrium`).
 2. If there is an equilibrium, it gives a lower bound.
-3. If a direction of negative curvature was met, the load is too high.
+3. If a direction with negative curvature was met, the load is too high.
    The direction is the guess for the lowest eigenvector of A on the
    slipping nodes. If the eigenvalue is not positive, the eigenvector
    gives an upper bound, which becomes the upper end of the interval.

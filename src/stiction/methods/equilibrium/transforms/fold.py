@@ -5,7 +5,7 @@ Problem
 K is the stiffness (Pa/m), W are the present weakening rates (Pa/m), A = K -
 diag(W), S are the slipping nodes, and p is the load profile. Between events, slip d
 grows with the load at the rate v, with A_SS v = p_S, and A_SS is positive definite.
-At an event, a node begins to slip or reaches a corner of its law. The path turns at
+At an event, a node begins to slip or reaches a corner in its law. The path turns at
 the first event after which A_SS is no longer positive definite. Find its load, and
 the direction y in which slip jumps.
 
@@ -16,7 +16,7 @@ The algorithm is the same as in `dense.stable_path`, but conjugate gradients
 
 1. Solve for the slip at the first load, revising the pieces of the
    nodes, and for the rates v.
-2. Find the smallest rise of the load to an event, and raise the load.
+2. Find the smallest load rise to an event, and raise the load.
    If the target comes first, end.
 3. At a corner of node j, solve A_SS y = e_j, the unit vector
    of j. On its next piece, W_j falls by c (W before minus W
@@ -100,7 +100,7 @@ def follow_to_turn(
     for _ in range(MAX_EVENTS):
         if v is None:
             break
-        # 2. At nodes at rest d = v = 0, so products with A stand for
+        # 2. At nodes at rest d = v = 0, so products with A replace
         # products with K.
         product(operator, slip, image)
         margin = np.maximum(strength + image - load * sample.profile, 0.0)

@@ -4,7 +4,7 @@ Problem
 -------
 Follow the equilibria of a plane, equation (1) in `solver`, from instability to
 instability. K is known only by its symbol in Fourier space. The onset without corners
-is the largest load with an equilibrium if no node reaches a corner of its law (problem
+is the largest load with an equilibrium if no node reaches a corner in its law (problem
 (1) in `bracket`).
 
 Algorithm
@@ -22,7 +22,7 @@ The algorithm is our own. `plane_onset` finds the onset without corners, also fo
 `PlaneSearch` follows a sample from instability to instability:
 
 4. From rest, the next instability is the onset without corners, if no
-   node reaches a corner of its law before. A coarse grid usually shows
+   node reaches a corner in its law before. A coarse grid usually shows
    whether a node reaches a corner.
 5. Otherwise, and after a jump, the path is followed in steps of the
    load. Each step is proved to be stable
@@ -157,14 +157,14 @@ def plane_onset(
     slip: Array | None = None,
     corner: Array | None = None,
 ) -> Bracket:
-    """Bracket the largest load with an equilibrium before a node reaches a corner of its law.
+    """Bracket the largest load with an equilibrium before a node reaches a corner in its law.
 
     All fields have shape (nx, ny), or (nodes,) on a line.
     `excess` is the peak strength minus the initial stress (Pa).
     `profile` is the load profile p > 0. `W` is the weakening rate
     (Pa/m, zero at residual nodes). `slip` (m) belongs to an
     equilibrium at a lower load, from which the search starts
-    instead of coarse grids. `corner` is the slip at the next
+    rather than coarse grids. `corner` is the slip at the next
     corner (m, 0 without a corner). The search stops when the
     bounds agree to a relative `gap`. If a node of a coarse grid
     slips beyond its corner, the bracket of this grid is returned.

@@ -3,7 +3,7 @@
 Problem
 -------
 K is the stiffness (Pa/m), d >= 0 is the slip (m), and p is the load profile. On its
-present piece, the strength of node i, minus its initial stress, is q_i - W_i d_i. A
+present piece, the strength at node i, minus its initial stress, is q_i - W_i d_i. A
 node is overloaded if load p - K d exceeds its strength. An equilibrium at a load
 (Pa) satisfies
 
@@ -11,7 +11,7 @@ node is overloaded if load p - K d exceeds its strength. An equilibrium at a loa
 
 For given pieces this problem is linear, and `held_equilibrium` solves
 it by conjugate gradients with A = K - diag(W). If A is not positive
-definite, conjugate gradients find a direction of negative curvature.
+definite, conjugate gradients find a direction with negative curvature.
 The pieces depend on the slip. Two questions are answered:
 
 (a) Does a stable path lead from an
@@ -310,9 +310,9 @@ def least_equilibrium(
     """
     tolerance = residual_tolerance(sample, load, accuracy)
     slip, weakens = np.maximum(slip, 0.0), sample.critical > 0.0
-    omitted = 0.0  # share of the weakening that is omitted
-    omitted_before = 0.0  # the same, before a step with the share 1 was tried
-    fall = 0.0  # largest fall of strength in the step before, Pa
+    omitted = 0.0  # fraction of the weakening that is omitted
+    omitted_before = 0.0  # the same, before a step with the fraction 1 was tried
+    fall = 0.0  # largest strength drop in the step before, Pa
     for _ in range(MAX_JUMP_STEPS):
         # 1. The load less the present strength, summed over the nodes.
         # The sum of K d is zero.

@@ -68,7 +68,7 @@ MAX_IDLE_STATES = 8
 IDLE_GAP_SHARE = 0.95
 """Fraction of the gap that must remain for a state to count as idle."""
 PATCH_CHANGE_RETREAT = 2e-3
-"""Share by which the load is lowered when another patch is held, twice as much each time."""
+"""Fraction by which the load is lowered when another patch is held, twice as much each time."""
 MAX_STEP = 0.3
 """Longest step, as a fraction of the amplitude. A longer step may reach another patch."""
 NEWTON_FACTOR = 1.2
@@ -234,7 +234,7 @@ def close_by_newton(
             above = state
             bracket.raise_multiplier(state.slope)
         if below is not None and above is not None:
-            # With these shares the slopes mu' cancel, so A y = 0 where
+            # With these weights the slopes mu' cancel, so A y = 0 where
             # both states slip.
             fall = -above.slope_of_force
             bracket.raise_multiplier(below.slope * fall + above.slope * below.slope_of_force)
