@@ -355,7 +355,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
         for row in effects.to_dataframe().itertuples()
     ]
     families = design.by_family.items()
-    return rows + [("scatter between joints", law, "", words(v), "") for law, v in families]
+    return rows + [("scatter of specimens", name, "", words(v), "") for name, v in families]
 
 
 def unseen_batch(specimens: int) -> list[str]:

@@ -301,7 +301,7 @@ class PlaneSearch:
                     if turn is not None:
                         break
                 else:
-                    # The path may turn here or not: `jump` decides,
+                    # The path may turn here or not: `jump` finds out,
                     # along the last growth.
                     direction = slip - passed[0][1]
                     return EquilibriumState(load, slip, direction, gap=step, certified=False)
