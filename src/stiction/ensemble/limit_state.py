@@ -33,8 +33,6 @@ from stiction.random.equally_likely import AnyRandom
 from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
-"""Stress of a method that counts as failure."""
-
 MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
 """Most samples of each interface, and about the number of all samples, by which
 interfaces are ordered, and the standard deviations below the mean that are compared."""

@@ -190,16 +190,14 @@ class Store:
     def save(self) -> None:
         """Store the collected tables, as a chunk for each set of variables."""
         _check_folder(self.path / CHUNKS)
-        # An array of rows has one type, and a
-        # chunk one version of the packages.
         groups: dict[Any, list[tuple[NDArray[Any], Table]]] = {}
-        for table in self._taken:
+        for table in self._taken:  # an array of rows has one type
             rows = _rows(table.columns)
-            groups.setdefault((rows.dtype, table.versions), []).append((rows, table))
-        for (_, made_by), group in groups.items():
+            groups.setdefault(rows.dtype, []).append((rows, table))
+        for group in groups.values():
             seconds = round(sum(table.seconds for _, table in group), 3)
             failures = [failure for _, table in group for failure in table.failures]
-            about = json.dumps([self._mark, made_by, seconds, failures]).encode()
+            about = json.dumps([self._mark, group[0][1].versions, seconds, failures]).encode()
             rows, file = np.concatenate([rows for rows, _ in group]), io.BytesIO()
             np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=rows)
             data = file.getvalue()

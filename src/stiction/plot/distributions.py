@@ -26,7 +26,7 @@ from stiction.plot.axes import (
     with_unit,
 )
 from stiction.plot.style import BAND, INK, MARKERS, PALE, QUIET, color, series
-from stiction.reliability.answer import Answer, bounded
+from stiction.reliability.answer import Answer
 from stiction.statistics import density
 from stiction.statistics import quantiles as estimate_quantiles
 
@@ -272,7 +272,7 @@ def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> FigureAxes:
     factor, unit = unit_for("Pa", curve["stress"].values)
     x = curve["stress"].values * factor
     with on_axes(ax) as axes:
-        if bounded(bound):
+        if 0.0 < bound < np.inf:
             axes.axvline(bound * factor, color=QUIET, linewidth=0.7, linestyle=":")
         text = "subset simulation, 90 % interval"
         if "members" in curve:

@@ -216,7 +216,23 @@ def onset(
     is_plane = problem.interface.is_plane
     size = {"height": map_height(problem.interface, 2.0)} if is_plane else {"width": PAGE}
     with on_axes(ax, **size) as axes:
-        (_draw_plane if is_plane else _draw_line)(axes, problem, rows[int(sample)], row)
+        tau_p, interface = rows[int(sample)], problem.interface
+        factor, unit = unit_for("Pa", tau_p)
+        if is_plane:
+            text = rf"strength $\tau_p$ ({unit})"
+            draw_map(axes, interface, tau_p * factor, text, cmap="cividis")
+        else:
+            x = interface.x * unit_for("m", interface.lengths)[0]
+            axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
+            with suppress(
+                InputError
+            ):  # no single nucleation length: the strength alone is drawn
+                averaged = nucleation_stress(problem, tau_p) * factor
+                axes.plot(x, averaged, label=r"nucleation stress $\tau_n$", **series(0))
+            name_line(axes, interface, with_unit("shear stress", unit))
+            axes.margins(y=0.08)
+            add_friction_scale(axes, problem, "y", factor)
+        _mark(axes, interface, row, factor)
         if ax is None:  # below new axes, but inside axes of the caller, whose layout stays
             axes.figure.legend(loc="outside lower center", ncols=2)
         else:
@@ -249,31 +265,6 @@ def chosen_row(
         )
     only = slice(int(sample), int(sample) + 1)
     return {name: result.isel(sample=only) for name, result in by_sample.items()}
-
-
-def _draw_line(
-    axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
-) -> None:
-    interface = problem.interface
-    x = interface.x * unit_for("m", interface.lengths)[0]
-    factor, unit = unit_for("Pa", tau_p)
-    axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-    with suppress(InputError):  # no single nucleation length: the strength alone is drawn
-        averaged = nucleation_stress(problem, tau_p)
-        axes.plot(x, averaged * factor, label=r"nucleation stress $\tau_n$", **series(0))
-    _mark(axes, interface, results, factor)
-    name_line(axes, interface, with_unit("shear stress", unit))
-    axes.margins(y=0.08)
-    add_friction_scale(axes, problem, "y", factor)
-
-
-def _draw_plane(
-    axes: Axes, problem: Problem, tau_p: Array, results: Mapping[str, xr.Dataset]
-) -> None:
-    interface = problem.interface
-    factor, unit = unit_for("Pa", tau_p)
-    draw_map(axes, interface, tau_p * factor, rf"strength $\tau_p$ ({unit})", cmap="cividis")
-    _mark(axes, interface, results, factor)
 
 
 def _mark(

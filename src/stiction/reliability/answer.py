@@ -383,8 +383,3 @@ def band_of(members: Array) -> tuple[float, float]:
     hidden = (zeros < known_from) & (np.ceil(ranks) >= zeros) & (np.floor(ranks) < known_from)
     low, high = np.where(hidden, math.nan, ends).tolist()
     return low, high
-
-
-def bounded(lowest: float) -> bool:
-    """Return whether the least stress is a useful bound: finite and above zero."""
-    return bool(np.isfinite(lowest) and lowest > 0.0)

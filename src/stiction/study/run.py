@@ -176,28 +176,23 @@ class StoredRun:
                 f"{self.path}: {int(rows.done.sum())} of {rows.done.size} samples exist."
                 " Run the study again to compute the others, or pass partial=True"
             )
-        export(self._checked(rows), place, events)
+        result = self._checked(rows)
+        if place.suffix == ".nc" and not events:
+            write_result(result, place)
+        elif place.suffix == ".csv":
+            frame = event_table(result) if events else table_of(result)
+            # Numbers are written as the shortest text that reads back to
+            # the same bits.
+            write_whole(place, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
+        elif events:
+            raise InputError(
+                f"{place}: a table of events is .csv; .nc holds them without --events"
+            )
+        else:
+            raise InputError(f"{place}: the suffix must be .nc or .csv, got {place.suffix!r}")
 
 
 # -- files for other programs --------------------------------------------------------------------
-
-
-def export(result: xr.Dataset, path: Path, events: bool = False) -> None:
-    """Write a result as NetCDF (.nc) or as a table (.csv), completely or not at all.
-
-    If `events` is true, the table has a row for each event.
-    """
-    if path.suffix == ".nc" and not events:
-        write_result(result, path)
-    elif path.suffix == ".csv":
-        frame = event_table(result) if events else table_of(result)
-        # Numbers are written as the shortest text that reads back to
-        # the same bits.
-        write_whole(path, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
-    elif events:
-        raise InputError(f"{path}: a table of events is .csv; .nc holds them without --events")
-    else:
-        raise InputError(f"{path}: the suffix must be .nc or .csv, got {path.suffix!r}")
 
 
 def write_result(result: xr.Dataset, path: Path) -> None:

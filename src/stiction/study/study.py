@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import codecs
 import itertools
 import json
+import re
+import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
+import pydantic
 import tomli_w
 from pydantic import (
     BeforeValidator,
@@ -22,7 +26,7 @@ from pydantic import (
 )
 
 from stiction.base.errors import InputError, StoreError, prefixed
-from stiction.base.files import write_whole
+from stiction.base.files import content_of, write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
     Count,
@@ -37,6 +41,9 @@ from stiction.base.model import (
     Text,
     check,
     checked,
+    describe,
+    explain,
+    keys_of,
     model,
     to_plain,
 )
@@ -44,10 +51,11 @@ from stiction.ensemble.dataset import GridAxes, distinct, variables_in
 from stiction.ensemble.experiment import Experiment, Measured
 from stiction.ensemble.monte_carlo import First, Samples, gather
 from stiction.ensemble.store import Store, read_study
-from stiction.inference.peaks import Peaks, make_peaks
+from stiction.inference.peaks import Peaks, make_peaks, read_peaks
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.friction import SCALES
 from stiction.problem.problem import Problem, stress_of
+from stiction.problem.profiles import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import FIRST_MEMBERS, Source
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
@@ -55,14 +63,20 @@ from stiction.reliability.answer import Answer
 from stiction.reliability.design import design_stress
 from stiction.reliability.failure import failure_probability
 from stiction.reliability.solving import Probability, TargetCv, too_slow
-from stiction.study.reading import check_toml, read_toml, validated
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
 from stiction.study.sweep import SWEPT, Point, Sweep, grid_axes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-T = TypeVar("T")
+TABLES = "problem", "random", "method"
+"""Tables that a study file must have."""
+MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
+"""Bytes of a study file, bytes apart from lists of numbers, and dots in a line of those bytes."""
+SHOWN_KEYS = 10
+"""Keys in a message about a file that is no study."""
+_NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
+"""A line that holds numbers, or a key and numbers."""
 MOST_WRITTEN = 8
 """Random interfaces that a study file holds itself; more of them are in a file next to it."""
 MethodOfStudy: Any = Annotated[
@@ -415,7 +429,7 @@ class Study(_Parts):
             plain["random"] = beside.name
         text = tomli_w.dumps(plain).encode()
         with prefixed("path"):
-            check_toml(text)
+            _check_toml(text)
         if many:
             write_whole(beside, json.dumps(interfaces).encode())
         write_whole(place, text)
@@ -424,7 +438,7 @@ class Study(_Parts):
     def from_dict(cls, given: dict[str, Any], *, folder: str | Path | None = None) -> Study:
         """Make a study from plain dictionaries. Files of profiles are in `folder`."""
         place = None if folder is None else check("folder", folder, FilePath)
-        return validated(cls, given, place)
+        return _validated(given, place, [])
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
@@ -443,10 +457,95 @@ class Study(_Parts):
         return cls.from_dict(given)
 
 
+# -- study files, which may come from strangers ---------------------------------------------------
+
+
+def _check_toml(content: bytes) -> None:
+    """Refuse text that Python's parser would need long for, such as keys with a thousand parts."""
+    words = 0
+    for line in content.split(b"\n"):
+        match = _NUMBERS.fullmatch(line)
+        if match and match[1].count(b".") <= match[1].count(b",") + 1:
+            line = line[: match.start(1)]
+        words += len(line)
+        if line.count(b".") > MAX_DOTS and not line.lstrip().startswith(b"#"):
+            raise InputError(
+                f"has a line with more than {MAX_DOTS} dots apart from its numbers"
+            )
+    if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
+        raise InputError(
+            f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} outside lists of numbers."
+            " Name profiles by files next to the study, such as strength.npy"
+        )
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    """Return the tables in a TOML file, or raise an `InputError`."""
+    content = content_of(path)
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))  # of PowerShell 5.1
+    with prefixed(str(path)):
+        try:
+            text = content.decode("utf-16" if wide else "utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InputError(
+                f"is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
+            ) from None
+        _check_toml(text.encode())
+        try:
+            return tomllib.loads(text)
+        except (RecursionError, ValueError) as error:  # the latter for integers of many digits
+            advice = "`stiction example FILE` writes a study"
+            if "'\\'" in str(error):
+                advice = "in paths, write / for \\, or put them in single quotes"
+            raise InputError(f"is not valid TOML: {error} ({advice})") from None
+
+
+def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) -> Study:
+    """Return the study in plain form. Its files are in `folder`, and are added to `files`."""
+    check("study", given, dict)
+    if given and not {*keys_of(Study)} & {*given}:
+        some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
+        raise InputError(
+            f"study: must have the tables {', '.join(TABLES)}, got {some}. `stiction example FILE`"
+            " writes a study to start from"
+        )
+    context = {}
+    if folder is not None:
+
+        def read(profile: Any, name: str) -> Any:
+            file = profile_in_file(profile, name, folder)
+            if isinstance(file, ProfileFile):
+                files.append(file.path)
+            return file
+
+        context["read"] = read
+        given = dict(given)
+        for key, reader in (("random", _stored_interfaces), ("peaks", read_peaks)):
+            if isinstance(given.get(key), str):
+                files.append(folder / check(key, given[key], FilePath))
+                with prefixed(key):
+                    given[key] = reader(files[-1])
+    try:
+        return pydantic.TypeAdapter(Study).validate_python(given, context=context)
+    except pydantic.ValidationError as error:
+        raise InputError(explain(error, given)) from None
+
+
+def _stored_interfaces(path: Path) -> list[Any]:
+    """Return the interfaces in a file that `Study.to_toml` wrote."""
+    with prefixed(str(path)):
+        content = content_of(path)
+        try:
+            interfaces = json.loads(content)
+        except (RecursionError, ValueError) as error:
+            raise InputError(f"is not valid JSON: {error}") from None
+        return list(check("interfaces", interfaces, list))
+
+
 def read_with_files(path: Path) -> tuple[Study, list[Path]]:
     """Return the study in a TOML file, and the files next to it that it names."""
-    named: list[Path] = []
-    return validated(Study, read_toml(path), path.parent, named), named
+    files: list[Path] = []
+    return _validated(_read_toml(path), path.parent, files), files
 
 
 def open_run(path: Any) -> StoredRun:
