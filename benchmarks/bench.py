@@ -26,8 +26,7 @@ from scipy.optimize import linprog
 from scipy.special import ndtr
 
 import stiction as st
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import make_search
+from stiction.methods.equilibrium.solver import make_search, sample_of
 
 RATIOS = (0.25, 0.5, 1.0, 2.0)
 """xi_0/h_n of Albertini et al. (2020)."""

@@ -19,9 +19,8 @@ import numpy as np
 import stiction as st
 from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.dynamics.summary import front_speeds
-from stiction.methods.equilibrium.endings import Outcome, PathStatus
-from stiction.methods.equilibrium.sample import sample_of
-from stiction.methods.equilibrium.solver import follow_to_sliding, make_search
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search, sample_of
+from stiction.methods.equilibrium.state import Outcome, PathStatus
 
 MACHINE = 2e7
 DRIVES = {
