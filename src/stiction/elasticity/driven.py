@@ -75,8 +75,7 @@ class Driven:
 
     def travel(self, force: Any, slip: Array) -> Any:
         """Return the total travel of both drives (m) at a force per unit depth (N/m)."""
-        moved = 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
-        return moved
+        return 2.0 * force / self.drive_stiffness + (slip * self.shear).mean(axis=-1)
 
 
 def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
@@ -127,9 +126,8 @@ def _windows_at(blocks: Driven, weakening_rate: float) -> Windows:
     # has a single sign if K has no positive entry off its diagonal.
     modes = np.zeros((len(runs), max((end - begin for begin, end in runs), default=1)))
     for row, (begin, end) in zip(modes, runs, strict=True):
-        _, vectors = scipy.linalg.eigh(
-            matrix[begin:end, begin:end], subset_by_index=[0, 0], check_finite=False
-        )
+        block = matrix[begin:end, begin:end]
+        _, vectors = scipy.linalg.eigh(block, subset_by_index=[0, 0], check_finite=False)
         row[: end - begin] = np.abs(vectors[:, 0])
         row /= row.sum()
     starts, ends = np.array(runs, dtype=np.int64).reshape(-1, 2).T

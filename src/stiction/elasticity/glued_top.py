@@ -104,9 +104,8 @@ class GluedTop:
         # The sum of both logarithms is smooth.
         # On the diagonal it has this limit.
         kernel += weight * np.log(sine)
-        kernel[np.diag_indices(count)] = harmonics.height / np.pi + weight * (
-            constant + np.log(2.0 * np.pi / period / self.stretch)
-        )
+        limit = weight * (constant + np.log(2.0 * np.pi / period / self.stretch))
+        kernel[np.diag_indices(count)] = harmonics.height / np.pi + limit
         # Put the logarithm back with the exact weights of its Fourier modes.
         modes = np.arange(1, count // 2 + 1)
         logarithm = np.fft.irfft(np.append(0.0, 0.5 * period / modes), count)
@@ -118,9 +117,8 @@ class GluedTop:
             kernel = 0.5 * (kappa * kappa + 1.0) * sums.inverse + kappa * across * sums.plain
             matrix += self.step * (kernel + 2.0 * np.outer(end, end) * sums.first)
         # All further reflections, harmonic by harmonic.
-        remainder = harmonics.reflected(
-            1.0 / harmonics.k, self._traction, self.x, self._traction, self.x
-        )
+        points = self._traction, self.x
+        remainder = harmonics.reflected(1.0 / harmonics.k, *points, *points)
         matrix -= self.step * (kappa + 1.0) ** 2 / 16.0 * remainder
         scaled: Array = matrix / (self.modulus * harmonics.height * (kappa + 1.0))
         return scaled

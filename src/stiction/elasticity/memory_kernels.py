@@ -242,9 +242,8 @@ class _Polish:
         return modes, q, weights, emphasis * (self.values - (modes @ weights).real)
 
     def run(self, poles: Complex, emphasis: Floats, iterations: int) -> tuple[Complex, Complex]:
-        parameters = np.concatenate(
-            [np.log(np.maximum(-poles.real - _MIN_DECAY_RATE, 1e-9)), poles.imag]
-        )
+        decay_rate = np.maximum(-poles.real - _MIN_DECAY_RATE, 1e-9)
+        parameters = np.concatenate([np.log(decay_rate), poles.imag])
         modes, q, weights, residual = self.project(self.poles(parameters), emphasis)
         cost, damping = float(residual @ residual), 1e-3
         for _ in range(iterations):

@@ -25,8 +25,7 @@ even nodes act only on odd nodes, and vice versa.
 `_apply_rows` does the same with rows of a dense matrix, which is symmetric.
 """
 
-# numba compares the names of arguments with their annotations, so
-# overloads have no annotations.
+# Functions that numba chooses by type have no annotations.
 # mypy: disable-error-code="no-untyped-def"
 
 from collections.abc import Callable
@@ -171,63 +170,41 @@ def _apply_rows_outside(
             _apply_rows(K, nodes, count, values, start, product[start:end])
 
 
-def _by_type(entries: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> Any:
-    """Return the function that numba compiles for a type of entries, or raise an error."""
-    # numba's type of a named tuple knows the class of the tuple.
-    kind = getattr(entries, "instance_class", None)
-    if kind is CircularEntries:
-        return circular
-    if kind is DenseEntries:
-        return dense
-    raise TypingError(
-        f"entries: kernels do not know the stiffness of {entries}. Give CircularEntries or"
-        " DenseEntries, or add a case to each overload of stiction.elasticity.stiffness"
-    )
+def _by_type(stub: Any, circular: Callable[..., Any], dense: Callable[..., Any]) -> None:
+    """Let numba compile a function by the type of its first argument, in place of a stub."""
+
+    @overload(stub, strict=False)
+    def choose(K, *others):
+        # numba's type of a named tuple knows the class of the tuple.
+        kind = getattr(K, "instance_class", None)
+        if kind not in (CircularEntries, DenseEntries):
+            raise TypingError(
+                f"entries: kernels do not know the stiffness of {K}. Give CircularEntries or"
+                " DenseEntries, or add a case to `_by_type` in stiction.elasticity.stiffness"
+            )
+        return circular if kind is CircularEntries else dense
 
 
-@overload(entry)
-def _entry(entries, i, j):
-    return _by_type(
-        entries,
-        circular=lambda entries, i, j: entries.column[abs(i - j)],
-        dense=lambda entries, i, j: entries.rows[i * entries.n_nodes + j],
-    )
+def _relief_of_rows(K, profile, slip):
+    if K.relief == 0.0:
+        return 0.0
+    total = 0.0
+    for i in range(slip.shape[0]):
+        total += profile[i] * slip[i]
+    return K.relief * total / slip.shape[0]
 
 
-@overload(mean_relief)
-def _mean_relief(entries, profile, slip):
-    def dense(entries, profile, slip):
-        if entries.relief == 0.0:
-            return 0.0
-        total = 0.0
-        for i in range(slip.shape[0]):
-            total += profile[i] * slip[i]
-        return entries.relief * total / slip.shape[0]
-
-    return _by_type(entries, circular=lambda entries, profile, slip: 0.0, dense=dense)
-
-
-@overload(apply)
-def _apply(entries, nodes, count, values, halves, product):
-    return _by_type(
-        entries,
-        circular=lambda entries, nodes, count, values, halves, product: apply_circular(
-            entries, nodes, count, values, halves, product
-        ),
-        dense=lambda entries, nodes, count, values, halves, product: _apply_rows(
-            entries, nodes, count, values, ZERO, product[: entries.n_nodes]
-        ),
-    )
-
-
-@overload(apply_outside)
-def _apply_outside(entries, nodes, count, values, is_slipping, halves, product):
-    return _by_type(
-        entries,
-        circular=lambda entries, nodes, count, values, is_slipping, halves, product: (
-            apply_circular(entries, nodes, count, values, halves, product)
-        ),
-        dense=lambda entries, nodes, count, values, is_slipping, halves, product: (
-            _apply_rows_outside(entries, nodes, count, values, is_slipping, product)
-        ),
-    )
+_by_type(entry, lambda K, i, j: K.column[abs(i - j)], lambda K, i, j: K.rows[i * K.n_nodes + j])
+_by_type(mean_relief, lambda K, profile, slip: 0.0, _relief_of_rows)
+_by_type(
+    apply,
+    lambda K, at, count, d, halves, out: apply_circular(K, at, count, d, halves, out),
+    lambda K, at, count, d, halves, out: _apply_rows(K, at, count, d, ZERO, out[: K.n_nodes]),
+)
+_by_type(
+    apply_outside,
+    lambda K, at, count, d, slips, halves, out: apply_circular(K, at, count, d, halves, out),
+    lambda K, at, count, d, slips, halves, out: _apply_rows_outside(
+        K, at, count, d, slips, out
+    ),
+)

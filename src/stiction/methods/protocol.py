@@ -232,7 +232,5 @@ def label(
 ) -> xr.Dataset:
     """Return values for many samples as a dataset over 'sample' and, if needed, the nodes."""
     variables = variables_of(problem, method, "friction_coefficient" in values)
-    coordinates = {"sample": (samples, SAMPLE)}
-    return to_dataset(
-        values, variables | dict(more_variables), coordinates, attributes, problem.interface
-    )
+    variables, coordinates = variables | dict(more_variables), {"sample": (samples, SAMPLE)}
+    return to_dataset(values, variables, coordinates, attributes, problem.interface)

@@ -100,9 +100,8 @@ def griffith_length(
 
     # 2. The lengths at which a crack is tested, and whether it runs
     # there under each load.
-    lengths = problem.interface.spacing * np.append(
-        SHORT_LENGTHS, np.arange(1, problem.interface.size)
-    )
+    interface = problem.interface
+    lengths = interface.spacing * np.append(SHORT_LENGTHS, np.arange(1, interface.size))
     above = runs(lengths, tau)
     # A crack can be arrested only after it has begun to run.
     if arrest:

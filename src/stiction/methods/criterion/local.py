@@ -239,9 +239,8 @@ class LocalCriterion(Listed):
                 # 1.
                 windows = windows_of(problem, weakening_rate)
                 # 2.
-                load[rows], place[rows], chosen = least_average(
-                    interface, windows, excess[rows], profile
-                )
+                least = least_average(interface, windows, excess[rows], profile)
+                load[rows], place[rows], chosen = least
                 if interface.is_plane:
                     patches = [(y.aspect, *y.extents, y.area) for y in windows]
                     patch[rows] = np.array(patches)[chosen]

@@ -327,9 +327,8 @@ def _smallest_unstable(
         middle = (low + high) // 2 if ellipse else min(low + probe, high - 1)
         inside = distance <= radii[middle]
         vector = vector.copy() if vector[inside].any() else np.ones(column.shape)
-        value = lowest_eigenvector(
-            operator, inside.reshape(-1), vector.reshape(-1), tolerance, MAX_ELLIPSE_ITERATIONS
-        )
+        flat = inside.reshape(-1), vector.reshape(-1)
+        value = lowest_eigenvector(operator, *flat, tolerance, MAX_ELLIPSE_ITERATIONS)
         if value <= W:
             high, ellipse = middle, Ellipse(float(radii[middle]), value, vector)
         else:

@@ -155,9 +155,8 @@ def _mesh(
 
 def row_heights(height: float, spacing: float) -> Array:
     """Return the heights y of the rows, m. The first two are `spacing` apart."""
-    steps = spacing * np.minimum(
-        ROW_RATIO ** np.arange(int(2.0 * height / spacing) + 2), MAX_ROW_HEIGHT
-    )
+    numbers = np.arange(int(2.0 * height / spacing) + 2)
+    steps = spacing * np.minimum(ROW_RATIO**numbers, MAX_ROW_HEIGHT)
     count = max(int(np.searchsorted(np.cumsum(steps), height * (1.0 - 1e-9))) + 1, 2)
     # Stretch the rows to end at the top, except the first, which fits
     # the interface.

@@ -214,9 +214,8 @@ class EventRecord:
         first = int(event.before.direction.argmax())
         if np.isfinite(arrival).any():
             first = int(np.nanargmin(arrival))
-        values: dict[str, Any] = {
-            name: np.array([frame[name] for frame in self.frames]) for name in self.frames[0]
-        }
+        names, frames = self.frames[0], self.frames
+        values: dict[str, Any] = {name: np.array([f[name] for f in frames]) for name in names}
         time = values.pop("time")
         values |= {
             "peak_strength": self.rows.strength[0],

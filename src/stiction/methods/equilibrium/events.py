@@ -202,9 +202,8 @@ def patch_measures(
 def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) -> dict[str, Any]:
     """Return the variables of one event."""
     (before, after, known), interface, law = event, problem.interface, problem.friction
-    initial, profile = (
-        float(rows.mean(values)) for values in (rows.initial_stress[row], rows.load_profile)
-    )
+    means = (rows.initial_stress[row], rows.load_profile)
+    initial, profile = (float(rows.mean(values)) for values in means)
     slips = before.slip.reshape(interface.shape), after.slip.reshape(interface.shape)
     added = slips[1] - slips[0]
     stress_before = before.load - problem.relief(before.slip)

@@ -73,9 +73,8 @@ def _check_loads(loads: Any) -> Array:
     # `prepend` also refuses a negative first load.
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
     if not (rises and np.isfinite(given[-1])):
-        raise InputError(
-            f"loads: must be finite, not negative, and rise, got {describe(given.tolist())}"
-        )
+        text = describe(given.tolist())
+        raise InputError(f"loads: must be finite, not negative, and rise, got {text}")
     return given
 
 

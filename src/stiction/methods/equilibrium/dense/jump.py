@@ -333,9 +333,8 @@ def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspa
         if course == Course.GOES_ON and not (progress and steps_in_row < MAX_ELASTIC_STEPS):
             # 2. and 3.
             steps_in_row = 0
-            course, n_slipping = _step_with_true_pieces(
-                state, load, true_pieces, n_slipping, tolerance
-            )
+            end = _step_with_true_pieces(state, load, true_pieces, n_slipping, tolerance)
+            course, n_slipping = end
         if course == Course.SLIDES:
             return Outcome.SLIDING
         if course == Course.RESTS:

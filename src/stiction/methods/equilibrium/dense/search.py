@@ -105,9 +105,8 @@ class DenseSearch:
         """Workspaces of the thread, for elastic steps (and programmes) and for true pieces."""
         # All threads use the same search, but kernels overwrite the workspaces.
         if not hasattr(self._of_thread, "workspaces"):
-            self._of_thread.workspaces = tuple(
-                make_workspace(self.elastic.entries, self.nodes) for _ in range(2)
-            )
+            elements = (self.elastic.entries, self.nodes)
+            self._of_thread.workspaces = make_workspace(*elements), make_workspace(*elements)
         pair: tuple[Workspace, Workspace] = self._of_thread.workspaces
         return pair
 
@@ -116,10 +115,8 @@ class DenseSearch:
         low, high = _range_of_weakening_rates(sample)
         windows = self.elastic.windows(low, high) if high > 0.0 else NONE
         allowed, multiplier = np.empty((2, self.nodes))
-        bound = window_bound(
-            sample.excess, sample.profile, sample.weakening_rate, windows, allowed, multiplier
-        )
-        return bound, multiplier
+        excess, profile, W = sample.excess, sample.profile, sample.weakening_rate
+        return window_bound(excess, profile, W, windows, allowed, multiplier), multiplier
 
     def solve(
         self, sample: StaticSample, cap: float = np.inf, state: EquilibriumState | None = None
@@ -247,10 +244,8 @@ class DenseSearch:
         self, present: StaticSample, instability: EquilibriumState, multiplier: Array
     ) -> Array:
         """Write the gap of an instability, and return K times the multiplier."""
-        Ky = np.empty(self.nodes)
-        instability.gap = certificate(
-            present, instability.slip, instability.Kd, multiplier, self._workspaces[0], Ky
-        )
+        Ky, slip, Kd = np.empty(self.nodes), instability.slip, instability.Kd
+        instability.gap = certificate(present, slip, Kd, multiplier, self._workspaces[0], Ky)
         return Ky
 
     def at(

@@ -339,10 +339,8 @@ class PlaneSearch:
         if outcome == Outcome.ARRESTED and not turns:
             # It only shows that a stable path was hard to follow.
             outcome = Outcome.NOT_UNSTABLE
-        after = EquilibriumState(
-            load_beyond, end.slip, instability.direction, status=PathStatus.STABLE
-        )
-        return Jump(outcome, after)
+        direction, status = instability.direction, PathStatus.STABLE
+        return Jump(outcome, EquilibriumState(load_beyond, end.slip, direction, status=status))
 
     def at(
         self, sample: StaticSample, state: EquilibriumState, load: float
