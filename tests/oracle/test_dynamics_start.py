@@ -95,7 +95,7 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
         for crossings in (20.0, 5.0, 1.25, 0.4):
             monkeypatch.setattr(module, "_CROSSINGS", crossings)
             run = run_of(PROBLEM, strength, method)
-            state = slow_start(setting, run, PROBLEM.sample(strength), 0, 2e7)
+            state = slow_start(setting, run, PROBLEM.sample(strength), 0)
             estimates.append(state.now.run.start_error)
             run.take_steps(state, 10_000)
             error = abs(state.now.results.onset_stress - exact)
@@ -133,7 +133,7 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     """Slip rates by central differences of equilibria; what is radiated only begins there."""
     run = run_of(CROOKED, CROOKED_STRENGTH, st.Rupture(loading_rate=1e7))
     search, rows = static_search(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
-    state = slow_start(search, run, rows, 0, 1e7)
+    state = slow_start(search, run, rows, 0)
     static, impedance = sample_of(rows, search.pieces, 0), run.medium.impedance
     load = state.now.step.load - impedance * state.slip_rate.mean() / 1.2  # <p>
     step = 0.01 * (search.solve(static).load - load)

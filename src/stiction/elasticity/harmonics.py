@@ -97,12 +97,8 @@ class Harmonics:
         ).transpose(2, 0, 1)
         # The same of the beam without ends, as combinations of the four
         # solutions in s.
-        endless = [
-            [1.0, 1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, 0.0, 1.0, 1.0],
-            [0, 0, 0, -1],
-        ]
+        endless = np.kron(np.diag([1.0, 0.0]), [[1.0, 1.0], [0.0, 1.0]])
+        endless += np.kron(np.diag([0.0, 1.0]), [[1.0, 1.0], [0.0, -1.0]])
         single = np.kron(np.eye(2), [[1.0, 1.0], [1.0, 2.0]])  # one clamp without the other
         inverse = np.linalg.inv(clamps)
         # All reflections but the single reflections, which have closed forms.

@@ -95,15 +95,6 @@ def static_stiffness(mode: str, eta: float) -> float:
     return 1.0 if mode == "III" else 2.0 * (1.0 - 1.0 / eta**2)
 
 
-def _half_arc() -> tuple[Floats, Floats]:
-    """Step 1: return angles from the upper branch point, and weights, for half an arc."""
-    t = np.arange(0.0, _RULE_END, _RULE_STEP)
-    angle = np.pi / (1.0 + np.exp(np.pi * np.sinh(t)))
-    weight = (np.pi**2 / 4.0) * _RULE_STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
-    weight[0] *= 0.5
-    return angle, weight
-
-
 def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     """Step 1: return nodes s, Re s < 0, and weights w with C(T) = Re sum w exp(s T).
 
@@ -111,7 +102,11 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     odd across an arc contribute: the shear root at |s| = 1 and the
     dilatational root at |s| = eta.
     """
-    angle, weight = _half_arc()
+    # Angles from the upper branch point, and weights, for half an arc.
+    t = np.arange(0.0, _RULE_END, _RULE_STEP)
+    angle = np.pi / (1.0 + np.exp(np.pi * np.sinh(t)))
+    weight = (np.pi**2 / 4.0) * _RULE_STEP * np.cosh(t) / np.cosh(0.5 * np.pi * np.sinh(t)) ** 2
+    weight[0] *= 0.5
     rotation = np.exp(1j * angle)
     # sqrt(1 + s^2) at s = i rotation, in a form without cancellation
     # next to the branch point.
@@ -123,12 +118,8 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     else:
         fast = eta * s
         nodes = np.concatenate([s, fast])
-        weights = np.concatenate(
-            [
-                -((2.0 + s * s) ** 2) / (s**3 * root) * factor,
-                4.0 * root / fast**3 * eta * factor,
-            ]
-        )
+        slow_weights = -((2.0 + s * s) ** 2) / (s**3 * root) * factor
+        weights = np.concatenate([slow_weights, 4.0 * root / fast**3 * eta * factor])
     kept = np.abs(weights) > 1e-18
     return nodes[kept], weights[kept]
 

@@ -42,7 +42,7 @@ class HalfSpaces(NamedTuple):
 
     def symbol(self, shape: tuple[int, ...]) -> Array:
         """Return K(k), Pa/m, for the modes of an interface as in ``numpy.fft.rfftn``; read-only."""
-        return _symbol(*self, shape)
+        return _symbol(self, shape)
 
     def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
         """Return h_n, m, in each direction, for a weakening rate (Pa/m)."""
@@ -51,9 +51,8 @@ class HalfSpaces(NamedTuple):
 
 
 @functools.lru_cache(maxsize=16)
-def _symbol(
-    lengths: tuple[float, ...], moduli: tuple[float, ...], shape: tuple[int, ...]
-) -> Array:
+def _symbol(half_spaces: HalfSpaces, shape: tuple[int, ...]) -> Array:
+    lengths, moduli = half_spaces
     last = 2.0 * np.pi / lengths[-1] * np.arange(shape[-1] // 2 + 1)
     if len(shape) == 1:
         symbol: Array = 0.5 * moduli[0] * last

@@ -81,9 +81,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
-        raise InputError(
-            "initial_stress: is too far below the strength. Check the units of both"
-        )
+        raise InputError("initial_stress: is far below the strength. Check the units of both")
     rise = run.slope(time) * step / scale
     if rise > _COARSE_RISE:
         slower = run.slope(time) * _COARSE_RISE / rise

@@ -177,18 +177,9 @@ class Run:
         now.stepping.phase = Phase.EXPLICIT if explicit else Phase.IMPLICIT
         now.stepping.next_size = min(max(size, first), LARGEST_STEP)
         return RuptureState(
-            slip=delta,
-            slip_rate=slip_rate,
-            stress=stress,
-            slip_hat=slip_hat,
-            past=slip_rate.copy(),
-            memory=memory,
-            memory_sum=memory_sum,
-            arrival=arrival,
-            maximum_slip=delta.copy(),
-            event_slip=delta.copy(),
-            diagnostics=diagnostics,
-        )
+            delta, slip_rate, stress, slip_hat, slip_rate.copy(), memory, memory_sum, arrival,
+            maximum_slip=delta.copy(), event_slip=delta.copy(), diagnostics=diagnostics,
+        )  # fmt: skip
 
     def ended(self, state: RuptureState) -> bool:
         """Return whether the end time is reached, apart from round-off after many steps."""
@@ -204,14 +195,11 @@ class Run:
         if self.ended(state):
             return "time"
         times, values = self.setting.load
-        resting = (  # the last piece of the load does not rise, and no node slips
-            not state.explicit
-            and state.now.step.time >= times[-1]
-            and values[-1] <= values[-2]
-            and self.medium.impedance * state.slip_rate.max()
-            <= _RESTING_STRESS * state.now.run.scale
-        )
-        return "rest" if self.stop != "time" and resting else None
+        # The last piece of the load does not rise, and no node slips.
+        level = state.now.step.time >= times[-1] and values[-1] <= values[-2]
+        fastest = self.medium.impedance * state.slip_rate.max()
+        rests = not state.explicit and fastest <= _RESTING_STRESS * state.now.run.scale
+        return "rest" if self.stop != "time" and level and rests else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
         """Continue to the run's end, or to `max_steps` in total. Return (ending, `Reason`).

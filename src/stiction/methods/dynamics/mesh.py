@@ -104,7 +104,7 @@ def _mesh(
 ) -> Mesh:
     # 1. Rows, elements, masses and the drive.
     dx, n, drive = interface.spacing, interface.size, specimen.drive
-    depth = specimen.thickness or 1.0
+    depth, c_s = specimen.thickness or 1.0, solid.shear_wave_speed
     heights = row_heights(specimen.height, dx)
     elements, strips = _elements(np.diff(heights), dx, solid, mode == "III")
     # A row carries half of the elements above and below it.
@@ -127,11 +127,8 @@ def _mesh(
         platen=isinstance(drive, Platen),
         stiffness=2.0 * drive.stiffness / depth,
         drive_mass=drive.mass / depth,
-        impedance=0.5 * solid.shear_modulus / solid.shear_wave_speed,
-        attenuation=np.pi
-        * solid.shear_wave_speed
-        / interface.measure
-        / specimen.quality_factor,
+        impedance=0.5 * solid.shear_modulus / c_s,
+        attenuation=np.pi * c_s / interface.measure / specimen.quality_factor,
     )
     # 2. and 3. The static response, with the machine, and its correction.
     static, profile, stiffness = condensed(mesh, n)
@@ -141,14 +138,14 @@ def _mesh(
     blocks = specimen.driven(interface.measure, n, solid, mode)
     correction = blocks.stiffness - static
     # 4. The step.
-    speed = solid.shear_wave_speed * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
+    speed = c_s * (1.0 if mesh.anti_plane else solid.wave_speed_ratio)
     viscous = GRID_VISCOSITY * dx / speed
-    step = courant * _limit(speed, solid.shear_wave_speed, mesh, correction, viscous)
+    step = courant * _limit(speed, c_s, mesh, correction, viscous)
     longest = max(interface.measure, specimen.height)
     return mesh._replace(
         viscous_time=viscous,
         step=step,
-        window=int(np.ceil(2.0 * longest / solid.shear_wave_speed / step)),
+        window=int(np.ceil(2.0 * longest / c_s / step)),
         correction=correction.astype(np.float32),
     )
 
@@ -236,14 +233,15 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
     return share / share.sum()
 
 
-def _limit(
-    speed: float, shear_speed: float, mesh: Mesh, correction: Array, viscous: float
-) -> float:
-    """Return the largest stable step, s, for mesh, viscosity and correction together."""
+def _limit(c: float, c_s: float, mesh: Mesh, correction: Array, viscous: float) -> float:
+    """Return the largest stable step, s, with the speeds c and c_s of the fastest waves and shear.
+
+    It holds for mesh, viscosity and correction together.
+    """
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     # Bound of the squared frequency of an element, then of the
     # correction on the interface.
-    squares = max(4.0 * speed**2, 8.0 / 3.0 * (speed**2 + shear_speed**2)) / thin**2
+    squares = max(4.0 * c**2, 8.0 / 3.0 * (c**2 + c_s**2)) / thin**2
     last = [len(correction) - 1] * 2
     stiffest = float(scipy.linalg.eigvalsh(correction, subset_by_index=last)[0])
     squares += 2.0 * max(stiffest, 0.0) * mesh.spacing / mesh.mass[0]

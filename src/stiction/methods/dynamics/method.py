@@ -234,7 +234,7 @@ class Rupture(Listed):
                 run = make_run(self, medium, rows, i)
                 start = None
                 if static and loading_rate and not from_rest:
-                    start = slow_start(static, run, rows, i, loading_rate)
+                    start = slow_start(static, run, rows, i)
                 summaries.append(self._summary_of(run, start, rows, i))
                 rises.append(checks.rise_in_crossing(run, summaries[-1]))
                 cut.append(run.cut_short)

@@ -97,7 +97,10 @@ def write_scec(
         for at in (run.sel(station=name) for name in run.station.values)
     ]
     files = _file_names(places, run.station.values.tolist())
-    begin = _first_onset(run)
+    # Times count from the first event or onset, or else from the start.
+    known = [run[name].values.ravel() for name in ("event_time", "onset_time") if name in run]
+    onsets = np.concatenate([*known, [np.nan]])
+    begin = float(np.nanmin(onsets) if np.isfinite(onsets).any() else run.time[0])
     target.mkdir(parents=True, exist_ok=True)
     paths = []
     for name, file, (j, k) in zip(run.station.values, files, places, strict=True):
@@ -136,13 +139,6 @@ def write_scec(
 
 def _write_table(path: Path, header: list[str], columns: list[Any], form: str) -> None:
     np.savetxt(path, np.column_stack(columns), form, header="\n".join(header), comments="")
-
-
-def _first_onset(run: Any) -> float:
-    """Return the time (s) of the first event or onset in a run, or else its start time."""
-    known = [run[name].values.ravel() for name in ("event_time", "onset_time") if name in run]
-    times = np.concatenate([*known, [np.nan]])
-    return float(np.nanmin(times) if np.isfinite(times).any() else run.time[0])
 
 
 def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:

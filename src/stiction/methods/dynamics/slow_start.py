@@ -71,14 +71,12 @@ def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
     return float(rows.part(slice(number, number + 1)).mean_stress(np.array([load]))[0])
 
 
-def slow_start(
-    search: DenseSearch, run: Run, rows: Sample, number: int, loading_rate: float
-) -> RuptureState | None:
+def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> RuptureState | None:
     """Return the state closest to the onset with a small error, or `None` without such a state.
 
-    `number` is the row of the sample, the loading rate is in Pa/s.
+    `number` is the row of the sample. The load rises at one rate.
     """
-    nodes = run.setting.nodes
+    nodes, loading_rate = run.setting.nodes, run.slope(0.0)
     if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):
         return None
     static = sample_of(rows, search.pieces, number)
@@ -94,7 +92,7 @@ def slow_start(
     for _ in range(_MAX_TRIALS):
         if onset.load - (1.0 + _RATE_SHARE) * distance <= run.first_load:  # 6.
             return None
-        state = _state_at(search, run, static, onset.load, distance, loading_rate)
+        state = _state_at(search, run, static, onset.load, distance)
         # 5. Close enough, or a greater distance.
         if state is None:
             distance *= 4.0
@@ -106,12 +104,7 @@ def slow_start(
 
 
 def _state_at(
-    search: DenseSearch,
-    run: Run,
-    static: StaticSample,
-    onset: float,
-    distance: float,
-    loading_rate: float,
+    search: DenseSearch, run: Run, static: StaticSample, onset: float, distance: float
 ) -> RuptureState | None:
     """Steps 2 to 5: return the state at a distance (Pa) below the onset. `None` if unknown.
 
@@ -119,7 +112,7 @@ def _state_at(
     the linear programme does not hold, or if a front has arrived, since
     the time of arrival is not known.
     """
-    nodes, grid = run.setting.nodes, run.medium.grid
+    nodes, grid, loading_rate = run.setting.nodes, run.medium.grid, run.slope(0.0)
     # 2. Two equilibria, and the slip rate between them.
     load, load_rise = onset - distance, _RATE_SHARE * distance
     present, before = (search.solve(static, cap) for cap in (load, load - load_rise))

@@ -167,13 +167,12 @@ def tabulate(
     return table
 
 
-def patch_measures(
-    problem: Problem, direction: Array, added: Array, drop: Array
-) -> dict[str, Any]:
+def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> dict[str, Any]:
     """Return what follows from the added slip (*shape), m, and the drop of shear stress, Pa.
 
-    `direction` is the direction in which slip jumps.
+    `before` is the state before the event.
     """
+    direction = before.direction
     # 1. and 2. Patch and moment.
     # The centre and the extents follow the growth alone.
     interface, moment = problem.interface, moment_of(problem, added)
@@ -227,7 +226,7 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
     values = {
         "event_load": before.load,
         "event_stress": initial + stress_before * profile,
-        **patch_measures(problem, before.direction, added, drop),
+        **patch_measures(problem, before, added, drop),
         "event_energy_stress_drop": 2.0 * released / (added.sum() * interface.cell),
         "event_fracture_energy": fracture,
         **known,

@@ -11,11 +11,10 @@ Algorithm
 The algorithm is our own (`press`, `begin_push`).
 
 1. Pressing alone causes shear, because the two bodies expand differently. Each cell has the sign s
-   of its shear T_p. With the slip s d, K becomes s K s. If no cell exceeds its strength and each
-   edge is pressed, the forces are T_p N.
-2. Otherwise begin at a small part of N. All strengths are zero without N. The nodes beyond their
-   strength are on E, edges on top. Follow the path to N. Slip nearby may then load a cell against
-   its sign beyond its strength. Change the sign of such cells, and press again.
+   of its shear T_p. With the slip s d, K becomes s K s.
+2. All strengths are zero without N, so begin at a small part of N. The nodes beyond their strength
+   are on E, edges on top. Follow the path to N. Slip nearby may then load a cell against its sign
+   beyond its strength. Change the sign of such cells, and press again.
 3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
    weakening. Edges that are open begin in S.
 4. Instabilities and arrests alternate until the slider slides (`SliderPath.follow`). The first
@@ -130,12 +129,10 @@ def make_contact(
 
 def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
     """Steps 1 and 2: return a slider under a normal force (N/m)."""
-    linear, n = T_p * force, len(friction.peak)
-    strength = friction.peak * on_cells(-linear[n:])
-    if np.all(linear[n:] < 0.0) and np.all(np.abs(linear[:n]) < strength):
-        return Pressed(linear, np.zeros_like(linear), friction)
-    # 1. The same with slip along the shear.
-    sign = np.where(linear < 0.0, -1.0, 1.0)
+    n = len(friction.peak)
+    strength = friction.peak * on_cells(-T_p[n:] * force)
+    # 1. The sign of slip along the shear.
+    sign = np.where(T_p < 0.0, -1.0, 1.0)
     sign[n:] = 1.0
     # 2. A sign may change once for each cell.
     for _ in range(n + 1):
@@ -339,7 +336,7 @@ class SliderSolver:
         for before, after in push.events[:most]:
             start, end = self.values_at(before), self.values_at(after)
             drop, added = start["stress"] - end["stress"], end["slip"] - start["slip"]
-            measured.append(patch_measures(self.problem, before.direction, added, drop) | {
+            measured.append(patch_measures(self.problem, before, added, drop) | {
                 "event_load": before.load / self.length,
                 "event_stress": start["mean_stress"],
                 "event_stress_drop": start["mean_stress"] - end["mean_stress"],

@@ -104,9 +104,7 @@ def forward_substitute(factor: Array, first: int, last: int, values: Array) -> N
 
 
 @jit_inside
-def _solve_two(
-    x: Array, k: int, corner: tuple[float, float, float], u_x: float, v_x: float
-) -> None:
+def _solve_two(x: Array, k: int, corner: tuple[float, ...], u_x: float, v_x: float) -> None:
     """Solve L x = values for the entries k and k + 1, from two rows u and v of L.
 
     The corner of L holds 1/u_k, v_k and 1/v_k+1. u_x and v_x are the
@@ -224,19 +222,13 @@ class Workspace(NamedTuple):
 def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> Workspace:
     """Return a workspace for samples with n nodes. Unused pages of L take no memory."""
     capacity = min(n, max_slipping)
+    factor, slipping = np.empty(row_start(capacity + 4)), np.empty(n + 4, dtype=np.int64)
+    queue, is_slipping = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
     return Workspace(
-        stiffness,
-        max_slipping,
-        np.empty(row_start(capacity + 4)),
-        np.empty(n + 4, dtype=np.int64),
-        np.empty(n, dtype=np.int64),
-        np.empty(n, dtype=np.bool_),
-        np.empty(n),
-        np.empty((2, n + 4)),
-        np.empty((2, n // 2)),
-        np.zeros(1, dtype=np.int64),
+        stiffness, max_slipping, factor, slipping, queue, is_slipping, np.empty(n),
+        np.empty((2, n + 4)), np.empty((2, n // 2)), np.zeros(1, dtype=np.int64),
         *np.zeros((10, n + 4)),
-    )
+    )  # fmt: skip
 
 
 class SlipState(NamedTuple):

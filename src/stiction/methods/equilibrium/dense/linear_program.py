@@ -189,10 +189,8 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
 
 
 @jit_inside
-def _cut(
-    state: SlipState, n_factored: int, bound: float, multiplier: Array
-) -> tuple[float, float]:
-    """Step 3: return the load of the cut and the new bound. Write the multiplier of the bound."""
+def _cut(state: SlipState, n_factored: int, bound: float, best: Array) -> tuple[float, float]:
+    """Step 3: return the load of the cut and the new bound. Write its multiplier to `best`."""
     sample, _, _, workspace, _, _ = state
     y = workspace.direction
     cholesky.singular_direction(workspace, n_factored, y)
@@ -205,8 +203,8 @@ def _cut(
     cut = excess_y / p_y
     if cut < bound:
         bound = cut
-        for i in range(multiplier.shape[0]):
-            multiplier[i] = y[i] / p_y
+        for i in range(best.shape[0]):
+            best[i] = y[i] / p_y
     return cut, bound
 
 

@@ -136,29 +136,23 @@ def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
 
 @jit_allocating
 def runs_away(
-    sample: StaticSample,
-    runs: Runs,
-    load: float,
-    slip: Array,
-    Kd: Array,
-    direction: Array,
-    K_direction: Array,
+    sample: StaticSample, runs: Runs, load: float, slip: Array, Kd: Array, z: Array, Kz: Array
 ) -> tuple[Outcome, float]:
     """Return SLIDING if the patch of an instability certainly slides, otherwise UNDECIDED.
 
     The second value is the number of residual nodes in a row that
-    proves sliding in `jump`. Slip d, K d, the direction and K times the
-    direction belong to the instability. After the call, slip is a lower
-    bound of the least equilibrium.
+    proves sliding in `jump`. Slip d, K d, the direction z of the
+    instability and K z belong to the instability. After the call, slip
+    is a lower bound of the least equilibrium.
     """
     n = slip.shape[0]
     griffith = unstoppable_length(sample, load, runs)
     unstoppable = UNSTOPPABLE_MARGIN * griffith
     # 1.
-    step = step_to_corner(sample, slip, direction, np.inf)
+    step = step_to_corner(sample, slip, z, np.inf)
     if step == np.inf:
         return Outcome.SLIDING, unstoppable
-    first, length, _ = main_patch(direction)
+    first, length, _ = main_patch(z)
     if (griffith > runs.longest and griffith < np.inf) or length > runs.longest:
         return Outcome.UNDECIDED, unstoppable
     # Places q on the circle are counted from `origin`, so that the
@@ -174,7 +168,7 @@ def runs_away(
     stress, solution = np.empty(n), np.empty(n)
     for q in range(n):
         i = (origin + q) % n
-        stress[q] = load * sample.profile[i] - Kd[i] - step * K_direction[i]
+        stress[q] = load * sample.profile[i] - Kd[i] - step * Kz[i]
     for _ in range(MAX_RUN_STEPS):
         # 2.
         while begin > low:

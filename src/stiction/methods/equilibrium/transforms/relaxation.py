@@ -197,14 +197,6 @@ def stable_equilibrium(
     return end if _is_definite(operator, steepest, end - slip, end) else None
 
 
-class Bound(NamedTuple):
-    """Result of a step with bounds (step (b) 2)."""
-
-    status: int
-    slip: Array
-    is_equilibrium: bool  # whether the assumed strengths are the true ones
-
-
 def _bound(
     operator: Operator,
     sample: StaticSample,
@@ -213,8 +205,11 @@ def _bound(
     present: Present,
     omitted: float,
     tolerance: float,
-) -> Bound:
+) -> tuple[int, Array, bool]:
     """(b) 2: return the slip if nodes omit a fraction of their weakening and stop at their corner.
+
+    Return the status, the slip, and whether it is an equilibrium: the
+    assumed strengths are then the true ones.
 
     The assumed strength is the larger of two straight
     lines, and Newton's method finds which line applies
@@ -226,10 +221,8 @@ def _bound(
     start = present.strength - (present.weakening_rate - W) * slip
     corner = np.append(sample.pieces.ends, 1e300)[present.piece] * sample.critical
     # `level` is the strength at the next corner. Nodes without a corner have no level.
-    falls, level = (
-        (present.weakening_rate > 0.0) & np.isfinite(corner),
-        np.full(slip.size, -np.inf),
-    )
+    falls = (present.weakening_rate > 0.0) & np.isfinite(corner)
+    level = np.full(slip.size, -np.inf)
     level[falls] = present.strength[falls] - present.weakening_rate[falls] * corner[falls]
     is_level = np.zeros(slip.size, dtype=np.bool_)
     end, lowered = slip, tolerance if omitted > 0.0 else 0.0
@@ -238,7 +231,7 @@ def _bound(
         drive = load * sample.profile - strength - lowered
         status, end = solve_pieces(operator, drive, slope, end, tolerance)
         if status != SOLVED:
-            return Bound(status, slip, False)
+            return status, slip, False
         is_beyond = start - W * end < level
         if np.array_equal(is_beyond, is_level):
             passed = present_pieces(sample, end).piece > present.piece
@@ -246,9 +239,9 @@ def _bound(
             # strength of a node is level, too.
             falls_on = passed & (present.piece < sample.pieces.ends.size - 1)
             is_equilibrium = omitted == 0.0 and not falls_on.any()
-            return Bound(SOLVED, np.maximum(end, slip), is_equilibrium)
+            return SOLVED, np.maximum(end, slip), is_equilibrium
         is_level = is_beyond
-    return Bound(EXHAUSTED, slip, False)
+    return EXHAUSTED, slip, False
 
 
 def _step_to_corner(
@@ -324,20 +317,21 @@ def least_equilibrium(
             return Relaxed(Outcome.SLIDING, slip)
         # 2.
         if is_unstable:  # as if step 2 had met the unstable direction
-            bound = Bound(NEGATIVE_CURVATURE, slip, False)
+            status, bound, is_equilibrium = NEGATIVE_CURVATURE, slip, False
             is_unstable = False
         else:
             allowed = max(tolerance, BOUND_RESIDUAL * omitted * fall)
-            bound = _bound(operator, sample, load, slip, present, omitted, allowed)
-        if bound.is_equilibrium:  # 3.
-            return Relaxed(Outcome.ARRESTED, bound.slip)
-        if bound.status == SOLVED:  # 4.
-            still_weakens = ~residual_nodes(sample, bound.slip) & weakens
-            growth = np.where(still_weakens, bound.slip - slip, 0.0)
-            fall, slip = float((present.weakening_rate * growth).max()), bound.slip
+            step = _bound(operator, sample, load, slip, present, omitted, allowed)
+            status, bound, is_equilibrium = step
+        if is_equilibrium:  # 3.
+            return Relaxed(Outcome.ARRESTED, bound)
+        if status == SOLVED:  # 4.
+            still_weakens = ~residual_nodes(sample, bound) & weakens
+            growth = np.where(still_weakens, bound - slip, 0.0)
+            fall, slip = float((present.weakening_rate * growth).max()), bound
             if not (growth > CREEP * sample.critical).any():
                 omitted, omitted_before = 0.0, omitted
-        elif bound.status == NEGATIVE_CURVATURE and omitted < 1.0:  # 5.
+        elif status == NEGATIVE_CURVATURE and omitted < 1.0:  # 5.
             if omitted == 0.0:
                 slip = _step_to_corner(operator, sample, load, slip, tolerance)
             omitted = min(max(2.0 * omitted, omitted_before, MIN_OMITTED), 1.0)
