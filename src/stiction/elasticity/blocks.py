@@ -15,8 +15,8 @@ K applies to a given force: uniform slip causes no stress.
 
 Algorithm
 ---------
-1. Compute K for two free ends that do not interact, averaged over the cells of the
-   nodes (`stiffness_between_ends`).
+1. Compute K for two free ends that do not interact, averaged over the
+   cells of the nodes (`stiffness_between_ends`).
 2. Add the effect of the top, which is on rollers, and of the other end.
    This is a smooth function, in closed form except for a few harmonics
    (`_rollers_correction`).
@@ -61,7 +61,8 @@ class Resolution(NamedTuple):
 
 
 RESOLUTION, COARSER_RESOLUTION = Resolution(40.0, 0.28, 1e-11), Resolution(26.0, 0.42, 1e-6)
-"""Resolution of the response, and a coarser resolution to measure the error."""
+"""Resolution of the response, and a coarser resolution to measure the
+error."""
 LATTICE_CORRECTION = 1.0 / 12.0
 """Half of the 1/6 with which the symbol would be right to fourth order.
 
@@ -328,11 +329,11 @@ def _anti_plane(
 def lattice_symbol(angle: Array) -> Array:
     """Return the symbol |k| dx of the lattice for angles k dx.
 
-    |k| dx is 2 arcsin(s) = 2 s (1 + s²/6 + ...), with s = |sin(k dx/2)|. The exact
-    symbol has a kink at the shortest wave, and its entries vanish at every second
-    distance. A smooth correction, such as for a finite block, would make these
-    entries positive. All entries of the lattice symbol except the diagonal are
-    negative.
+    |k| dx is 2 arcsin(s) = 2 s (1 + s²/6 + ...), with s = |sin(k
+    dx/2)|. The exact symbol has a kink at the shortest wave, and its
+    entries vanish at every second distance. A smooth correction, such
+    as for a finite block, would make these entries positive. All
+    entries of the lattice symbol except the diagonal are negative.
     """
     s = np.abs(np.sin(0.5 * angle))
     symbol: Array = 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)

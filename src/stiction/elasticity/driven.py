@@ -29,11 +29,14 @@ from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
 from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
 
 MAX_WINDOWS_PER_WIDTH = 32
-"""Windows that begin within the width of a window. Weighted means hardly change between them."""
+"""Windows that begin within the width of a window. Weighted means
+hardly change between them."""
 POSITIVE_RTOL = 1e-12
-"""Largest positive entry of K off its diagonal that is round-off, as a fraction of the diagonal."""
+"""Largest positive entry of K off its diagonal that is round-off, as a
+fraction of the diagonal."""
 MIN_SHEAR = 1e-9
-"""Smallest value of the profile of a drive far from a pusher, as a fraction of the largest."""
+"""Smallest value of the profile of a drive far from a pusher, as a
+fraction of the largest."""
 
 
 @dataclass(frozen=True, eq=False)

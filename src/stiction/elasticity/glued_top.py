@@ -14,11 +14,11 @@ Mechanics 19, 1952).
 
 Algorithm
 ---------
-1. Map the line -inf < z < inf to the top so that x falls as exp(z) towards the corner and grows
-   evenly between corners (`GluedTop`). For any exponents, t dx/dz is
-   smooth and falls exponentially at both ends, so that trapezoidal sums
-   converge exponentially (F. Stenger, Numerical Methods Based on Sinc
-   and Analytic Functions, 1993).
+1. Map the line -inf < z < inf to the top so that x falls as exp(z)
+   towards the corner and grows evenly between corners (`GluedTop`). For
+   any exponents, t dx/dz is smooth and falls exponentially at both
+   ends, so that trapezoidal sums converge exponentially (F. Stenger,
+   Numerical Methods Based on Sinc and Analytic Functions, 1993).
 2. G has a logarithm at x = s. Split off log |2 sin(pi (z - z')/P)|,
    where P is the range of z. Its integrals with trigonometric
    polynomials are known (R. Kress, Linear Integral Equations, 2014,
@@ -37,9 +37,11 @@ from stiction.base.arrays import Array
 from stiction.elasticity.harmonics import CURVATURE, SLOPE, Harmonics
 
 MAX_EXPONENT = 36.0
-"""Points reach to a distance of exp(-MAX_EXPONENT) sizes of the block from its corners."""
+"""Points reach to a distance of exp(-MAX_EXPONENT) sizes of the block
+from its corners."""
 HEIGHTS_PER_UNIT = 0.5
-"""Length of the top, in heights of the block, that a unit of z covers between the corners."""
+"""Length of the top, in heights of the block, that a unit of z covers
+between the corners."""
 
 
 class GluedTop:

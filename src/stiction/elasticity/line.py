@@ -16,10 +16,11 @@ bound.
 
 Algorithm
 ---------
-1. Find the widths for rates between two values (`widths_between`). At one rate W, start from the
-   width in the continuum, h_n = 2 lambda_0 G*/W (K. Uenishi and J. R.
-   Rice, J. Geophys. Res. 108, 2003), and move to the narrowest unstable
-   width. If rates vary, use a ladder of widths.
+1. Find the widths for rates between two values (`widths_between`). At
+   one rate W, start from the width in the continuum, h_n = 2 lambda_0
+   G*/W (K. Uenishi and J. R. Rice, J. Geophys. Res. 108, 2003), and
+   move to the narrowest unstable width. If rates vary, use a ladder of
+   widths.
 2. Compute the smallest eigenvalue and its eigenvector for each width
    (`window_mode`), with a dense matrix up to `MAX_DENSE_WIDTH` nodes,
    and above by inverse iteration with a solver for Toeplitz matrices.
@@ -44,15 +45,20 @@ from stiction.elasticity.protocol import (
 )
 
 WIDTH_RATIO = 1.25
-"""Ratio of successive widths if the rate varies, and bounds are rough anyway."""
+"""Ratio of successive widths if the rate varies, and bounds are rough
+anyway."""
 MAX_DENSE_WIDTH = 300
-"""Nodes of the widest window for which a dense matrix is faster than inverse iteration."""
+"""Nodes of the widest window for which a dense matrix is faster than
+inverse iteration."""
 MAX_WIDTH = 4096
-"""Nodes of the widest window. The eigenvector of a wider window takes longer than it saves."""
+"""Nodes of the widest window. The eigenvector of a wider window takes
+longer than it saves."""
 MAX_INVERSE_ITERATIONS = 60
-"""Iterations, each of which more than halves the error, until a double gains no further digit."""
+"""Iterations, each of which more than halves the error, until a double
+gains no further digit."""
 MODE_RTOL = 1e-14
-"""Change of an eigenvector in an iteration, relative to its largest entry, that is round-off."""
+"""Change of an eigenvector in an iteration, relative to its largest
+entry, that is round-off."""
 
 
 def stiffness_column(nodes: int, length: float, modulus: float) -> Array:

@@ -23,10 +23,10 @@ convolution with the whole history into a recursion for each pair.
 
 Algorithm (`fit_exponentials`)
 ------------------------------
-1. Compute the inverse transform along arcs in Re s < 0 that join the branch points
-   -i a and i a, a = 1 and eta. The integrand is smooth there and
-   decays, so that the same tanh-sinh nodes (H. Takahasi and M. Mori,
-   Publications of RIMS 9, 1974) are accurate for every T
+1. Compute the inverse transform along arcs in Re s < 0 that join the
+   branch points -i a and i a, a = 1 and eta. The integrand is smooth
+   there and decays, so that the same tanh-sinh nodes (H. Takahasi and
+   M. Mori, Publications of RIMS 9, 1974) are accurate for every T
    (`arc_quadrature`). The result is a sum of some 280 exponentials.
    (The closed forms with Bessel functions lose digits by cancellation
    above T = 7.)

@@ -63,9 +63,11 @@ NEGATIVE_CURVATURE = 1
 EXHAUSTED = 2
 
 MAX_ITERATIONS = 3000
-"""Most iterations of conjugate gradients for a solution, or for an equilibrium."""
+"""Most iterations of conjugate gradients for a solution, or for an
+equilibrium."""
 MIN_NORM = 1e-14
-"""Smallest norm of a unit vector, less its parts along others, that is not round-off."""
+"""Smallest norm of a unit vector, less its parts along others, that is
+not round-off."""
 
 Mask = NDArray[np.bool_]
 

@@ -10,21 +10,24 @@ depth (N/m). Forces on cells and edges, also per unit depth, are
     U = F/C + T'j,            1/C = g' A^-1 g - S_gg                                       (2)
     elastic energy = F^2/(2 C) + j' K j/2                                                  (3)
 
-with shear forces f[:n], pressing forces -f[n:], and the travel U of the push without a constant
-part from N (Betti's theorem). S_S and S_B are the stiffness matrices of the bodies on their
-interface displacements. With a unit load, the held interface of the slider carries g, and the
+with shear forces f[:n], pressing forces -f[n:], and the travel U of the
+push without a constant part from N (Betti's theorem). S_S and S_B are
+the stiffness matrices of the bodies on their interface displacements.
+With a unit load, the held interface of the slider carries g, and the
 load travels by -S_gg.
 
 Algorithm
 ---------
-1. Compute the bodies by columns (`columns.block`). The depth of both counts from the interface,
-   so that v changes its sign in the base.
-2. Reduce the top of the slider to coordinates: all its points if it is free, or a single v if
-   a rigid, frictionless plate lies on it.
+1. Compute the bodies by columns (`columns.block`). The depth of both
+   counts from the interface, so that v changes its sign in the base.
+2. Reduce the top of the slider to coordinates: all its points if it is
+   free, or a single v if a rigid, frictionless plate lies on it.
 3. Eliminate the top: S_S, and g and S_gg for the push and for the normal force.
-4. Evaluate (1) and (2) with a Cholesky factor of A, and S_B = A - S_S. Rigid motions of the
-   slider, for which S_S is zero, then cause no force up to round-off.
-5. If the push acts along -x, mirror the rig. Slip and shear are positive along the push.
+4. Evaluate (1) and (2) with a Cholesky factor of A, and S_B = A - S_S.
+   Rigid motions of the slider, for which S_S is zero, then cause no
+   force up to round-off.
+5. If the push acts along -x, mirror the rig. Slip and shear are
+   positive along the push.
 """
 
 from __future__ import annotations
@@ -42,8 +45,9 @@ from stiction.elasticity.columns import Body, Far, Interval, block, eliminated
 class Rig(NamedTuple):
     """Stiffness and loads of a slider on a base with n cells, per unit depth.
 
-    The unknowns are slip at n cells and opening at n + 1 edges. Forces are
-    f = T F + T_p N - K j. Shear forces along the push are f[:n], and pressing forces are -f[n:].
+    The unknowns are slip at n cells and opening at n + 1 edges. Forces
+    are f = T F + T_p N - K j. Shear forces along the push are f[:n],
+    and pressing forces are -f[n:].
     """
 
     K: Array  # (2n+1, 2n+1), Pa, symmetric
@@ -72,12 +76,13 @@ def contact_rig(
 ) -> Rig:  # fmt: skip
     """Return the stiffness and the loads of a slider on a base.
 
-    Lengths are in m. `push` holds the lowest and the highest point of the pusher. Without a push,
-    a uniform shear acts on the top. A soft pressing is
-    N/L (1 + tilt (2 x/L - 1)), with x from the trailing end, and a plate does not rotate. The
-    base is longer than the slider by `behind` at the trailing end and by `ahead` at the leading
-    end. If its bottom lies on rollers, a frictionless stop holds its leading end. The
-    push acts along +x or -x (`towards`).
+    Lengths are in m. `push` holds the lowest and the highest point of
+    the pusher. Without a push, a uniform shear acts on the top. A soft
+    pressing is N/L (1 + tilt (2 x/L - 1)), with x from the trailing
+    end, and a plate does not rotate. The base is longer than the slider
+    by `behind` at the trailing end and by `ahead` at the leading end.
+    If its bottom lies on rollers, a frictionless stop holds its leading
+    end. The push acts along +x or -x (`towards`).
     """
     cell, order = length / nodes, np.arange(2 * nodes + 1)
     signs = np.repeat([1.0, -1.0], [nodes, nodes + 1])

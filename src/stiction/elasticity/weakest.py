@@ -9,9 +9,10 @@ profile. Find the lowest bound over all windows and all places.
 
 Algorithm: our own
 ------------------
-1. Take the windows in turn, from the narrowest to the widest. Skip windows that need a higher
-   weakening rate than any node has. Stop if a narrower window is
-   unstable anywhere, because wider windows give a looser bound.
+1. Take the windows in turn, from the narrowest to the widest. Skip
+   windows that need a higher weakening rate than any node has. Stop if
+   a narrower window is unstable anywhere, because wider windows give a
+   looser bound.
 2. If the rate varies, count for each node how many nodes in a row
    weaken fast enough.
 3. A window with a fixed place (on blocks) has a single bound.

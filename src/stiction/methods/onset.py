@@ -37,9 +37,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
-"""Most samples that `onset` also solves by the exact method, and the seconds for them."""
+"""Most samples that `onset` also solves by the exact method, and the
+seconds for them."""
 MAX_DIFFERENCE = 0.01
-"""Mean or scatter of the difference, over the exact onset, above which there is a warning."""
+"""Mean or scatter of the difference, over the exact onset, above which
+there is a warning."""
 
 
 def exact_counterpart(problem: Problem, method: Method) -> Method | None:

@@ -82,21 +82,25 @@ class OptionalMembers:
     """Optional members of a method, with their defaults."""
 
     accepts: ClassVar[tuple[str, ...]] = ()
-    """Special profiles that it takes: "overstress", see `Problem.sample`."""
+    """Special profiles that it takes: "overstress", see
+    `Problem.sample`."""
     first_stage: ClassVar[str | None] = None
-    """Type of a faster method with similar onsets, for the first search of rare failures."""
+    """Type of a faster method with similar onsets, for the first search
+    of rare failures."""
     exact_method: ClassVar[str | None] = None
-    """Type of the method that this method approximates. Some samples are solved by both, and a
-    warning gives the difference."""
+    """Type of the method that this method approximates. Some samples
+    are solved by both, and a warning gives the difference."""
     scaling: ClassVar[Literal["none", "stretch", "affine"]] = "none"
-    """How onsets scale with the strength s at a given weakening rate and a uniform load. "affine":
-    onset(a + b s) = a + b onset(s). "stretch": onset(b s) = b onset(s)
-    without residual strength
-    and initial stress."""
+    """How onsets scale with the strength s at a given weakening rate
+    and a uniform load. "affine": onset(a + b s) = a + b onset(s).
+    "stretch": onset(b s) = b onset(s) without residual strength and
+    initial stress."""
     counted_only: ClassVar[bool] = False
-    """Whether failures are counted in plain samples, not sought by subset simulation."""
+    """Whether failures are counted in plain samples, not sought by
+    subset simulation."""
     samples_at_point: ClassVar[int] = 100
-    """Number of samples with which `stiction.infer` simulates each point of a prior."""
+    """Number of samples with which `stiction.infer` simulates each
+    point of a prior."""
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
         """Return whether strength bounds the stress of an event from below and from above.
@@ -147,7 +151,8 @@ def as_method(value: Any) -> Any:
 
 
 MethodObject = Annotated[Method, SkipValidation, BeforeValidator(as_method), "Method"]
-"""Annotation of an argument that is a method; see `stiction.base.model.checked`."""
+"""Annotation of an argument that is a method; see
+`stiction.base.model.checked`."""
 
 
 def prepared(problem: Problem, method: Method) -> Solver:

@@ -44,7 +44,8 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 MAX_RMS_DIFFERENCE = 0.01
-"""Relative difference from the exact onset (rms) above which samples are solved by both methods."""
+"""Relative difference from the exact onset (rms) above which samples
+are solved by both methods."""
 COARSE_PLANE = (
     8.0,
     "the local criterion is about 0.15 % too high at 8 nodes, 0.4 % at 5, 0.7 % at 4",
@@ -54,7 +55,8 @@ COARSE_LINE = (
     "if the strength varies within a quarter of it, the local criterion is off by about 0.8 %"
     " (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
 )
-"""Nodes in a nucleation length without a warning, and the error on coarser grids."""
+"""Nodes in a nucleation length without a warning, and the error on
+coarser grids."""
 INSTEAD = ". Use st.Equilibrium() or st.Rupture()"
 
 OF_PLANES = {

@@ -44,16 +44,17 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MAX_OPERATIONS = 4e9
-"""Most operations on a sample before it counts as undecided: cubes of the nodes that move and
-squares of all nodes, summed over steps."""
+"""Most operations on a sample before it counts as undecided: cubes of
+the nodes that move and squares of all nodes, summed over steps."""
 FROZEN_STEPS = 4
 """Steps with frozen strengths before Newton's method is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9
-"""Overstress, as a fraction of the strength, below which slip is an equilibrium, and below which a
-node does not join S."""
+"""Overstress, as a fraction of the strength, below which slip is an
+equilibrium, and below which a node does not join S."""
 BRACKETS_RATIO = 2.0**0.5
 BRACKETS = tuple(0.01 * BRACKETS_RATIO**i for i in range(7))
-"""Half-widths of the brackets around a predicted load, as fractions of it: 1 to 8 %."""
+"""Half-widths of the brackets around a predicted load, as fractions of
+it: 1 to 8 %."""
 GRIFFITH_MARGIN = 1.5
 """Safety factor on the length of a crack that counts as unstoppable."""
 

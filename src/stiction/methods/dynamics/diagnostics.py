@@ -35,10 +35,10 @@ release of this stress is also an instability.
 Algorithm, after each step of a run (`observe`)
 -----------------------------------------------
 1. Compute the fall (2).
-2. While <tau> is practically at its maximum, the fastest node is the place of the
-   maximum. At slow loading, all creeping patches are
-   about equally slow at the maximum. The unstable
-   patch is faster only just after the maximum.
+2. While <tau> is practically at its maximum, the fastest node is the
+   place of the maximum. At slow loading, all creeping patches are about
+   equally slow at the maximum. The unstable patch is faster only just
+   after the maximum.
 3. An instability ends when <tau> rises above the maximum at which it
    began. It was arrested if a node slipped faster than
    `Thresholds.unstable_slip_rate`, which the waves of an earlier

@@ -23,9 +23,9 @@ complementarity problem of `complementarity` with a circulant matrix.
 
 Algorithm
 ---------
-1. Choose a size: as proposed, but smaller if the load would rise too much. The step
-   is cut short at a turning point of the load or at the end time
-   (`_choose_size`).
+1. Choose a size: as proposed, but smaller if the load would rise too
+   much. The step is cut short at a turning point of the load or at the
+   end time (`_choose_size`).
 2. Assemble the matrix and the stress without slip in this step (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
 4. Go to step 1 with half the size if no u is found (a patch is unstable
@@ -253,7 +253,8 @@ def implicit_steps(
 ) -> Any:
     """Take up to `n` accepted implicit steps in place. Return (steps taken, reason).
 
-    The parameters are described in `explicit_steps`. `stepping.phase` is IMPLICIT.
+    The parameters are described in `explicit_steps`. `stepping.phase`
+    is IMPLICIT.
     """
     now, thresholds, u = state.diagnostics[0], setting.thresholds, tables.problem.increment
     stepping = now.stepping

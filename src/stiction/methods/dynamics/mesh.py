@@ -50,9 +50,11 @@ from stiction.problem.solid import Solid
 from stiction.problem.specimen import Blocks, Platen
 
 ROW_RATIO, MAX_ROW_HEIGHT = 1.08, 5.0
-"""Ratio of the heights of successive rows, and their largest height in units of dx."""
+"""Ratio of the heights of successive rows, and their largest height in
+units of dx."""
 GRID_VISCOSITY = 0.05
-"""Viscous time in units of dx/c_d, which damps oscillations of the shortest waves."""
+"""Viscous time in units of dx/c_d, which damps oscillations of the
+shortest waves."""
 
 
 class Mesh(NamedTuple):
@@ -64,17 +66,19 @@ class Mesh(NamedTuple):
     mass: Array
     """Mass of a node of each row, kg/m."""
     elements: Array
-    """Stiffness of the elements above each row but the last, (rows - 1, 2, 2, 2, 2, 2, 2), Pa. The
-    indices are lower or upper row, x or y, left or right, for the force
-    and then for the
-    displacement."""
+    """Stiffness of the elements above each row but the last, (rows - 1,
+    2, 2, 2, 2, 2, 2), Pa. The indices are lower or upper row, x or y,
+    left or right, for the force and then for the displacement."""
     strips: Array
-    """Stiffness of the half cells at the ends, along x and y, (rows - 1, 2), Pa."""
+    """Stiffness of the half cells at the ends, along x and y, (rows -
+    1, 2), Pa."""
     stencils: Array
-    """Coefficients of the force on a node by its neighbours, (rows, 2, 5, 3); see `_stencils`."""
+    """Coefficients of the force on a node by its neighbours, (rows, 2,
+    5, 3); see `_stencils`."""
     anti_plane: bool
     push: Array
-    """Fraction of the pusher's force on the left and on the right of each row, (rows, 2)."""
+    """Fraction of the pusher's force on the left and on the right of
+    each row, (rows, 2)."""
     platen: bool
     stiffness: float
     """Stiffness of the machine for a block, half of the specimen, Pa."""
@@ -87,7 +91,8 @@ class Mesh(NamedTuple):
     viscous_time: float = 0.0
     step: float = 0.0
     window: int = 0
-    """Number of steps in which a shear wave crosses the block and returns."""
+    """Number of steps in which a shear wave crosses the block and
+    returns."""
     correction: Array = np.zeros((0, 0), np.float32)
     """K of the closed form less K of the mesh, (n, n), Pa/m."""
 

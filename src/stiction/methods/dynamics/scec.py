@@ -18,7 +18,8 @@ COLUMN_TITLES = (
     "normal stress (MPa), compression negative",
 )  # fmt: skip
 MOST_DECIMALS = 9
-"""Decimals of places in names of files, in units of 100 m, that tell stations on a grid apart."""
+"""Decimals of places in names of files, in units of 100 m, that tell
+stations on a grid apart."""
 COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
 
 

@@ -71,12 +71,14 @@ class Phase(IntEnum):
 
 
 UNSTABLE_STRESS = 0.075
-"""Z V that only an instability reaches, in units of the median of tau_p - tau_r: at least 0.106 in
-those that were arrested, at most 0.054 in the waves after them (4 problems, 5e6 and 5e7 Pa/s)."""
+"""Z V that only an instability reaches, in units of the median of tau_p
+- tau_r: at least 0.106 in those that were arrested, at most 0.054 in
+the waves after them (4 problems, 5e6 and 5e7 Pa/s)."""
 
 PULSE_SHARE = 0.1
-"""Slip is fast if a node slips at the rate of an instability, and if the mean slip rate is above
-this fraction of its maximum in the event. Echoes in a period of two extents reach 0.06."""
+"""Slip is fast if a node slips at the rate of an instability, and if
+the mean slip rate is above this fraction of its maximum in the event.
+Echoes in a period of two extents reach 0.06."""
 
 
 def record(numbers: str, counts: str = "", **groups: np.dtype[Any]) -> np.dtype[Any]:
@@ -118,13 +120,15 @@ EVENT = record(
 """The present instability, and the event that `Run` follows until its fast slip has settled, or
 until the next one begins:
 
-- `unstable`: whether an instability is under way; `slip_rate`: the largest in it, m/s
+- `unstable`: whether an instability is under way; `slip_rate`: the
+  largest in it, m/s
 - `last_arrested`: whether the last instability is among the arrested events
-- `open`: whether there is an event; `begun`, `calm`: whether it has just begun or ended
+- `open`: whether there is an event; `begun`, `calm`: whether it has
+  just begun or ended
 - `time` (s), `load` and `work` when it began, and the fastest `node` then
 - `peak_rate`: largest mean slip rate in the event while slip was fast, m/s
-- `fast`: whether slip was fast in the event, first at `fast_since` and last at `fast_until` (s),
-  see step 6 of `diagnostics`
+- `fast`: whether slip was fast in the event, first at `fast_since` and
+  last at `fast_until` (s), see step 6 of `diagnostics`
 """
 
 RESULTS = record(
@@ -135,11 +139,11 @@ RESULTS = record(
 
 - `instabilities`, `arrested_events`: their numbers
 - `first_stress`: mean stress at the first instability
-- `onset_stress`, `onset_time`, `onset_load`, `onset_node`: `whole_stress` at the highest
-  instability, and its time, load and node
+- `onset_stress`, `onset_time`, `onset_load`, `onset_node`:
+  `whole_stress` at the highest instability, and its time, load and node
 - `critical_stress`: largest mean stress of breakable nodes at an instability
-- `all_broken`: whether all breakable nodes have reached residual strength; `kinetic_stress`: if
-  so, the mean stress when that happened
+- `all_broken`: whether all breakable nodes have reached residual
+  strength; `kinetic_stress`: if so, the mean stress when that happened
 """
 
 STEPPING = record(
@@ -148,26 +152,31 @@ STEPPING = record(
 )
 """Choice of steps:
 
-- `phase`: a `Phase`; `explicit_steps`, `implicit_steps`: numbers of steps so far
+- `phase`: a `Phase`; `explicit_steps`, `implicit_steps`: numbers of
+  steps so far
 - `next_size`: size that the next implicit step tries, s
-- `two_step`: whether the next implicit step follows an implicit step, of the size
-  `previous_size` (s), with Z <V> = `previous_radiated` after it
-- `calm_steps`: calm steps in a row; `calm_slip_rate`: largest slip rate when the row began, m/s
+- `two_step`: whether the next implicit step follows an implicit step,
+  of the size `previous_size` (s), with Z <V> = `previous_radiated`
+  after it
+- `calm_steps`: calm steps in a row; `calm_slip_rate`: largest slip rate
+  when the row began, m/s
 """
 
 RUN = record("scale start_load start_error reverse_margin", "reverse_node")
 """The whole run so far:
 
 - `scale`: stress scale of the largest load
-- `start_load`: load at the start; `start_error`: error of the onset due to the start
-- `reverse_margin`: smallest sum of stress and strength, at `reverse_node`. Below 0 slip would
-  reverse.
+- `start_load`: load at the start; `start_error`: error of the onset due
+  to the start
+- `reverse_margin`: smallest sum of stress and strength, at
+  `reverse_node`. Below 0 slip would reverse.
 """
 
 DIAGNOSTICS = record(
     "", step=STEP, maximum=MAXIMUM, event=EVENT, results=RESULTS, stepping=STEPPING, run=RUN
 )
-"""Diagnostics of a run, in a record that compiled steps and checkpoints have in common."""
+"""Diagnostics of a run, in a record that compiled steps and checkpoints
+have in common."""
 
 STATION = record("slip slip_rate shear_stress")
 """Slip (m), slip rate (m/s) and stress (Pa) of a node."""

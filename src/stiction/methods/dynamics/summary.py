@@ -42,7 +42,8 @@ SPEED_SPANS: dict[str, Any] = {
     "rupture_speed": (2.0, np.max),
     "median_rupture_speed": (0.5, np.median),
 }
-"""Length over which a speed is a mean, in units of h_n, and the statistic over all places."""
+"""Length over which a speed is a mean, in units of h_n, and the
+statistic over all places."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),

@@ -60,8 +60,8 @@ class Waves(NamedTuple):
     slip: Array
     slip_rate: Array
     stress: Array
-    """Slip, slip rate and stress of the interface, (nodes,). Stress is counted from the initial
-    stress."""
+    """Slip, slip rate and stress of the interface, (nodes,). Stress is
+    counted from the initial stress."""
     corrected: Array
     """Stress of the static correction, (nodes,), Pa."""
     arrival: Array
@@ -85,8 +85,8 @@ TOTALS = record(
 - `friction`: energy that friction took from a block, J/m
 - `fast_slip_rate`: slip rate that counts as fast, m/s
 - `peak_rate`: largest sum of the rates of all nodes while slip was fast, m/s
-- `fast`: whether slip was fast, as in `diagnostics`, first at `fast_since` and last at `fast_until`
-  (s)
+- `fast`: whether slip was fast, as in `diagnostics`, first at
+  `fast_since` and last at `fast_until` (s)
 """
 
 

@@ -10,49 +10,58 @@ the two ends of the slider. Written N = Q P, the law of a cell is
 
     strength_a = mu_a N_a - W_a d_a,                                                          (1)
 
-with mu_a = mu_p at first. When the strength meets mu_r N_a, it is mu_r N_a from then on: mu_a is
-mu_r, and W_a is 0. Slip is irreversible, opening is reversible. The overstress o (N/m) of a cell is
-its shear force minus its strength, and the overstress of an edge is -P. Equilibrium is
+with mu_a = mu_p at first. When the strength meets mu_r N_a, it is mu_r
+N_a from then on: mu_a is mu_r, and W_a is 0. Slip is irreversible,
+opening is reversible. The overstress o (N/m) of a cell is its shear
+force minus its strength, and the overstress of an edge is -P.
+Equilibrium is
 
     o <= 0,   o = 0 where a cell slips or an edge is open.                                    (2)
 
-o changes at the rate do = p dD - M dx. Row a of M is K_a + mu_a (Q K_w)_a with -W_a on the
-diagonal, and p_a = T_a + mu_a (Q T_w)_a. Row b of an edge is K_b, and p_b = T_b. M is not
-symmetric, but its entries off the diagonal are nearly never positive, so that the least
+o changes at the rate do = p dD - M dx. Row a of M is K_a + mu_a (Q
+K_w)_a with -W_a on the diagonal, and p_a = T_a + mu_a (Q T_w)_a. Row b
+of an edge is K_b, and p_b = T_b. M is not symmetric, but its entries
+off the diagonal are nearly never positive, so that the least
 equilibrium above the present slip is the one which the slider reaches.
 
-A set S of slipping cells and open edges moves at the rate v = M_SS^-1 p_S. If a cell or an edge
-starts whose pivot M_ee - M_eS M_SS^-1 M_Se is not positive, slip jumps at this load.
+A set S of slipping cells and open edges moves at the rate v = M_SS^-1
+p_S. If a cell or an edge starts whose pivot M_ee - M_eS M_SS^-1 M_Se is
+not positive, slip jumps at this load.
 
 Algorithm
 ---------
 The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E of cells and edges that
 could not start.
 
-1. If E is empty, the load rises and v = M_SS^-1 p_S. Otherwise the load is held. e, the top of
-   E, moves at the rate 1, and v = -M_SS^-1 M_Se.
-2. Find the nearest kink: a resting cell or a closed edge has lost its margin (a start), e has
-   lost its overstress, a cell meets mu_r N (a corner; a resting cell may meet it while N
-   falls), or an open edge closes. A slipping cell stops at once if its rate is negative. e
-   is released at once if others have taken its overstress away. Without a kink the slider
-   slides.
-3. Move to the kink.
-   Start: border the inverse if the pivot is positive. Otherwise push the node on E.
-   e has lost its overstress: take e from E, and start it. Released: take e from E.
-   Corner: change one row of M. If the cell slips, remove it from the inverse, and border again.
-   Close or stop: remove a row and a column from the inverse. If the diagonal of the
-   inverse is not positive there, the rest of S is unstable: border all of S again, open
-   edges first and cells in the order in which they started, and push each node whose
-   pivot is not positive on E.
-4. Return if E was empty and is not, or the other way round, or if the load is at its target.
-   Otherwise go to 1.
+1. If E is empty, the load rises and v = M_SS^-1 p_S. Otherwise the load
+   is held. e, the top of E, moves at the rate 1, and v = -M_SS^-1 M_Se.
+2. Find the nearest kink: a resting cell or a closed edge has lost its
+   margin (a start), e has lost its overstress, a cell meets mu_r N (a
+   corner; a resting cell may meet it while N falls), or an open edge
+   closes. A slipping cell stops at once if its rate is negative. e is
+   released at once if others have taken its overstress away. Without a
+   kink the slider slides.
+3. Move to the kink. Start: border the inverse if the pivot is positive.
+   Otherwise push the node on E. e has lost its overstress: take e from
+   E, and start it. Released: take e from E. Corner: change one row of
+   M. If the cell slips, remove it from the inverse, and border again.
+   Close or stop: remove a row and a column from the inverse. If the
+   diagonal of the inverse is not positive there, the rest of S is
+   unstable: border all of S again, open edges first and cells in the
+   order in which they started, and push each node whose pivot is not
+   positive on E.
+4. Return if E was empty and is not, or the other way round, or if the
+   load is at its target. Otherwise go to 1.
 
-A machine of stiffness k' (Pa) lowers the force F = D - k' T'x. It adds k' T T' to K.
+A machine of stiffness k' (Pa) lowers the force F = D - k' T'x. It adds
+k' T T' to K.
 
-Example by hand: one cell without edges that couple, K = 3, T = 1, mu_p N = 2, mu_r N = 1, W = 1.
-The cell starts at D = 2 with the pivot 3 - 1 = 2, and slips at the rate 1/2. At d = 1 (D = 4) it
-meets its corner, and slips at the rate 1/3 from then on. With W = 4 the pivot is -1: the cell jumps
-at D = 2, passes its corner at d = 1/4 with the overstress 1/4, and rests at d = 1/3.
+Example by hand: one cell without edges that couple, K = 3, T = 1, mu_p
+N = 2, mu_r N = 1, W = 1. The cell starts at D = 2 with the pivot 3 - 1
+= 2, and slips at the rate 1/2. At d = 1 (D = 4) it meets its corner,
+and slips at the rate 1/3 from then on. With W = 4 the pivot is -1: the
+cell jumps at D = 2, passes its corner at d = 1/4 with the overstress
+1/4, and rests at d = 1/3.
 """
 
 from enum import IntEnum
@@ -73,7 +82,8 @@ PIVOT_RTOL = 1e-9
 OVERSTRESS_RTOL = 1e-12
 """Overstress that is round-off, as a fraction of the largest force."""
 MAX_EVENTS_PER_NODE = 64
-"""Events for each cell and edge, on average, after which a path is given up."""
+"""Events for each cell and edge, on average, after which a path is
+given up."""
 
 
 class Status(IntEnum):
@@ -117,9 +127,11 @@ class Kink(NamedTuple):
 class Contact(NamedTuple):
     """A slider on its path. Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
 
-    `columns` is M transposed. `difference` is mu_p - mu_r, and `weakening` is W. Both are 0 from
-    the corner on. `loads` holds the load D, the force F and the largest F so far. `counts` holds
-    the sizes of S and E, and how many events there were and how often S was bordered again.
+    `columns` is M transposed. `difference` is mu_p - mu_r, and
+    `weakening` is W. Both are 0 from the corner on. `loads` holds the
+    load D, the force F and the largest F so far. `counts` holds the
+    sizes of S and E, and how many events there were and how often S was
+    bordered again.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa

@@ -64,7 +64,8 @@ BETWEEN_HALF_SPACES = {
     "event_settled": Variable("1", "whether the event ended before its run did", ("event",)),
 }
 MIN_ADDED_SLIP = 1e-3
-"""Smallest added slip of the nodes in the patch of an event, as a fraction of the largest."""
+"""Smallest added slip of the nodes in the patch of an event, as a
+fraction of the largest."""
 
 
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:

@@ -10,15 +10,18 @@ Algorithm
 ---------
 The algorithm is our own (`press`, `begin_push`).
 
-1. Pressing alone causes shear, because the two bodies expand differently. Each cell has the sign s
-   of its shear T_p. With the slip s d, K becomes s K s.
-2. All strengths are zero without N, so begin at a small part of N. The nodes beyond their strength
-   are on E, edges on top. Follow the path to N. Slip nearby may then load a cell against its sign
-   beyond its strength. Change the sign of such cells, and press again.
-3. Push. Slip in the push is positive. Slip of both stages in either direction adds up in the
-   weakening. Edges that are open begin in S.
-4. Instabilities and arrests alternate until the slider slides (`SliderPath.follow`). The first
-   instability is the first of them during the push. Static friction is the largest force.
+1. Pressing alone causes shear, because the two bodies expand
+   differently. Each cell has the sign s of its shear T_p. With the slip
+   s d, K becomes s K s.
+2. All strengths are zero without N, so begin at a small part of N. The
+   nodes beyond their strength are on E, edges on top. Follow the path
+   to N. Slip nearby may then load a cell against its sign beyond its
+   strength. Change the sign of such cells, and press again.
+3. Push. Slip in the push is positive. Slip of both stages in either
+   direction adds up in the weakening. Edges that are open begin in S.
+4. Instabilities and arrests alternate until the slider slides
+   (`SliderPath.follow`). The first instability is the first of them
+   during the push. Static friction is the largest force.
 
 Results
 -------
@@ -56,11 +59,13 @@ OF_SLIDERS = {
     "open_fraction": Variable("1", "part of the interface that is open before it slides")
 }
 WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
-"""Variables of events that are defined for a pressure that does not change."""
+"""Variables of events that are defined for a pressure that does not
+change."""
 STRENGTH_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
 MIN_NODES = 16
-"""Nodes in a nucleation length without a warning about the ends of the slider."""
+"""Nodes in a nucleation length without a warning about the ends of the
+slider."""
 COARSE = (
     "stress is singular at the ends of the slider. At 17 nodes, twice as many move static friction"
     " by up to 0.04 % and the first instability by up to 0.5 %"
@@ -76,9 +81,11 @@ WARNINGS = (
 FIRST_PRESSING = 1e-3
 """Fraction of the normal force at which a pressing that slips begins."""
 REVERSE_RTOL = 1e-9
-"""Excess of shear against the sign of a cell that is round-off, in mean normal forces of a cell."""
+"""Excess of shear against the sign of a cell that is round-off, in mean
+normal forces of a cell."""
 MIN_TURNING = 1e-6
-"""Opening over slip of a slider that topples, in the motion that does not end."""
+"""Opening over slip of a slider that topples, in the motion that does
+not end."""
 
 
 class Friction(NamedTuple):
@@ -102,8 +109,9 @@ def make_contact(
 ) -> Contact:
     """Return a slider at rest, in which open edges are in S.
 
-    `overstress` and `moved` are taken over. Where the strength is mu_r N, `friction.peak` must
-    equal `friction.residual`. With a machine, the force falls by `relief` T'x (Pa).
+    `overstress` and `moved` are taken over. Where the strength is mu_r
+    N, `friction.peak` must equal `friction.residual`. With a machine,
+    the force falls by `relief` T'x (Pa).
     """
     n, m = len(friction.peak), len(moved)
     if relief > 0.0:
@@ -194,8 +202,9 @@ class PushState(NamedTuple):
 class Push(NamedTuple):
     """The push of a sample until it slides. Without an instability, `first` is None.
 
-    `last` is the last equilibrium, and `peak` the largest force (N/m). `events` holds the states
-    before and after each. `known` is false if the path was not followed to its end.
+    `last` is the last equilibrium, and `peak` the largest force (N/m).
+    `events` holds the states before and after each. `known` is false if
+    the path was not followed to its end.
     """
 
     first: PushState | None

@@ -74,9 +74,11 @@ from stiction.methods.equilibrium.strength import StaticSample
 
 ROWS_APPENDED_TOGETHER = 4
 PIVOT_RTOL = 1e-13
-"""Fraction of the diagonal entry below which the square of a pivot is round-off."""
+"""Fraction of the diagonal entry below which the square of a pivot is
+round-off."""
 COST_OF_ROTATING_ROW = 4
-"""Time to rotate one entry of a row, in units of the time to append it in a group of rows."""
+"""Time to rotate one entry of a row, in units of the time to append it
+in a group of rows."""
 MAX_SLIPPING = 8192
 """Slipping nodes for which L has space (268 MB if all of it is used)."""
 

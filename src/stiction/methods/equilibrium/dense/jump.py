@@ -100,7 +100,8 @@ from stiction.methods.equilibrium.strength import (
 
 MAX_ELASTIC_STEPS_IN_ALL = 4000
 MAX_ELASTIC_STEPS = 16
-"""Elastic steps in a row after which a step 2 follows although nodes keep joining."""
+"""Elastic steps in a row after which a step 2 follows although nodes
+keep joining."""
 
 
 class Course(IntEnum):

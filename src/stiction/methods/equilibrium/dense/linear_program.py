@@ -78,7 +78,8 @@ from stiction.methods.equilibrium.strength import StaticSample, strength_at
 OVERSTRESS_RTOL = 1e-12
 """Fraction of the mean strength below which an overstress is round-off."""
 CLOSE_RTOL = 0.02
-"""Relative distance below the bound from which a stable load is raised to the bound itself."""
+"""Relative distance below the bound from which a stable load is raised
+to the bound itself."""
 SHARE_TOWARDS_BOUND = 0.75
 """Fraction of the way to the bound by which a stable load is raised."""
 MAX_PASSES = 10_000

@@ -62,22 +62,26 @@ from stiction.methods.equilibrium.transforms.plane import plane_onset
 from stiction.problem.problem import Problem
 
 MAX_WEAK_NODES = 1500
-"""Number of nodes weaker than the upper bound of the load above which transforms are faster."""
+"""Number of nodes weaker than the upper bound of the load above which
+transforms are faster."""
 TRANSFORMS_GAP_RTOL = 3e-10
 """Relative distance of the bounds by transforms, below `widest_gap`."""
 WIDEST_GAP_IF_NODES_STOP = 1e-4
-"""`widest_gap` if nodes may stop, since positive entries of K leave the bounds so far apart."""
+"""`widest_gap` if nodes may stop, since positive entries of K leave the
+bounds so far apart."""
 WEAKENING_RATE_RTOL = 1e-12
 """Relative distance of weakening rates that differ by round-off."""
 RESTING_MULTIPLIER_RTOL = 1e-9
-"""Fraction of the largest multiplier below which it is zero, as at nodes at rest."""
+"""Fraction of the largest multiplier below which it is zero, as at
+nodes at rest."""
 
 
 class DenseSearch:
     """Search for equilibria of a line or a specimen. It is thread-safe."""
 
     widest_gap = 1e-9
-    """Certificate gap, as a fraction of the load, above which there is a warning."""
+    """Certificate gap, as a fraction of the load, above which there is
+    a warning."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

@@ -47,13 +47,14 @@ method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
 4. After a start, append a row to L. After a corner, one diagonal entry
    of A_SS changes. Rotate the rows of L from this entry on, or compute
    them again if the node now weakens more steeply.
-5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0 for the
-   direction z = (-A_SS^-1 A_Sj, 1) at the failed node j. If z >= 0, slip along z is
-   unbounded: it jumps at constant load, and the path ends, unstable. Otherwise, for
-   (3) only, v moves along z until a rate reaches zero. If a start failed, that node
-   stops, and the start is tried again. If a corner or the first factor failed, the
-   nodes without a row in L leave S, and may start again. Nodes that do not start
-   again before the load rises have stopped.
+5. If a pivot of L fails, A_SS is no longer positive definite: z'Az <= 0
+   for the direction z = (-A_SS^-1 A_Sj, 1) at the failed node j. If z
+   >= 0, slip along z is unbounded: it jumps at constant load, and the
+   path ends, unstable. Otherwise, for (3) only, v moves along z until a
+   rate reaches zero. If a start failed, that node stops, and the start
+   is tried again. If a corner or the first factor failed, the nodes
+   without a row in L leave S, and may start again. Nodes that do not
+   start again before the load rises have stopped.
 6. The path ends at the target, or when every node has slipped. The path
    is abandoned if S outgrows L, or if nodes stop and start without end.
 
@@ -97,13 +98,17 @@ from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16
-"""Slip is computed anew from L after so many events, so that round-off does not accumulate."""
+"""Slip is computed anew from L after so many events, so that round-off
+does not accumulate."""
 MAX_MARGIN_AT_STRENGTH = 1e3
-"""Distance below its strength at which a node counts as at it, in units of `stress_tolerance`."""
+"""Distance below its strength at which a node counts as at it, in units
+of `stress_tolerance`."""
 MAX_RESTARTS_PER_NODE = 16
-"""How often a node may start again, on average, before the path is given up."""
+"""How often a node may start again, on average, before the path is
+given up."""
 NEGATIVE_RATE_RTOL = 1e-10
-"""A rate below zero by less than this fraction of the largest rate is round-off."""
+"""A rate below zero by less than this fraction of the largest rate is
+round-off."""
 
 ONE: Any = np.int64(1)  # as `ZERO`: numba would compile a kernel again for a literal
 NOBODY = -1  # no position in S, no node

@@ -46,15 +46,17 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 MAX_HALVINGS = 60
 """Most halvings of the interval, more than a double has binary digits."""
 MIN_MAGNITUDE = 1e-2
-"""Least load to which gaps refer, as a fraction of the mean ratio of strength to load."""
+"""Least load to which gaps refer, as a fraction of the mean ratio of
+strength to load."""
 LIFTING_SHARE = 0.4
-"""Fraction of g in the lifting field. Below one half A z < 0 holds for any W."""
+"""Fraction of g in the lifting field. Below one half A z < 0 holds for
+any W."""
 EIGENVALUE_RTOL = 1e-4
 """Residual of the lowest eigenvector, as a fraction of the largest W."""
 MAX_EIGENVECTOR_ITERATIONS = 200
 LIFTING_RTOL = 1e-6
-"""The same for the eigenvector by which multipliers of a part are lifted, to be positive at its
-border."""
+"""The same for the eigenvector by which multipliers of a part are
+lifted, to be positive at its border."""
 
 
 class TooSmallError(Exception):

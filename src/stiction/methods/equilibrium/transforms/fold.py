@@ -40,11 +40,14 @@ from stiction.methods.equilibrium.strength import StaticSample, present_pieces
 from stiction.methods.equilibrium.transforms.relaxation import residual_tolerance, solve_pieces
 
 MAX_EVENTS = 300
-"""Most events up to the turn, in a path that begins a step of the load before it."""
+"""Most events up to the turn, in a path that begins a step of the load
+before it."""
 TURN_SLIP_RTOL = 1e-11
-"""Residual stress of the slip, as a fraction of the mean strength or load."""
+"""Residual stress of the slip, as a fraction of the mean strength or
+load."""
 SOLUTION_RTOL = 1e-9
-"""Residual of other solutions, as a fraction of their largest right side."""
+"""Residual of other solutions, as a fraction of their largest right
+side."""
 MAX_PIECE_REVISIONS = 20
 """Revisions of the pieces of a rough slip."""
 

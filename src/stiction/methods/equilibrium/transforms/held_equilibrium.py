@@ -50,7 +50,8 @@ from stiction.elasticity.operator import (
 )
 
 LOOSE_RESIDUAL = 0.05
-"""Factor by which a residual is reduced before the set of slipping nodes is revised."""
+"""Factor by which a residual is reduced before the set of slipping
+nodes is revised."""
 
 
 @jit_inside

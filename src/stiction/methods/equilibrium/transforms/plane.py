@@ -64,34 +64,41 @@ from stiction.methods.equilibrium.transforms.turning_point import close_by_newto
 from stiction.problem.problem import Problem
 
 MIN_STIFFNESS_RATIO = 8.0
-"""Least ratio of the largest K(k) to W on a coarse grid: about six nodes in h_n."""
+"""Least ratio of the largest K(k) to W on a coarse grid: about six
+nodes in h_n."""
 MIN_COARSE_NODES = 8
-"""Least nodes along x and y on a coarse grid. A smaller grid is not faster than the next."""
+"""Least nodes along x and y on a coarse grid. A smaller grid is not
+faster than the next."""
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
 FIRST_LOAD_STEP = 1e-4
-"""First step of the load along a path, as a fraction of the load. Later steps adapt."""
+"""First step of the load along a path, as a fraction of the load. Later
+steps adapt."""
 FIRST_SHARE_OF_ONSET = 0.9
-"""Part of the way to the onset without corners that is tried at once. Corners mostly take off less
-than a tenth."""
+"""Part of the way to the onset without corners that is tried at once.
+Corners mostly take off less than a tenth."""
 STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
-"""Factors of the next step, after a step that failed and after a step that succeeded."""
+"""Factors of the next step, after a step that failed and after a step
+that succeeded."""
 MAX_EXTRAPOLATION = 3.0
 """Steps ahead to which slip is extrapolated as a guess."""
 STEP_RESIDUAL = 0.1
 """Largest residual stress after a step, as a fraction of the step."""
 MAX_STEP_RESIDUAL = 1e-5
-"""Largest residual stress after a step, relative to the mean strength or load. A rougher slip may
-miss an event."""
+"""Largest residual stress after a step, relative to the mean strength
+or load. A rougher slip may miss an event."""
 AT_CORNER = 1.0 - 1e-9
-"""Fraction of the slip at a corner above which a node counts as beyond it, given `SLIP_RTOL`."""
+"""Fraction of the slip at a corner above which a node counts as beyond
+it, given `SLIP_RTOL`."""
 SLIP_RTOL = 1e-7
-"""Largest residual stress of the slip at a given load, as a fraction of the mean strength."""
+"""Largest residual stress of the slip at a given load, as a fraction of
+the mean strength."""
 BISECTED_GAP, BISECTED_GAP_FACTOR = 5e-3, 0.2
-"""Relative gap to which a trivial bracket is bisected before Newton's method is tried, and its
-change each time that fails."""
+"""Relative gap to which a trivial bracket is bisected before Newton's
+method is tried, and its change each time that fails."""
 BISECTED_RESIDUAL = 0.05
-"""Residual stress of bisection, as a fraction of that gap, or of `COARSE_GAP` if it is smaller."""
+"""Residual stress of bisection, as a fraction of that gap, or of
+`COARSE_GAP` if it is smaller."""
 
 
 def halved(fine: Array) -> Array:

@@ -33,8 +33,8 @@ Algorithm for (a): Newton's method
 
 Algorithm for (b): our own, steps that do not pass the least equilibrium
 ------------------------------------------------------------------------
-1. If the load exceeds the mean strength, the interface slides, because the mean of
-   K d is zero.
+1. If the load exceeds the mean strength, the interface slides, because
+   the mean of K d is zero.
 2. Step with bounds (`_bound`). Let nodes weaken at only a fraction of
    their present rate, and no further than to their next corner. This
    strength is not below the true strength at any node. Therefore the
@@ -92,14 +92,18 @@ MAX_JUMP_STEPS = 2000
 PIECES_RESIDUAL = 0.03
 """Factor by which a residual is reduced before the pieces are revised."""
 CURVATURE_RESIDUAL = 0.1
-"""Factor by which a residual is reduced in the search for negative curvature."""
+"""Factor by which a residual is reduced in the search for negative
+curvature."""
 DIRECTION_RTOL = 1e-5
-"""Fraction of the largest entry below which an entry of an unstable direction is round-off."""
+"""Fraction of the largest entry below which an entry of an unstable
+direction is round-off."""
 DRAG = 1e-3
-"""Stiffness that is added in place of the omitted weakening, relative to the largest W. Without
-it a step of a plane that slides as a whole would have no solution."""
+"""Stiffness that is added in place of the omitted weakening, relative
+to the largest W. Without it a step of a plane that slides as a whole
+would have no solution."""
 BOUND_RESIDUAL = 0.05
-"""Largest residual stress of a step, as a fraction of the weakening omitted in the step before."""
+"""Largest residual stress of a step, as a fraction of the weakening
+omitted in the step before."""
 MIN_OMITTED = 0.02
 """Fraction of the weakening that is omitted first."""
 CREEP = 0.02
