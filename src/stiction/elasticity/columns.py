@@ -10,25 +10,31 @@ and P = lambda + 2 G, the elastic energy is
     cell a:  (h G/2) int (u_a' + (v_{a+1} - v_a)/h)^2 dy
     edge b:  (w/2) int P e^2 + P v_b'^2 + 2 lambda e v_b' dy,    e = (u_b - u_{b-1})/w,
 
-where w is the distance between the middles of the two cells. `block` returns the stiffness of
-the points on the surface and on the far side, with the forces of a push on the left side.
+where w is the distance between the middles of the two cells. `block`
+returns the stiffness of the points on the surface and on the far side,
+with the forces of a push on the left side.
 
 Algorithm: our own
 ------------------
 Staggered differences along x, elements of degree 6 across. Each derivative along x has the
 symbol 2i sin(k h/2)/h, so that a half-plane has the symbol E* sin(k h/2)/h of the lattice.
 
-1. Elements across (`graded`, `Elements`): their sizes are 2 h, 6 h, 18 h and so on, away from
-   the surface and from both edges of a push. All integrals are exact.
-2. Terms of a cell, an edge between two cells, and an edge at an end, where sigma_xx = 0
-   or -p in the half cell between the line and the end (`Columns`).
-3. A piece is a matrix with labels. `merge` adds pieces and eliminates labels by Cholesky.
-4. Cell 0 and edge 1 are a period. n - 1 periods are two copies of half of them, and one period
-   more if n - 1 is odd (`_repeated`). A piece keeps its first and last two lines, and its points
-   on the surface and the far side.
-5. Columns beyond the surface in contact grow outwards. Merge them inwards (`_beyond`).
-6. Merge the cells with the last cell and the ends. If the far side is held, its points are
-   left out of each term.
+1. Elements across (`graded`, `Elements`): their sizes are 2 h, 6 h, 18
+   h and so on, away from the surface and from both edges of a push. All
+   integrals are exact.
+2. Terms of a cell, an edge between two cells, and an edge at an end,
+   where sigma_xx = 0 or -p in the half cell between the line and the
+   end (`Columns`).
+3. A piece is a matrix with labels. `merge` adds pieces and eliminates
+   labels by Cholesky.
+4. Cell 0 and edge 1 are a period. n - 1 periods are two copies of half
+   of them, and one period more if n - 1 is odd (`_repeated`). A piece
+   keeps its first and last two lines, and its points on the surface and
+   the far side.
+5. Columns beyond the surface in contact grow outwards. Merge them
+   inwards (`_beyond`).
+6. Merge the cells with the last cell and the ends. If the far side is
+   held, its points are left out of each term.
 """
 
 from __future__ import annotations
@@ -47,17 +53,19 @@ from stiction.base.arrays import Array
 DEGREE = 6
 """Degree of the elements across a body."""
 FIRST_ELEMENT, ELEMENT_GROWTH, MAX_REMAINDER = 2.0, 3.0, 1.5
-"""Smallest element in cells, ratio of neighbours, and largest last element over the next size."""
+"""Smallest element in cells, ratio of neighbours, and largest last
+element over the next size."""
 COLUMN_GROWTH, MAX_COLUMN = 1.25, 0.1
-"""Ratio of the widths of neighbouring columns beyond the contact, and largest width over the
-length of these columns."""
+"""Ratio of the widths of neighbouring columns beyond the contact, and
+largest width over the length of these columns."""
 STRIDE, PERIOD = 1 << 20, 2 << 20
-"""Distances between the labels of two lines and of two periods. Lines at edges are even, and
-lines of cells odd."""
+"""Distances between the labels of two lines and of two periods. Lines
+at edges are even, and lines of cells odd."""
 LOBATTO = np.concatenate(([-1.0], legendre.Legendre.basis(DEGREE).deriv().roots(), [1.0]))
 """Points of an element on [-1, 1]."""
 PUSH = 1 << 60
-"""Label of the force of the push, per unit depth. Rows and columns hold minus its loads."""
+"""Label of the force of the push, per unit depth. Rows and columns hold
+minus its loads."""
 
 Far: TypeAlias = Literal["free", "rollers", "fixed"]
 Interval: TypeAlias = tuple[float, float]
@@ -180,7 +188,8 @@ class Columns(NamedTuple):
     def edge(self, line: int, width: float, stop: bool = False) -> Piece:
         """Return the extension between two cells whose middles are `width` apart (m).
 
-        With a stop, the place of the second cell is taken by a frictionless wall.
+        With a stop, the place of the second cell is taken by a
+        frictionless wall.
         """
         (_, M, D, S), P = self.across, self.body.longitudinal
         lines = [line - 1, line, line + 1][: 3 - stop]
@@ -255,11 +264,11 @@ def block(
 ) -> Array:  # fmt: skip
     """Return the stiffness of a body per unit depth, Pa, on its surface and its far side.
 
-    Lengths are in m. The rows are u at the cells and v at the edges of the surface, u and v of
-    the far side if it is free, and the push, if any. The row for the push holds
-    minus the loads by a unit force. The body is longer than the surface in
-    contact by `behind` and `ahead`. If it lies on rollers, a frictionless wall
-    holds its leading end.
+    Lengths are in m. The rows are u at the cells and v at the edges of
+    the surface, u and v of the far side if it is free, and the push, if
+    any. The row for the push holds minus the loads by a unit force. The
+    body is longer than the surface in contact by `behind` and `ahead`.
+    If it lies on rollers, a frictionless wall holds its leading end.
     """
     columns = Columns(elements(body.height, FIRST_ELEMENT * cell, push), body, far)
     last, last_point = 2 * n_cells, len(columns.across.points) - 1

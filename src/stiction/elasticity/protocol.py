@@ -26,9 +26,11 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 
 ANYWHERE = -1
-"""In place of the first node of a window that may begin anywhere on a periodic interface."""
+"""In place of the first node of a window that may begin anywhere on a
+periodic interface."""
 SMALLEST_EIGENVALUE = 0.5788869418506
-"""lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and Rice, 2003)."""
+"""lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and
+Rice, 2003)."""
 
 
 class HalfSpaces(NamedTuple):

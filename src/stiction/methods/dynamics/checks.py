@@ -17,10 +17,12 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 FAST_RISE = 1e-3
-"""Rise of the load while shear waves cross the nucleation length, relative to the stress scale,
-above which arrested events depend on the rate of loading."""
+"""Rise of the load while shear waves cross the nucleation length,
+relative to the stress scale, above which arrested events depend on the
+rate of loading."""
 MISSED_PERCENT = 2.0
-"""Distance of a first instability from equilibrium, %, from which there is a warning."""
+"""Distance of a first instability from equilibrium, %, from which there
+is a warning."""
 # Fractions of the stress scale:
 _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning

@@ -42,7 +42,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 PICTURE_SHARES = (0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95)
-"""Fractions of an event's slip at which the velocities of the whole block are kept."""
+"""Fractions of an event's slip at which the velocities of the whole
+block are kept."""
 OVER_TIME = over(
     "time",
     machine_stress=("Pa", "force of the machine per area of interface"),

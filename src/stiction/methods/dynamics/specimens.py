@@ -54,15 +54,19 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 OPTIONS = ("courant", "arrival", "max_steps", "events")
-"""Options of `Rupture` with an effect on specimens. The others need a load that rises in time."""
+"""Options of `Rupture` with an effect on specimens. The others need a
+load that rises in time."""
 LOAD_RISE = 1e-5
-"""Rise of the drive in an event, as a fraction of the mean strength drop."""
+"""Rise of the drive in an event, as a fraction of the mean strength
+drop."""
 INITIAL_GROWTH = 1e-3
 """Largest growth of the slip at the start, as a fraction of d_c."""
 RESTING_SLIP = 1e-4
-"""Fraction of the largest slip of an event below which a node counts as resting."""
+"""Fraction of the largest slip of an event below which a node counts as
+resting."""
 CHECKS_PER_WINDOW = 8
-"""Number of checks for rest while shear waves cross the block and return."""
+"""Number of checks for rest while shear waves cross the block and
+return."""
 
 
 def refusals(method: Any, problem: Problem) -> list[str]:

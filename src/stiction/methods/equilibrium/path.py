@@ -7,8 +7,8 @@ rising loads, and the stress tau_i + load p - K d.
 
 Algorithm
 ---------
-1. Follow the sample to global sliding. This gives the arrested events and the last
-   load.
+1. Follow the sample to global sliding. This gives the arrested events
+   and the last load.
 2. For each load before sliding, start from the
    nearest known state: the equilibrium after the last
    event, or the equilibrium at the previous load.

@@ -20,8 +20,9 @@ The algorithm is our own (`follow_to_sliding`). A `EquilibriumSearch` supplies t
 1. Start from rest and raise the load to the next instability
    (`EquilibriumSearch.next`).
 2. If the path ends without an instability, the interface slides stably: stop.
-3. Let the unstable patch jump at constant load (`EquilibriumSearch.jump`). If no
-   equilibrium stops it, the interface slides: stop.
+3. Let the unstable patch jump at constant load
+   (`EquilibriumSearch.jump`). If no equilibrium stops it, the interface
+   slides: stop.
 4. If the patch comes to rest, this is an arrested event. Go to step 1
    from the new equilibrium.
 """
@@ -60,22 +61,25 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 MIN_NODES = 8.0
-"""Fewest nodes in a nucleation length without a warning, which gives the expected error."""
+"""Fewest nodes in a nucleation length without a warning, which gives
+the expected error."""
 ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
     1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
     " quarter of it, by 3 and 9 % if it is a tenth",
     2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
 }
 MIN_PEAK_HEIGHT = 0.02
-"""A peak that is hardly higher than the stress of sliding gets a warning. This is its smallest
-height above the mean residual strength, as a fraction of the strength drop."""
+"""A peak that is hardly higher than the stress of sliding gets a
+warning. This is its smallest height above the mean residual strength,
+as a fraction of the strength drop."""
 OF_INSTABILITY = {
     "first_instability", "critical_position", "critical_patch_length", "critical_patch_extent",
     "critical_patch_area",
 }  # fmt: skip
 """Variables that are NaN without an instability."""
 STRENGTH_STEP = 1e-7
-"""Rise of a node's strength in a difference quotient, as a fraction of the mean strength."""
+"""Rise of a node's strength in a difference quotient, as a fraction of
+the mean strength."""
 
 
 class SamplePath(NamedTuple):

@@ -22,10 +22,9 @@ from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.parameters import Polygon
 
 CONSTANT_STRENGTH_RTOL = 1e-11
-"""Smallest strength drop, as a fraction of the mean strength, with which a node counts as
-weakening. A smaller fall is within the round-off of K d: an instability
-of such nodes adds no slip
-and never ends."""
+"""Smallest strength drop, as a fraction of the mean strength, with
+which a node counts as weakening. A smaller fall is within the round-off
+of K d: an instability of such nodes adds no slip and never ends."""
 
 
 class Pieces(NamedTuple):

@@ -64,23 +64,31 @@ MAX_STATES = 40
 MAX_PATCH_CHANGES = 4
 """How often another patch may be held instead."""
 MAX_IDLE_STATES = 8
-"""States in a row that hardly narrow the gap, after which the search ends."""
+"""States in a row that hardly narrow the gap, after which the search
+ends."""
 IDLE_GAP_SHARE = 0.95
 """Fraction of the gap that must remain for a state to count as idle."""
 PATCH_CHANGE_RETREAT = 2e-3
-"""Fraction by which the load is lowered when another patch is held, twice as much each time."""
+"""Fraction by which the load is lowered when another patch is held,
+twice as much each time."""
 MAX_STEP = 0.3
-"""Longest step, as a fraction of the amplitude. A longer step may reach another patch."""
+"""Longest step, as a fraction of the amplitude. A longer step may reach
+another patch."""
 NEWTON_FACTOR = 1.2
-"""Length of a step as a multiple of Newton's, which falls short because mu' falls in steps."""
+"""Length of a step as a multiple of Newton's, which falls short because
+mu' falls in steps."""
 STALLED_SHARE = 0.7
-"""Fraction of mu' that must remain after a step for the next step to be twice as long instead."""
+"""Fraction of mu' that must remain after a step for the next step to be
+twice as long instead."""
 RESIDUAL_SHARE_OF_GAP = 0.05
-"""Residual stress, relative to the gap that is asked for, so that it does not open the bounds."""
+"""Residual stress, relative to the gap that is asked for, so that it
+does not open the bounds."""
 LOAD_BELOW_BOUND = 0.3
-"""Distance of the load below the upper bound, as a fraction of that gap: such a state closes it."""
+"""Distance of the load below the upper bound, as a fraction of that
+gap: such a state closes it."""
 PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
-"""Residual of the eigenvector of another patch, as a fraction of the largest W, and iterations."""
+"""Residual of the eigenvector of another patch, as a fraction of the
+largest W, and iterations."""
 
 
 class Held(NamedTuple):
