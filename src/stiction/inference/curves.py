@@ -40,7 +40,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -70,6 +70,7 @@ from stiction.problem.reading.labels import (
     column_in_si,
     several_tables,
     with_stated_unit,
+    without_missing,
 )
 from stiction.problem.reading.tables import Options, table_of_frame
 
@@ -295,7 +296,8 @@ def read_curve(
     """
     tests: list[Curve] = []
     read: list[Reading] = []
-    for name, table in _tables(source, Options(skip, sheet, missing, decimal)):
+    options = Options(skip, sheet, missing, decimal)
+    for name, table in _tables(source, options):
         with prefixed(name):
             if table.begins and split != "tables":
                 raise InputError(f"{several_tables(table)}. split='tables' reads all of them")
@@ -303,7 +305,8 @@ def read_curve(
             column = read_column(columns, "force", "force", force, FORCE_UNITS)
             along = _travel_of([c for c in columns if c is not column], travel)
             at, at_si = column_in_si(along, "travel", travel_unit, TRAVEL_UNITS, "travel_unit")
-            values, si = column_in_si(column, "force", unit, FORCE_UNITS, "unit")
+            known = replace(column, values=without_missing(column.values, options))
+            values, si = column_in_si(known, "force", unit, FORCE_UNITS, "unit")
             if at_si == "s" and speed is not None:
                 at, at_si = at * speed, "m"
             used = "travel" if at_si == "m" else "time"

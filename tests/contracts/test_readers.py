@@ -1,0 +1,160 @@
+"""Laws of readers: each option counts, and a table has the same numbers in each format."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+import pandas as pd
+import pytest
+from contracts.bodies import attempt
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+MM, MPA = [0.5 * i for i in range(8)], [1.25, 1.5, 1.125, 1.75, 1.0625, 1.875, 1.375, 1.625]
+PROFILE = [["x (mm)", "far (mm)", "strength (MPa)", "other (MPa)"]]
+PROFILE += [[x, 2.0 * x, s, 3.0 - s] for x, s in zip(MM, MPA, strict=True)]
+HEIGHTS = [["x (mm)", "height (um)"], *zip(MM, MPA, strict=True)]
+TIMES = [i / 10 for i in range(40)]
+FORCE = [10.0 * t if t < 2.5 else 8.0 + 0.01 * t for t in TIMES]
+CURVE = [["time (s)", "travel (mm)", "friction (N)", "side (N)"]]
+CURVE += [[t, 0.25 * t, f, 0.5 * f + 0.125 * t] for t, f in zip(TIMES, FORCE, strict=True)]
+CYCLES = [["time (s)", "friction (N)"]]
+CYCLES += [[0.1 * i, 4.0 + 0.5 * (i % 40) + 0.1 * (i // 40)] for i in range(320)]
+PEAKS = [["specimen", "peak (kN)", "other (kN)", "normal (kN)"]]
+PEAKS += [[i + 1, 10.0 * s, 12.0 * s, 40.0 + i] for i, s in enumerate(MPA)]
+
+
+def headed(table: Any, *words: str) -> Any:
+    """The table under other headings, '' for those that stay."""
+    return [[word or old for word, old in zip(words, table[0], strict=True)], *table[1:]]
+
+
+def of_three_digits(table: Any) -> Any:
+    """Numbers as texts whose point could also mark thousands."""
+    return [table[0], *([f"{1.0 + cell:.3f}" for cell in row] for row in table[1:])]
+
+
+TURNED = [*PROFILE[:1], *PROFILE[2:], [4.0, *PROFILE[1][1:]]]
+"""The first node at the end of the period."""
+ABOVE = [["7", "8", "9", "1"], ["", "", "", ""]]
+OPTIONS: dict[str, dict[str, Any]] = {  # reader: option: a table in which it counts, a value
+    "read_profile": {
+        "x": (PROFILE, "far (mm)"), "value": (PROFILE, "other (MPa)"),
+        "unit": (headed(PROFILE, "", "", "strength", "other"), "kPa"),
+        "x_unit": (headed(PROFILE, "x", "far", "", ""), "cm"),
+        "quantity": ([row[::2] for row in PROFILE], "initial_stress"),
+        "strength": (HEIGHTS, lambda h: 1e6 + 1e11 * h), "missing": (PROFILE, 1.0625),
+        "decimal": (of_three_digits(PROFILE), ","), "skip": (ABOVE + PROFILE, 2), 
+        "sheet": (PROFILE, 1),
+        "interface": (TURNED, st.Interface(4e-3, 8)),
+    },
+    "read_curve": {
+        "force": (CURVE, "side (N)"), "travel": (CURVE, "time (s)"),
+        "unit": (headed(CURVE, "", "", "friction", "side"), "kN"),
+        "travel_unit": (headed(CURVE, "time", "travel", "", ""), "cm"),
+        "speed": ([row[::2] for row in CURVE], 1e-3), "noise": (CURVE, 2.0),
+        "split": (CYCLES, "cycles"), "missing": (CURVE, 24.0), 
+        "decimal": (of_three_digits(CURVE), ","),
+        "skip": (ABOVE + CURVE, 2), "sheet": (CURVE, 1),
+    },
+    "read_peaks": {
+        "value": (PEAKS, "other (kN)"),
+        "unit": (headed(PEAKS, "", "peak", "other", ""), "N"), "normal": (PEAKS, "normal (kN)"),
+        "surfaces": (PEAKS, 2), "missing": (PEAKS, 12.5), "decimal": (of_three_digits(PEAKS), ","),
+        "skip": (ABOVE + PEAKS, 2), "sheet": (PEAKS, 1),
+    },
+}  # fmt: skip
+BASE = {("read_peaks", "surfaces"): {"normal": "normal (kN)"}}
+CASES = [(reader, option) for reader in OPTIONS for option in OPTIONS[reader]]
+
+
+def as_text(table: Any, folder: Path) -> Path:
+    path = folder / "table.csv"
+    path.write_text("\n".join(";".join(map(str, row)) for row in table))
+    return path
+
+
+def as_workbook(table: Any, folder: Path) -> Path:
+    """With a second sheet, whose numbers are half as large."""
+    book, path = openpyxl.Workbook(), folder / "table.xlsx"
+    for sheet, factor in ((book.active, 1.0), (book.create_sheet("more"), 0.5)):
+        for row in table:
+            numbers = [c if isinstance(c, str) else factor * c for c in row]
+            sheet.append([None if c == "" else c for c in numbers])
+    book.save(path)
+    return path
+
+
+def as_frame(table: Any, folder: Path) -> pd.DataFrame:
+    return pd.DataFrame(table[1:], columns=table[0])
+
+
+FORMATS = {"text": as_text, "workbook": as_workbook, "frame": as_frame}
+TAKEN = {  # option: the formats that it is about, if not all
+    "decimal": ["text", "workbook"], "skip": ["text", "workbook"], "sheet": ["workbook"],
+}  # fmt: skip
+
+
+def numbers_of(result: Any) -> str:
+    """All that a reader returns, but for names of files and of tests."""
+    plain = result.to_dict()
+    if "attrs" in plain:
+        parts = [(plain | plain["attrs"])[key] for key in ("name", "coords", "data", "units")]
+    else:
+        parts = [part | {"read": 0, "name": ""} for part in plain.get("tests", [plain])]
+    number = r"\d+\.\d+(e-\d+)?"
+    return re.sub(number, lambda text: f"{float(text[0]):.12g}", repr(parts))
+
+
+def read(reader: str, form: str, table: Any, folder: Path, **options: Any) -> tuple[str, str]:
+    """The numbers that are read, or the refusal."""
+    source = FORMATS[form](table, folder)
+    result, refusal = attempt(lambda: getattr(st, reader)(source, **options))
+    return ("" if refusal else numbers_of(result)), refusal
+
+
+def test_every_option_of_a_reader_has_a_table():
+    for reader, options in OPTIONS.items():
+        names = [*inspect.signature(getattr(st, reader)).parameters][1:]
+        assert {*names} == options.keys()
+
+
+@pytest.mark.parametrize(("reader", "option"), CASES)
+def test_each_option_of_a_reader_counts_in_each_format_and_gives_the_same_numbers(
+    reader, option, tmp_path
+):
+    table, value = OPTIONS[reader][option]
+    base, found = BASE.get((reader, option), {}), set()
+    for form in FORMATS:
+        if form == "frame" and reader == "read_peaks":
+            continue
+        plain = read(reader, form, table, tmp_path, **base)
+        with_option = read(reader, form, table, tmp_path, **base, **{option: value})
+        if form in TAKEN.get(option, FORMATS):
+            assert with_option[0], with_option[1]
+            assert with_option[0] != plain[0], f"{option} has no effect on a {form}"
+            found.add(with_option[0])
+        else:
+            assert option in with_option[1] or with_option == plain
+    assert len(found) == 1, found
+
+
+@pytest.mark.parametrize("reader", OPTIONS)
+def test_a_table_has_the_same_numbers_in_each_format(reader, tmp_path):
+    """Every table above, with the options that it needs, also in a file with commas."""
+    for option, (table, value) in OPTIONS[reader].items():
+        if option in ("sheet", "decimal"):
+            continue
+        given = BASE.get((reader, option), {}) | {option: value}
+        text = as_text(table, tmp_path).read_text()
+        results = {read(reader, "text", table, tmp_path, **given)}
+        path = tmp_path / "comma.csv"
+        path.write_text(text.replace(".", ","))
+        comma, refusal = attempt(lambda p=path, g=given: getattr(st, reader)(p, **g))
+        results.add((numbers_of(comma) if not refusal else "", refusal))
+        assert len(results) == 1, (option, results)
