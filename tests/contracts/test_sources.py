@@ -1,0 +1,152 @@
+"""Laws of random inputs: a source is its interfaces, and what hardly varies is a constant."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from contracts.bodies import SOLID, attempt
+
+import stiction as st
+from stiction.problem.sample import REPLACED
+from stiction.random.dotted_keys import with_values
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+QUIET, MEMBERS = {"progress": False}, 20
+LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
+FRICTION = st.LinearWeakening(weakening_rate=0.25e12)
+INTERFACE = st.Interface(0.05, 64, width=0.013)
+PROBLEM = st.Problem(SOLID, INTERFACE, FRICTION, st.Load(normal_pressure=2e6))
+SPECTRUM = st.PowerLawSpectrum(4e-3)
+FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), SPECTRUM, mean_mode=True)
+FACTORED = st.RandomInterface(
+    strength=FIELD, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
+)
+PEAKS = 0.8e6 * np.exp(0.05 * np.random.default_rng(8).standard_normal(6))
+LENGTHS = {0.05: PEAKS[:3], 0.075: PEAKS[3:]}
+PRIOR = {"marginal.mean": (0.8e6, 1.2e6)}
+
+
+@cache
+def fit(between: bool) -> st.FieldFit:
+    records = [
+        factor * FIELD.sample(INTERFACE, seed=seed)[0]
+        for seed, factor in enumerate((1.0, 0.93, 1.08))
+    ]
+    quick = {"marginal": "gamma", "noise": False, "bootstrap": 20, "between": between}
+    return st.fit_field(records, INTERFACE, **quick, **QUIET)
+
+
+def inferred(random: Any, peaks: Any = PEAKS, **more: Any) -> Any:
+    return st.infer(PROBLEM, random, peaks, method=LOCAL, samples=100, **more, **QUIET)
+
+
+SOURCES: dict[str, Any] = {  # all kinds of random inputs, and what the package makes of them
+    "field": lambda: FIELD,
+    "interface": lambda: FACTORED,
+    "list": lambda: [FIELD, dataclasses.replace(FIELD, marginal=st.Gamma(mean=9e5, cv=0.2))],
+    "fit": lambda: fit(False),
+    "fit with scatter": lambda: fit(True),
+    "posterior": lambda: inferred(FIELD, prior=PRIOR),
+    "posterior of two lengths": lambda: inferred(FIELD, LENGTHS, prior=PRIOR),
+    "tests alone": lambda: inferred(FIELD),
+    "tests of two lengths": lambda: inferred(FACTORED, LENGTHS),
+    "profiles and tests": lambda: inferred(fit(True)),
+}
+source_of = cache(lambda name: SOURCES[name]())
+ASKED = {"target_cv": 0.5} | QUIET
+CALLS: dict[str, Any] = {  # every call that takes what may be random, here p and r, by a method m
+    "monte_carlo": lambda p, r, m: st.monte_carlo(
+        p, r, method=m, samples=8, pilot=False, **QUIET).critical_stress.values,
+    "Study": lambda p, r, m: st.Study(problem=p, random=r, method=m, samples=8).run(
+        pilot=False, **QUIET).critical_stress.values,
+    "failure_probability": lambda p, r, m: st.failure_probability(
+        p, r, 0.8e6, method=m, **ASKED).probability,
+    "design_stress": lambda p, r, m: st.design_stress(
+        p, r, probability=0.2, sensitivities=False, method=m, **ASKED).stress,
+    "failure_curve": lambda p, r, m: st.failure_curve(
+        p, r, smallest=0.1, method=m, **ASKED).stress.values,
+    "external.limit_state": lambda p, r, m: (
+        lambda state: state(state.draws(0, 0, 8)))(st.external.limit_state(p, r, m)),
+    "external.simulator": lambda p, r, m: st.external.simulator(
+        p, r, ("marginal.cv",), method=m, samples=4)([0.2]),
+    "infer": lambda p, r, m: st.infer(p, r, PEAKS, method=m, samples=100, **QUIET).mean["mean"],
+    "infer with a prior": lambda p, r, m: st.infer(
+        p, r, PEAKS, prior={"marginal.cv": (0.1, 0.3)}, method=m, samples=100, **QUIET
+    ).mean["marginal.cv"],
+    "infer from coefficients": lambda p, r, m: st.infer(
+        p, r, PEAKS / 2e6, unit="1", method=m, samples=100, **QUIET).mean["mean"],
+}  # fmt: skip
+ELSEWHERE = {"design_of_tests"}
+"""See tests/user/test_expected_widths.py."""
+NO_SOURCE = {name for name in CALLS if "infer" in name or "simulator" in name}
+"""Calls that change a field, or join it with peaks."""
+
+
+def test_every_call_that_takes_what_is_random_has_a_line():
+    modules = {"": st, "external.": st.external}
+    calls = {
+        prefix + name
+        for prefix, module in modules.items()
+        for name in module.__all__
+        if inspect.isfunction(getattr(module, name)) or name == "Study"
+        if "random" in inspect.signature(getattr(module, name)).parameters
+    }  # fmt: skip
+    assert calls - ELSEWHERE == {name.split()[0] for name in CALLS}
+
+
+@pytest.mark.parametrize("name", SOURCES)
+@pytest.mark.parametrize("call", [call for call in CALLS if call not in NO_SOURCE])
+def test_a_source_is_the_list_of_its_interfaces(call, name, monkeypatch):
+    """To the bit, also for a source that draws more members when an answer needs them."""
+    for place in ("stiction.study.study", "stiction.random.equally_likely"):
+        monkeypatch.setattr(f"{place}.FIRST_MEMBERS", MEMBERS)
+    source = source_of(name)
+    members = source.interfaces(MEMBERS) if hasattr(source, "interfaces") else source
+    found, expected = (CALLS[call](PROBLEM, given, LOCAL) for given in (source, members))
+    np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("call", sorted(NO_SOURCE))
+@pytest.mark.parametrize("name", SOURCES)
+def test_a_call_that_changes_a_field_takes_a_source_or_names_it(call, name):
+    result, refusal = attempt(lambda: CALLS[call](PROBLEM, source_of(name), LOCAL))
+    assert "random" in refusal if refusal else np.isfinite(result).all()
+
+
+CLOSE = {"design_stress": 0.1, "failure_curve": 0.1, "infer with a prior": 0.04}
+"""Chains of samples take other ways with more draws, and a posterior may be interpolated."""
+CONSTANTS = {  # a value of each constant of a problem that may be random
+    "residual_strength": 1e5, "initial_stress": 2e4, "normal_pressure": 2e6,
+    "weakening_rate": 0.25e12, "critical_slip": 5e-6, "fracture_energy": 4.0,
+}  # fmt: skip
+COEFFICIENT = st.RandomField(
+    st.Gamma(mean=0.5, cv=0.2), SPECTRUM, mean_mode=True, quantity="friction_coefficient"
+)
+
+
+@pytest.mark.parametrize("call", CALLS)
+@pytest.mark.parametrize("name", REPLACED)
+def test_a_property_that_hardly_varies_is_a_constant(name, call):
+    """Each constant of a problem may be random in each call, with the same draws of the rest."""
+    value, strength = CONSTANTS[name], COEFFICIENT if name == "normal_pressure" else FIELD
+    (key,) = [key for key in REPLACED[name] if key.endswith(f".{name}")]
+    of_law = key in REPLACED["critical_slip"]
+    if of_law and call in CLOSE:
+        return  # a minute
+    friction, method = (st.LinearWeakening(), EXACT) if of_law else (FRICTION, LOCAL)
+    bare = dataclasses.replace(PROBLEM, friction=friction, load=st.Load())
+    constant = with_values({"problem": bare}, {f"problem.{key}": value})["problem"]
+    field = st.RandomField(st.Lognormal(mean=value, cv=1e-8), SPECTRUM)
+    both = st.RandomInterface(**{"strength": strength, name: field})
+    (found, refusal), (expected, other) = (
+        attempt(lambda p=problem, r=random: CALLS[call](p, r, method))
+        for problem, random in ((bare, both), (constant, strength))
+    )
+    assert bool(refusal) == bool(other), refusal or other
+    if not refusal:
+        np.testing.assert_allclose(found, expected, rtol=CLOSE.get(call, 1e-5))
