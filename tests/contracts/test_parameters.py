@@ -46,7 +46,7 @@ BASE: dict[str, dict[str, Any]] = {  # public call: arguments of a cheap example
     },
 }  # fmt: skip
 OTHERS: dict[str, Any] = {  # parameter: another value, for all calls or by call
-    "problem": OTHER, "random": WEAKER, "method": EXACT, "samples": 150, "seed": 5, "first": 2,
+    "problem": OTHER, "random": WEAKER, "method": EXACT, "samples": 150, "seed": 5,
     "keep": ["strength"], "pilot": True, "profiles": 0.98 * ROWS, "loads": [3e5, 5.5e5],
     "stress": 6.4e5, "friction_coefficient": 0.31, "force": 270.0, "target_cv": 0.05,
     "probability": 0.2, "max_evaluations": 100, "algorithm": "subset", "smallest": 0.02,
@@ -145,9 +145,10 @@ def test_progress_rises_to_its_total_and_changes_no_number(call):
     assert seen[-1][0] == (seen[-1][1] or seen[-1][0])
 
 
-def test_first_continues_an_ensemble():
-    whole, rest = ask("monte_carlo", samples=6), ask("monte_carlo", first=4, samples=2)
-    assert whole.isel(sample=slice(4, 6)).drop_attrs().identical(rest.drop_attrs())
+def test_samples_of_an_ensemble_are_drawn_alone():
+    whole = ask("monte_carlo", samples=6, seed=5).critical_stress[4:]
+    alone = ask("onset", profiles=FIELD.sample(LINE.interface, samples=2, seed=5, first=4))
+    np.testing.assert_array_equal(whole, alone.critical_stress)
 
 
 @pytest.mark.parametrize("call", ["failure_probability", "design_stress"])

@@ -156,11 +156,11 @@ def test_what_cannot_be_read_is_not_damaged(tmp_path, often, monkeypatch, number
 def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
     """Which another process, with more samples, may have stored; a count that is lost is NaN."""
     point = Experiment(LINE, beta_strength(4e-3), st.Equilibrium())
-    whole = batches.solve_span(point, batches.Span(0, 5, 5))
-    failures = tuple(batches.Failure(0, sample, 0, "lost") for sample in (7, 8))
+    whole = batches.solve_span(point, batches.Span(0, 0, 5))
+    failures = tuple(batches.Failure(0, sample, 0, "lost") for sample in (2, 3))
     fewer = {name: np.delete(values, 2, axis=0) for name, values in whole.columns.items()}
-    for columns, lost in ((whole.columns, []), (fewer, [7])):
-        gathered = Gathered([point], 3, 5)
+    for columns, lost in ((whole.columns, []), (fewer, [2])):
+        gathered = Gathered([point], 3)
         gathered.add(whole._replace(columns=columns, failures=failures))
         assert [one.sample for one in gathered.failed] == lost
         found = gathered.dataset({})

@@ -307,7 +307,7 @@ def _cost(study: Any) -> dict[str, str]:
 
     points, samples, cores = study.experiments, study.samples, usable_cores()
     places = np.unique(np.linspace(0, len(points) - 1, TIMED_POINTS).astype(int))
-    ratios = [_seconds(points[place], study.first) / points[place].seconds for place in places]
+    ratios = [_seconds(points[place]) / points[place].seconds for place in places]
     # Other points are as much slower than their estimates as the nearest timed points.
     factors = np.exp(np.interp(np.arange(len(points)), places, np.log(ratios)))
     costs = factors * [point.seconds for point in points]
@@ -320,15 +320,15 @@ def _cost(study: Any) -> dict[str, str]:
     }
 
 
-def _seconds(point: Any, first: int) -> float:
+def _seconds(point: Any) -> float:
     """Return the processor time of a sample, s, or its estimate if samples are slow or fail."""
     seconds: list[float] = []
     with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():
         if point.seconds < SLOW_SECONDS:
-            point.results(first, 1)  # compiles
+            point.results(0, 1)  # compiles
         while point.seconds < SLOW_SECONDS and sum(seconds) < TIMING_SECONDS:
             begin = time.thread_time()
-            point.results(first + len(seconds), 1)
+            point.results(len(seconds), 1)
             seconds.append(time.thread_time() - begin)
     return max(sum(seconds) / len(seconds), 1e-9) if seconds else point.seconds
 

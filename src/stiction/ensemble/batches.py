@@ -279,11 +279,11 @@ def _result(future: Future[Table], span: Span) -> Table:
     return table
 
 
-def spans_of(missing: NDArray[np.bool_], first: int) -> list[Span]:
+def spans_of(missing: NDArray[np.bool_]) -> list[Span]:
     """Return spans of missing samples, given a mask (points, samples)."""
     spans = []
     for point, row in enumerate(missing):
         # Missing samples begin and end where the mask changes.
         edges = np.flatnonzero(np.diff(row, prepend=False, append=False)).reshape(-1, 2)
-        spans += [Span(point, first + start, stop - start) for start, stop in edges.tolist()]
+        spans += [Span(point, start, stop - start) for start, stop in edges.tolist()]
     return spans

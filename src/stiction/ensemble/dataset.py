@@ -47,16 +47,12 @@ class Gathered:
     """
 
     def __init__(
-        self,
-        points: Sequence[Experiment],
-        samples: int,
-        first: int = 0,
-        only: Sequence[str] | None = None,
+        self, points: Sequence[Experiment], samples: int, only: Sequence[str] | None = None
     ) -> None:
         if only is None:
             largest = max(point.sample_bytes for point in distinct(points, "problem", "method"))
             check_memory("samples", largest * len(points) * samples)
-        self.points, self.first, self._only = points, first, only
+        self.points, self._only = points, only
         self.done = np.zeros((len(points), samples), dtype=np.bool_)
         self._failures: dict[tuple[int, int], Failure] = {}
         self._arrays: dict[str, NDArray[Any]] = {}  # floats, NaN without a value
@@ -69,7 +65,7 @@ class Gathered:
         # Numbers of failures may be anything in a stranger's file, so
         # they are objects.
         for points, samples in ((table.columns[POINT], table.columns[NUMBER]), failed.T):
-            known = (points >= 0) & (points < len(self.points)) & (samples >= self.first)
+            known = (points >= 0) & (points < len(self.points)) & (samples >= 0)
             if not np.all(known):
                 return "a point or a sample is not in the study"
         variables, interface = variables_in(self.points), self.points[0].problem.interface
@@ -88,9 +84,9 @@ class Gathered:
         """Put each row of a table in its place. Ignore other samples."""
         # The folder of a run may hold more samples than are gathered.
         for failure in table.failures:
-            if failure.sample - self.first < self.done.shape[1]:
-                self._failures[failure.point, failure.sample - self.first] = failure
-        point, sample = table.columns[POINT], table.columns[NUMBER] - self.first
+            if failure.sample < self.done.shape[1]:
+                self._failures[failure.point, failure.sample] = failure
+        point, sample = table.columns[POINT], table.columns[NUMBER]
         inside = sample < self.done.shape[1]
         where = point[inside], sample[inside]
         self.done[where] = True
@@ -133,7 +129,7 @@ class Gathered:
             values[name] = array.reshape(shape + array.shape[1:])
         swept = {name: replace(v, dims=dims + v.dims) for name, v in variables.items()}
         coordinates = {k: v for of_dim in axes.values() for k, v in of_dim.items()}
-        coordinates["sample"] = self.first + np.arange(self.done.shape[1]), SAMPLE
+        coordinates["sample"] = np.arange(self.done.shape[1]), SAMPLE
         attributes, failed, made = dict(attributes), self.failed, int(self.done.sum())
         if failed:
             attributes["failed_samples"] = failed

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Samples: TypeAlias = Annotated[Count, Field(le=10**10)]
-First: TypeAlias = Annotated[Number, Field(le=2**62)]
 MAX_SHOWN_FAILURES = 3
 """Number of failures that a warning lists."""
 LONG_RUN_SECONDS = 3600.0
@@ -93,9 +92,7 @@ def complete(
         warned = stack.enter_context(merge_warnings())
         meter = stack.enter_context(Meter(label, total, progress))
         # Closing the generator cancels pieces that have not begun.
-        work = solve_spans(
-            points, spans_of(missing, rows.first), executor=executor, workers=workers
-        )
+        work = solve_spans(points, spans_of(missing), executor=executor, workers=workers)
         for span, table in stack.enter_context(closing(work)):
             if store:
                 store.add(table)
@@ -115,7 +112,6 @@ def complete(
 def gather(
     points: Sequence[Experiment],
     samples: int,
-    first: int,
     attributes: Mapping[str, Any],
     axes: GridAxes = MappingProxyType({}),
     *,
@@ -132,7 +128,7 @@ def gather(
     samples), marks samples that a different job computes. See
     `monte_carlo` for the other arguments.
     """
-    rows, cores = Gathered(points, samples, first), workers or usable_cores()
+    rows, cores = Gathered(points, samples), workers or usable_cores()
     # Samples that are stored, or that another job computes, are not missing.
     if store:
         store.resume(rows)
@@ -147,7 +143,7 @@ def gather(
     comparison = store.pilot if store else None
     if comparison is None and pilot:
         show = progress is True
-        comparison = compare(points, rows.onsets, first, show, workers)
+        comparison = compare(points, rows.onsets, show, workers)
         where = " at the worst point of the sweep" if len(points) > 1 else ""
         if text := pilot_doubt(points[0], comparison, where):
             warn_accuracy(text)
@@ -173,7 +169,6 @@ def monte_carlo(
     method: MethodObject,
     samples: Samples,
     seed: Number = 0,
-    first: First = 0,
     keep: Names = (),
     workers: Count | None = None,
     executor: Executor | None = None,
@@ -193,8 +188,9 @@ def monte_carlo(
         The members of a list are equally likely, and every sample uses
         one of them.
     method : LocalCriterion, Equilibrium or Rupture
-    samples, seed, first : int
-        How many samples, seed, and number of the first sample.
+    samples, seed : int
+        How many samples, and the seed. `RandomField.sample` and
+        `RandomInterface.profiles` draw sample i alone: ``first=i``.
     keep : str or tuple of str
         Random fields whose profiles are kept, such as ``"strength"``.
         Other profiles are kept by options of the method, such as
@@ -259,9 +255,9 @@ def monte_carlo(
     experiment = Experiment(problem, random, method, keep, seed)
     about = study_attributes(
         problem=problem, random=experiment.given, method=experiment.method,
-        samples=samples, seed=seed, first=first, keep=keep,
+        samples=samples, seed=seed, keep=keep,
     )  # fmt: skip
     return gather(
-        [experiment], samples, first, about | {"seed": seed}, workers=workers, executor=executor,
+        [experiment], samples, about | {"seed": seed}, workers=workers, executor=executor,
         progress=progress, pilot=pilot,
     )  # fmt: skip

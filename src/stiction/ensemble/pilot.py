@@ -39,15 +39,13 @@ MAX_PILOT_POINTS = 8
 def compare(
     points: Sequence[Experiment],
     onsets: Array | None = None,
-    first: int = 0,
     show: bool = False,
     workers: int | None = None,
 ) -> dict[str, Any]:
     """Return the bias and scatter of an approximate method for the first and weakest samples.
 
-    `onsets` (points, samples) has the critical stresses
-    from sample `first` on, or NaN. By default a few
-    samples are solved. The result is empty if there is
+    `onsets` (points, samples) has the critical stresses,
+    or NaN. By default a few samples are solved. The result is empty if there is
     no exact counterpart, or if no point leaves a doubt.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
@@ -56,7 +54,7 @@ def compare(
     with Meter("comparing with the exact onset", len(chosen), show, unit="points") as meter:
         for point in chosen.tolist():
             known = None if onsets is None else onsets[point]
-            differences = _differences(points[point], known, first, cores)
+            differences = _differences(points[point], known, cores)
             for name, relative in differences.items():
                 if relative.size:
                     parts.setdefault(name, []).append(relative)
@@ -72,7 +70,7 @@ def compare(
 
 
 def _differences(
-    experiment: Experiment, stress: Array | None, first: int, workers: int
+    experiment: Experiment, stress: Array | None, workers: int
 ) -> dict[str, Array]:
     """Return differences from the exact onset over its mean, for the first and weakest samples.
 
@@ -85,7 +83,7 @@ def _differences(
         return {}
     with collect_warnings():  # the ensemble itself warns
         if stress is None:
-            stress = onsets_of(experiment, first + np.arange(SAMPLES_ON_LINE), workers)
+            stress = onsets_of(experiment, np.arange(SAMPLES_ON_LINE), workers)
         # 1.
         solved = np.flatnonzero(np.isfinite(stress))[:MAX_RANKED_SAMPLES]
         size = SAMPLES_ON_PLANE if problem.interface.is_plane else SAMPLES_ON_LINE
@@ -97,7 +95,7 @@ def _differences(
         # 2.
         may_differ = False
         for rows in chosen.values():
-            draws = np.concatenate([experiment.draws(first + row, 1) for row in rows.tolist()])
+            draws = np.concatenate([experiment.draws(row, 1) for row in rows.tolist()])
             sample = experiment.sample(experiment.profiles(draws))
             if optional_member(method, "may_differ")(problem, sample, stress[rows]):
                 may_differ = True
@@ -107,7 +105,7 @@ def _differences(
         # 3.
         some = np.unique(np.concatenate(list(chosen.values())))
         true = np.full(stress.size, np.nan)
-        true[some] = onsets_of(experiment.by(exact), first + some, workers)
+        true[some] = onsets_of(experiment.by(exact), some, workers)
     return {
         name: relative_differences(stress[rows], true[rows]) for name, rows in chosen.items()
     }

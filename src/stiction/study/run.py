@@ -143,7 +143,7 @@ class StoredRun:
         return rows.dataset(attributes, self.study.axes)
 
     def _read(self, only: Sequence[str] | None = None) -> Gathered:
-        rows = Gathered(self.study.experiments, self.study.samples, self.study.first, only)
+        rows = Gathered(self.study.experiments, self.study.samples, only)
         self._store.read_into(rows)
         return rows
 

@@ -49,7 +49,7 @@ from stiction.base.model import (
 )
 from stiction.ensemble.dataset import GridAxes, distinct, variables_in
 from stiction.ensemble.experiment import Experiment, Measured
-from stiction.ensemble.monte_carlo import First, Samples, gather
+from stiction.ensemble.monte_carlo import Samples, gather
 from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks, read_peaks
 from stiction.methods.protocol import METHODS, as_method
@@ -231,7 +231,7 @@ class Study(_Parts):
         Given profiles rather than random properties, as in `onset`. In a
         study file, also files or tables {file, ...} for `read_profile`.
     method : LocalCriterion, Equilibrium or Rupture
-    samples, seed, first, keep
+    samples, seed, keep
         As in `stiction.monte_carlo`.
     sweep : list of dict
         Axes of the sweep. All their combinations are computed. An axis
@@ -258,7 +258,6 @@ class Study(_Parts):
 
     profiles: ProfilesOfStudy | None = None
     samples: Samples = 1
-    first: First = 0
     keep: Names = ()
     sweep: Sweep = ()
     reliability: QuestionTable | None = None
@@ -291,7 +290,7 @@ class Study(_Parts):
         """Read the profiles, and hold them as plain values at the nodes, in SI."""
         unused = [f"{name}: has no effect on given profiles" for name in ("reliability", "peaks")
                   if getattr(self, name) is not None]  # fmt: skip
-        if self.samples > 1 or self.first:
+        if self.samples > 1:
             unused.append("samples: given profiles are a single sample")
         if unused:
             raise InputError(unused)
@@ -399,7 +398,6 @@ class Study(_Parts):
         return gather(
             self.experiments,
             self.samples,
-            self.first,
             self.attributes,
             self.axes,
             store=store,
@@ -417,7 +415,7 @@ class Study(_Parts):
         An `InputError` names a part that exists only in Python.
         """
         plain = to_plain(self).items()
-        left_out = ("title", "sweep", "first", "keep")
+        left_out = ("title", "sweep", "keep")
         return {name: value for name, value in plain if value or name not in left_out}
 
     def to_toml(self, path: str | Path) -> None:

@@ -22,7 +22,7 @@ SWEPT = "problem", "random", "method", "seed"
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
 """Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
-FIXED = "samples", "first", "keep"
+FIXED = "samples", "keep"
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
