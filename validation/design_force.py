@@ -26,6 +26,7 @@ from design_force_closed import SCATTER, factors, law, student
 
 import stiction as st
 from stiction.inference import bootstrap
+from stiction.inference.specimens import Prediction
 
 PROBLEM = st.Problem(
     st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0),
@@ -92,7 +93,9 @@ def campaign(truth, seed, method):
         (both.grid, both.likelihood),
         (tests.grid, tests.likelihood),
     ):
-        designs.append([tables.quantile(grid, probability) for probability in PROMISED])
+        designs.append(
+            [Prediction(tables, grid).quantile(probability) for probability in PROMISED]
+        )
         draws = grid.described(grid.draws(4000, np.random.default_rng(0)))
         for name, right in (("mean", 1e6), ("between", SCATTER)):
             low, high = np.quantile(draws[name], [0.05, 0.95])

@@ -1,4 +1,4 @@
-"""Statistics of samples: means, quantiles and densities with errors, and agreement with tests.
+"""Statistics of samples: quantiles and densities with errors, and agreement with tests.
 
 The exact moments of the nucleation stress are in `stiction.theory`.
 """
@@ -28,14 +28,7 @@ def __dir__() -> list[str]:  # what completion lists
     return __all__
 
 
-class WithError(NamedTuple):
-    """Estimated number and its standard error, which is zero if the number is exact."""
-
-    value: float
-    error: float = 0.0
-
-
-def as_sample(values: Any, fewest: int = 2) -> Array:
+def as_sample(values: Any, fewest: int) -> Array:
     """Return finite values as a flat array with at least `fewest` entries."""
     array = check("values", values, RealArray).ravel()
     if array.size < fewest:
@@ -44,25 +37,6 @@ def as_sample(values: Any, fewest: int = 2) -> Array:
         entry = int(np.argmin(np.isfinite(array)))
         raise InputError(f"values: must be finite, but entry {entry} is {array[entry]}")
     return array
-
-
-def mean(values: Any) -> WithError:
-    """Estimate the mean of independent values (samples,), in their unit."""
-    sample = as_sample(values)
-    return WithError(float(sample.mean()), float(sample.std(ddof=1)) / math.sqrt(sample.size))
-
-
-def standard_deviation(values: Any) -> WithError:
-    """Estimate the standard deviation of independent values (samples,), in their unit.
-
-    The error, sqrt((m_4 - s^4)/N)/(2 s), follows from the fourth moment
-    with the delta method. A Gaussian distribution is not assumed.
-    """
-    sample = as_sample(values)
-    s = float(sample.std(ddof=1))
-    fourth = float(np.mean((sample - sample.mean()) ** 4))
-    error = math.sqrt(max(fourth - s**4, 0.0) / sample.size)
-    return WithError(s, error / (2.0 * s) if s else 0.0)
 
 
 class Quantiles(NamedTuple):

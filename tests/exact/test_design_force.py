@@ -17,6 +17,7 @@ from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
     Onsets,
+    Prediction,
     Profiles,
     Tables,
     grid_of_profiles,
@@ -124,7 +125,7 @@ def test_a_design_by_specimens_of_solved_samples_is_that_of_an_integral(probabil
 def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
     peaks = 0.8e6 * PEAKS
     posterior = st.infer(LINE, scattering(1e6, 0.2, 0.1), peaks, samples=2000, **LOCAL)
-    exact = posterior.likelihood.quantile(posterior.grid, 1e-2)
+    exact = Prediction(posterior.likelihood, posterior.grid).quantile(1e-2)
     given = LOCAL | {"probability": 1e-2, "target_cv": 0.2}
     low, high = st.design_stress(LINE, posterior, seed=1, **given).interval["stress"]
     assert low < exact < high

@@ -49,7 +49,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, checked
 from stiction.base.representation import Result, Row, Summary
 from stiction.inference.curves import Curves, precursors
-from stiction.inference.peaks import Peaks, factor_of, make_peaks, title_of
+from stiction.inference.peaks import Peaks, peaks_and_error, title_of
 from stiction.inference.posterior import Posterior
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
@@ -190,15 +190,13 @@ def agreement(
     True
     """
     rng = np.random.default_rng([seed, 3])
-    measured = make_peaks(peaks, unit)
+    measured, error = peaks_and_error(peaks, unit, load_cell_error)
     if isinstance(prediction, Posterior):
         if load_cell_error:
             raise InputError("load_cell_error: the posterior has its own. Leave it out")
         return _with_posterior(prediction, measured, replicates, rng)
     values = _predicted_peaks(prediction, measured)
-    values = values + factor_of(unit, peaks) * load_cell_error * rng.standard_normal(
-        values.size
-    )
+    values = values + error * rng.standard_normal(values.size)
     measured.refuse_far([values])
     # 1. to 3.
     distances = _permuted(measured.values[0], values, replicates, rng)

@@ -74,6 +74,7 @@ from stiction.inference.specimens import (
     MEAN_KEY,
     SCATTER_KEY,
     FactorGrid,
+    Prediction,
     Tables,
     factor_of_family,
     grid_of_profiles,
@@ -138,8 +139,7 @@ def design_of_tests(
     load_cell_error : float
         Standard error of a peak, in `unit`.
     unit : str
-        Unit for the peaks, as in `infer`. Use
-        "N" if the prior varies the area.
+        Unit for the peaks, as in `infer`.
     repetitions : int
         Number of simulated campaigns for each design.
 
@@ -196,8 +196,8 @@ def design_of_tests(
                 if tables.profiles.levels.size or not isinstance(design, dict)
             }
             further = _further(usual if designs is None else designs)
-            # Peaks may be forces or coefficients, and a design is a stress.
-            scale = 1.0 / tables.onsets[0].area
+            # Peaks may be coefficients, and a design is a stress.
+            scale = 1.0
             if getattr(random, "peaks", None) and random.peaks.unit == "1":
                 scale = Experiment(problem, tables.profiles.fields[0], method).pressure
             return _widths(tables, further, probability, repetitions, simulation, scale)
@@ -389,7 +389,7 @@ def _widths(
             drawn = grid.described(grid.draws(WIDTH_DRAWS, rng))
             ends = [np.quantile(drawn[name], [0.05, 0.95]) for name in (MEAN_KEY, SCATTER_KEY)]
             widths[row, number] = np.ptp(ends, axis=1)
-            stresses[row, number] = both.quantile(grid, probability)
+            stresses[row, number] = Prediction(both, grid).quantile(probability)
             simulation.meter.advance()
     low, high = np.quantile(stresses, [0.05, 0.95], axis=1) * scale
     both_dims, about = ("design", "parameter"), {"units": "Pa"}

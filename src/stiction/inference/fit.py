@@ -65,7 +65,6 @@ from stiction.inference.specimens import (
     FactorGrid,
     Prediction,
     Profiles,
-    WithFactors,
     families_of,
     grid_of_profiles,
     of_mean,
@@ -75,6 +74,7 @@ from stiction.inference.window import RecordWindow
 from stiction.problem.interface import Interface
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import with_values
+from stiction.random.equally_likely import WithFactors
 from stiction.random.fields import RandomField, RandomInterface
 
 USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")

@@ -51,7 +51,7 @@ from stiction.inference.likelihood import (
     out_of_reach,
     variable_of,
 )
-from stiction.inference.peaks import Peaks, by_specimen, factor_of, make_peaks
+from stiction.inference.peaks import Peaks, peaks_and_error
 from stiction.inference.posterior import POSTERIOR_DRAWS, Posterior, SpecimenPosterior, grid_of
 from stiction.inference.prior import Prior, make_prior, refuse_conditioned
 from stiction.inference.specimens import (
@@ -192,14 +192,7 @@ def infer(
     >>> 0.9e6 < low < high < 1.1e6
     True
     """
-    measured, repeated = by_specimen(make_peaks(peaks, unit))
-    error = load_cell_error * factor_of(unit, peaks)
-    if error > np.concatenate(measured.values).max():
-        raise InputError(
-            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
-            " standard deviation in the unit of the peaks"
-        )
-    error = math.hypot(error, repeated)
+    measured, error = peaks_and_error(peaks, unit, load_cell_error)
     of_parameters = prior and {*prior} - {MEAN_KEY, SCATTER_KEY}
     if method is None:
         if random is not None:

@@ -197,27 +197,18 @@ def simulate(
     return peaks
 
 
-class Area(NamedTuple):
-    """Area of a specimen, m². It is proportional to some parameters."""
-
-    unit: float  # area if these parameters are 1
-    sides: list[int]  # places of these parameters in the prior
-
-    def at(self, theta: Array) -> Array:
-        """Return the area at points (points, parameters)."""
-        return self.unit * np.prod(theta[:, self.sides], axis=1)
-
-
-def area_of(prior: Prior, method: Any, length: float | None) -> Area:
-    """Return the area of specimens with a given length, m, or as in the problem if None."""
-    middle = prior.middle
-    # One parameter after the other moves to its lower end, to see
-    # whether the area follows.
-    moved = np.where(np.eye(middle.size, dtype=np.bool_), prior.ends[0], middle)
-    experiments = experiments_at(prior, np.vstack([middle, moved]), method, length)
-    areas: list[Any] = [experiment.problem.area for experiment in experiments]
-    sides = [i for i, area in enumerate(areas[1:]) if area != areas[0]]
-    return Area(float(areas[0] / np.prod(middle[sides])), sides)
+def area_of(prior: Prior, method: Any, length: float | None) -> float:
+    """Return the area, m², of specimens with a given length, m, or as in the problem if None."""
+    # One parameter after the other moves to its lower end. The area must not follow.
+    moved = np.where(np.eye(prior.dimension, dtype=np.bool_), prior.ends[0], prior.middle)
+    experiments = experiments_at(prior, np.vstack([prior.middle, moved]), method, length)
+    areas = [experiment.problem.area for experiment in experiments]
+    if len({*areas}) > 1:
+        raise InputError(
+            f"peaks: are forces, but the prior changes the area, {areas[0]:g} m2. Give peaks as"
+            " stresses, in Pa"
+        )
+    return areas[0] or math.nan
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
@@ -248,7 +239,7 @@ class Likelihood:
     axes: tuple[Axis, ...]  # of the simulated parameters
     error: float  # standard deviation of the load cell
     densities: Sequence[Densities]  # for each kind of specimen
-    areas: Sequence[Area]  # for each kind if peaks are forces, or else 1
+    areas: Sequence[float]  # for each kind if peaks are forces, or else 1
     samples: float  # number of independent samples with the same information
     box: Array  # corners, as u, of the simulated part of the prior, (2, parameters)
     peaks: Sequence[Array] = ()
@@ -261,7 +252,7 @@ class Likelihood:
 
     def scales(self, kind: int, theta: Array) -> Array:
         """Return shift and stretch of the simulated onsets, with shape (2, points)."""
-        return self.scaling.of(theta) * self.areas[kind].at(theta)
+        return self.scaling.of(theta) * self.areas[kind]
 
     def parts(self, u: Array) -> Array:
         """Return the log likelihood (points, tests) of each test at points u."""
@@ -400,7 +391,7 @@ def make_likelihood(
         # 5.
         bounds = [bounds_of(own, variable)[0] for own in experiments]
         densities.append(densities_of(onsets, np.array(bounds)))
-    areas = [area_of(prior, method, length) if forces else Area(1.0, []) for length in lengths]
+    areas = [area_of(prior, method, length) if forces else 1.0 for length in lengths]
     return Likelihood(prior, method, scaling, axes, error, densities, areas, effective, box)
 
 

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -32,13 +33,7 @@ from stiction.base.model import (
     is_finite,
 )
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import (
-    factor_to,
-    is_in,
-    magnitude_in_one_of,
-    number_and_unit,
-    states_unit,
-)
+from stiction.base.units import factor_to, is_in, magnitude_in_one_of
 from stiction.inference.curves import Curves
 from stiction.inference.standards import standards_of
 from stiction.problem.reading.columns import (
@@ -46,6 +41,7 @@ from stiction.problem.reading.columns import (
     Reading,
     Table,
     Wanted,
+    named,
     read_column,
     reading_of,
     role_of,
@@ -66,6 +62,8 @@ MIN_PEAKS = 3
 """Fewest different peaks in all: of two numbers, one may be a mistake."""
 MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks above which their unit must be wrong."""
+MAX_STATISTICS = 4
+"""Most rows of statistics without names below a table."""
 MIN_CURVE_LINES = 100
 """Fewest lines of a table that is taken for a curve if its time or travel only rises."""
 PART = re.compile(r"(.*\d)[ ._-]?[A-Za-z]")
@@ -156,32 +154,34 @@ def title_of(peaks: Peaks) -> str:
     return ", ".join(kinds)
 
 
-def by_specimen(peaks: Peaks) -> tuple[Peaks, float]:
-    """Return the mean peak of each specimen, and its standard error from repeated slip loads.
+def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peaks, float]:
+    """Return the mean peak of each specimen, and the standard deviation of its error, in SI.
 
     The unit is a specimen: its slip loads do not show how specimens differ.
     Their pooled coefficient of variation gives the error in a mean. If
     specimens have different numbers of slip loads, the error is for their
     harmonic mean.
     """
-    if peaks.specimens is None:
-        return peaks, 0.0
-    means, squares, loads, shares = [], 0.0, 0, 0.0
-    for values, names in zip(peaks.values, peaks.specimens, strict=True):
+    measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
+    if error > np.concatenate(measured.values).max():
+        raise InputError(
+            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
+            " standard deviation in the unit of the peaks"
+        )
+    if measured.specimens is None:
+        return measured, error
+    means, squares, shares = [], 0.0, 0.0
+    for values, names in zip(measured.values, measured.specimens, strict=True):
         _, of, counts = np.unique(names, return_inverse=True, return_counts=True)
         means.append(np.bincount(of, values) / counts)
         squares += float(np.sum((values / means[-1][of] - 1.0) ** 2))
-        loads, shares = loads + values.size, shares + float(np.sum(1.0 / counts))
-    total = np.concatenate(means)
+        shares += float(np.sum(1.0 / counts))
+    total, loads = np.concatenate(means), sum(map(np.size, measured.values))
     if loads == total.size:
-        return peaks, 0.0
-    if total.size < MIN_PEAKS:
-        raise InputError(
-            f"peaks: are of {total.size} specimens, at least {MIN_PEAKS} are needed. Several tests"
-            " of a specimen say nothing about other specimens"
-        )
-    error = math.sqrt(squares / (loads - total.size) * shares / total.size) * total.mean()
-    return replace(peaks, values=tuple(means), specimens=None, loads=peaks), float(error)
+        return measured, error
+    repeated = math.sqrt(squares / (loads - total.size) * shares / total.size) * total.mean()
+    of_specimens = replace(measured, values=tuple(means), specimens=None, loads=measured)
+    return of_specimens, math.hypot(error, repeated)
 
 
 def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
@@ -283,8 +283,8 @@ def read_peaks(
         or kN, friction coefficients in 1 or -.
     normal : str or float, optional
         Column of the normal force (or normal stress) of each test, or a
-        number for all tests (N or Pa, or text such as "196 kN"). The
-        result then holds friction coefficients, and keeps the forces.
+        number for all tests (N or Pa). The result then holds friction
+        coefficients, and keeps the forces.
     surfaces : int
         Number of friction surfaces that carry the force together.
     missing, decimal, skip, sheet
@@ -344,25 +344,21 @@ def _of_table(
     if table.begins:
         raise InputError(several_tables(table))
     columns = table.columns
-    named = [c for c in columns if re.match(SPECIMEN_NAMES, c.name.strip("_:. ").casefold())]
+    of_specimens = named(columns, SPECIMEN_NAMES)
     lengths = [c for c in columns if role_of(c) == "length"]
-    lengths += [c for c in named if is_in(c.unit, "m") and c not in lengths]
-    names = [c for c in named if c not in lengths and role_of(c) == "specimen"]
-    used: dict[str, Column] = {}
-    force = None
-    if isinstance(normal, str) and not states_unit(normal):
-        force = stated_column(columns, "normal", normal)
-        used["normal force"] = force
-    left = [c for c in columns if c not in (*lengths, *names, force)]
-    peak = read_column(
-        left, "peak", "value", value, VARIABLES, lambda column: role_of(column) == "friction"
-    )
+    lengths += [c for c in of_specimens if is_in(c.unit, "m") and c not in lengths]
+    names = [c for c in of_specimens if c not in lengths and role_of(c) == "specimen"]
     if len(lengths) > 1 or len(names) > 1:
         raise InputError(unclear(columns, "specimen or its length", "value", lengths + names))
-    used |= dict(zip(["length"] * len(lengths) + ["specimen"], lengths + names, strict=False))
+    used = {
+        what: found[0] for what, found in (("length", lengths), ("specimen", names)) if found
+    }
+    if isinstance(normal, str):
+        used["normal force"] = stated_column(columns, "normal", normal)
+    left = [c for c in columns if c not in (*lengths, *names, used.get("normal force"))]
+    peak = read_column(left, "peak", "value", value, VARIABLES)
     _refuse_curve(columns, [peak, *used.values()])
-    if texts := [c.text for c in (peak, *lengths, *filter(None, [force])) if c.text]:
-        raise InputError(texts)
+    _refuse_statistics(table, peak)
     known = replace(peak, values=without_missing(peak.values, options))
     values, si = column_in_si(known, "peak", unit, VARIABLES, "unit")
     # A stated word or number marks a test without a peak. Any other NaN
@@ -370,26 +366,26 @@ def _of_table(
     kept = ~np.isnan(values) if options.missing is not None else np.ones(values.size, np.bool_)
     values, forces = values[kept], None
     if normal is not None:
-        forces = _normal_forces(force, normal, si, table, options)[kept]
+        forces = _normal_forces(used.get("normal force"), normal, si, table, options)[kept]
         values, si = _coefficients(values, forces, si, surfaces), "1"
     elif surfaces != 1:
         raise InputError("surfaces: needs normal=, the normal force. Leave it out")
     labels = (
         np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept] if names else None
     )
-    if labels is not None and (alike := [PART.fullmatch(str(name)) for name in labels]):
-        stems = [part[1] if part else "" for part in alike]
-        if all(stems) and len({*stems}) < np.unique(labels).size:
+    if labels is not None:
+        stems = [part[1] for name in labels if (part := PART.fullmatch(str(name)))]
+        if len(stems) == labels.size and len({*stems}) < len({*labels}):
             warn_accuracy(
                 f"{names[0].label!r}: {labels[0]}, {labels[1]}, ... are read as slip loads of"
                 f" specimens {', '.join(dict.fromkeys(stems))}. Otherwise number the specimens"
             )
             labels = np.array(stems)
-    if labels is not None and 1 < np.unique(labels).size < MIN_PEAKS:
-        raise InputError(
-            f"holds {np.unique(labels).size} specimens in {names[0]}, at least {MIN_PEAKS} are"
-            " needed. Several tests of a specimen say nothing about other specimens"
-        )
+        if (count := len({*labels})) < MIN_PEAKS:
+            raise InputError(
+                f"holds {count} specimens in {names[0]}, at least {MIN_PEAKS} are needed. Several"
+                " tests of a specimen say nothing about other specimens"
+            )
     read = reading_of(table, peak, unit or si, used)
     sizes: Array | None = None
     if lengths:
@@ -412,6 +408,31 @@ def _of_table(
     )  # fmt: skip
 
 
+def _refuse_statistics(table: Table, peak: Column) -> None:
+    """Refuse a last row, apart from the tests, that holds the mean or deviation of the tests.
+
+    A row is apart if it follows an empty line, or has nothing in the first column.
+    """
+    values, first = peak.values, table.columns[0]
+    apart = np.diff(table.lines, prepend=table.lines[:1]) > 1
+    if first is not peak:
+        apart |= np.array(
+            [str(cell).strip() in ("", "nan") for cell in first.cells or first.values]
+        )
+    known = values[np.isfinite(values)].tolist()
+    digits = max(-int(Decimal(f"{value:.12g}").as_tuple().exponent) for value in known)
+    for row in np.flatnonzero(apart):
+        tests = values[:row][np.isfinite(values[:row])]
+        if tests.size >= MIN_PEAKS and values.size - row <= MAX_STATISTICS:
+            away = np.abs(values[row] - [tests.mean(), tests.std(ddof=1)])
+            if away.min() <= 0.5001 * 10.0**-digits:
+                raise InputError(
+                    f"line {table.lines[row]} holds the mean or the deviation of the tests above,"
+                    f" {values[row]:g}. Write 'mean' or 'SD' in front of it, or delete it. If it is"
+                    " a test, number it, and remove the empty line"
+                )
+
+
 def _normal_forces(
     column: Column | None, given: Any, si: str, table: Table, options: Options
 ) -> Array:
@@ -419,11 +440,7 @@ def _normal_forces(
     if si == "1":
         raise InputError("normal: the peaks are friction coefficients already. Leave it out")
     if column is None:
-        number = given
-        if isinstance(given, str):
-            number, stated = number_and_unit(given)
-            number *= factor_to(si, stated or si)
-        return np.full(table.lines.size, float(number))
+        return np.full(table.lines.size, float(given))
     values = without_missing(column.values, options)
     forces, _ = column_in_si(replace(column, values=values), "normal force", None, (si,))
     if (missing := np.flatnonzero(~(forces > 0.0))).size:

@@ -40,6 +40,7 @@ from stiction.base.variables import unit_of_key
 from stiction.inference.likelihood import Simulation
 from stiction.inference.peaks import Peaks, title_of
 from stiction.inference.specimens import (
+    FEW_FIELDS,
     MEAN_KEY,
     PRIOR_SCALE,
     SCATTER_KEY,
@@ -47,12 +48,12 @@ from stiction.inference.specimens import (
     FactorPrior,
     Prediction,
     Profiles,
-    WithFactors,
     grid_of_profiles,
     tables_of,
 )
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import full_key, value_at, with_values
+from stiction.random.equally_likely import WithFactors
 from stiction.random.fields import RandomInterface
 
 POSTERIOR_DRAWS = 4000
@@ -390,9 +391,9 @@ class SpecimenPosterior(Posterior):
             if key.startswith("problem.")
         }
         of_field = {full_key(k)[7:]: v for k, v in changes.items() if k[:8] != "problem."}
-        profiles = self.grid.profiles.few()
-        fields = tuple(with_values(one, of_field) for one in profiles.fields)
-        profiles = profiles._replace(fields=fields)
+        profiles = self.grid.profiles
+        fields = tuple(with_values(one, of_field) for one in profiles.fields[:FEW_FIELDS])
+        profiles = profiles._replace(fields=fields, within=profiles.within[:FEW_FIELDS])
         in_tests = {
             key: value
             for key, value in of_problem.items()

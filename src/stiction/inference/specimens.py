@@ -36,7 +36,7 @@ their levels.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
@@ -179,10 +179,6 @@ class Profiles(NamedTuple):
         fields = (RandomInterface(strength=field),)
         return cls(fields, level, np.zeros(0), np.zeros((1, 0)), whole=True, **more)
 
-    def few(self) -> Self:
-        """Return the profiles with at most `FEW_FIELDS` fields."""
-        return self._replace(fields=self.fields[:FEW_FIELDS], within=self.within[:FEW_FIELDS])
-
     @classmethod
     def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
         """Return fields without levels. Means and factors of the strength are removed."""
@@ -233,8 +229,7 @@ class Onsets:
 
     def ranges(self, peaks: Array, error: float) -> tuple[float, float, float]:
         """Return the range of x to tabulate for these peaks, and the smallest deviation of x."""
-        # x = log y - log(T(c) over c/reference), by which fields and
-        # samples scatter.
+        # x = log y - log(T(c) over c/reference), by which fields and samples scatter.
         logs = np.log(self.area * self.ratios)
         deviation = max(float(logs.std(axis=2).min()), LEAST_DEVIATION)
         away = TABULATED_DEVIATIONS * np.hypot(float(logs.std()), error / peaks.min())
@@ -328,8 +323,7 @@ def grid_of_profiles(
     profiles: Profiles, tables: "Tables | None" = None
 ) -> tuple[FactorGrid, FactorGrid]:
     """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
-    # The logarithm of a level lies below log(m
-    # b) by half its variance on average.
+    # The logarithm of a level lies below log(m b) by half its variance on average.
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -389,8 +383,7 @@ def _products(kernel: Array, tables: Array) -> Array:
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
     for table in np.moveaxis(tables, 1, 0):
-        # The likelihood of a number may be far below the smallest
-        # number of the computer.
+        # The likelihood of a number may be far below the smallest number of the computer.
         top = table.max(axis=1, keepdims=True)
         total += np.log(np.maximum(np.exp(table - top) @ flat, 1e-300)) + top
     return total.reshape(-1, *kernel.shape[:-1])
@@ -426,8 +419,7 @@ class Tables:
 
     def parts(self, u: Array) -> Array:
         """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
-        # The density of a peak at a draw is
-        # the integral over x, as in step 3.
+        # The density of a peak at a draw is the integral over x, as in step 3.
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
         for family, cv, places in _factor_groups(self.profiles, u):
@@ -443,8 +435,7 @@ class Tables:
         """Draw a peak of one specimen type for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
-        # A further specimen has its own factor
-        # and one of the simulated onsets.
+        # A further specimen has its own factor and one of the simulated onsets.
         x = u[:, 3].copy()
         for family, cv, places in _factor_groups(self.profiles, u):
             x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
@@ -452,59 +443,6 @@ class Tables:
         ratios = known.ratios[u[:, 0].astype(np.int64), :, sample]
         ratio = [np.interp(at, known.at, row) for at, row in zip(x, ratios, strict=True)]
         return known.area * np.exp(x) * ratio + self.error * rng.standard_normal(len(u))
-
-    def quantile(
-        self, grid: FactorGrid, probability: float, family: str | None = None
-    ) -> float:
-        """Return the peak of a further specimen (first kind) at a probability.
-
-        The predictive distribution is the mean over field, onset and
-        grid, or over the part of the grid with one `family` of the
-        factor. No draws are needed.
-        """
-        chance, (low, high) = self.distribution(grid, family)
-        if chance(low) >= probability:  # a rarer peak than those of the table
-            return float(np.exp(low))
-        return float(
-            np.exp(
-                brentq(lambda log_peak: chance(log_peak) - probability, low, high, xtol=1e-6)
-            )
-        )
-
-    def distribution(
-        self, grid: FactorGrid, family: str | None = None
-    ) -> tuple[Callable[[float], float], tuple[float, float]]:
-        """Return the probability below a log peak, and a range of log peaks."""
-        if family is not None:
-            place = self.profiles.families.index(family)
-            mass = np.zeros_like(grid.mass)
-            mass[:, place] = grid.mass[:, place] / grid.mass[:, place].sum()
-            grid = replace(grid, mass=mass)
-        profiles, known = self.profiles, self.onsets[0]
-        x = np.linspace(grid.means[0] - LOWEST, grid.means[-1] + LOG_MEAN_MARGIN, PREDICTED)
-        # Probability that x of a further specimen lies below each
-        # point, for each field.
-        below, half = np.zeros((len(profiles.fields), x.size)), 0.5 * (x[1] - x[0])
-        for number, name in enumerate(profiles.families):
-            for cell, cv in enumerate(profiles.prior.cells()):
-                mass = grid.mass[:, number, cell]
-                below += mass @ masses(name, cv, grid.means, x)
-                start = np.interp(x[0] - half - grid.means, *_tabulated(name, cv))
-                below[:, 0] += mass @ start
-        below = np.cumsum(below, axis=1)
-        # T(c) rises with c. Find the c at which
-        # it is t, for each field and sample.
-        logs = np.log(known.area * known.ratios) + known.at[:, None]
-
-        def chance(log_peak: float) -> float:
-            at = log_peak - logs[:, 0]
-            if known.at.size > 1:
-                at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
-            pairs = zip(at, below, strict=True)
-            shares = [np.interp(row, x, part).sum() for row, part in pairs]
-            return float(sum(shares)) / logs.shape[2]
-
-        return chance, (x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1])
 
 
 class Prediction(NamedTuple):
@@ -520,13 +458,50 @@ class Prediction(NamedTuple):
         return cls(tables_of(problem, grid.profiles, simulation, nothing, 0.0), grid)
 
     def quantile(self, probability: float, family: str | None = None) -> float:
-        """Return the stress, Pa, at a probability, for all families of the factor or for one."""
-        return self.tables.quantile(self.grid, probability, family) / self.tables.onsets[0].area
+        """Return the stress, Pa, at a probability, for all families of the factor or for one.
+
+        The predictive distribution is the mean over field, onset and grid, or over the part of
+        the grid with this family. No draws are needed.
+        """
+        chance, (low, high) = self._distribution(family)
+        if chance(low) < probability:  # or else a rarer peak than those of the table
+            low = brentq(lambda log_peak: chance(log_peak) - probability, low, high, xtol=1e-6)
+        return float(np.exp(low)) / self.tables.onsets[0].area
 
     def probability(self, stress: float) -> float:
         """Return the probability of an onset below a stress, Pa."""
-        chance, _ = self.tables.distribution(self.grid)
+        chance, _ = self._distribution()
         return chance(math.log(stress * self.tables.onsets[0].area))
+
+    def _distribution(
+        self, family: str | None = None
+    ) -> tuple[Callable[[float], float], tuple[float, float]]:
+        """Return the probability below a log peak, and a range of log peaks."""
+        profiles, known, means = self.tables.profiles, self.tables.onsets[0], self.grid.means
+        mass_of = dict(zip(profiles.families, np.moveaxis(self.grid.mass, 1, 0), strict=True))
+        if family is not None:
+            mass_of = {family: mass_of[family] / mass_of[family].sum()}
+        x = np.linspace(means[0] - LOWEST, means[-1] + LOG_MEAN_MARGIN, PREDICTED)
+        # Probability that x of a further specimen lies below each point, for each field.
+        below, half = np.zeros((len(profiles.fields), x.size)), 0.5 * (x[1] - x[0])
+        for name, of_family in mass_of.items():
+            for cell, cv in enumerate(profiles.prior.cells()):
+                mass = of_family[:, cell]
+                below += mass @ masses(name, cv, means, x)
+                below[:, 0] += mass @ np.interp(x[0] - half - means, *_tabulated(name, cv))
+        below = np.cumsum(below, axis=1)
+        # T(c) rises with c. Find the c at which it is t, for each field and sample.
+        logs = np.log(known.area * known.ratios) + known.at[:, None]
+
+        def chance(log_peak: float) -> float:
+            at = log_peak - logs[:, 0]
+            if known.at.size > 1:
+                at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
+            pairs = zip(at, below, strict=True)
+            shares = [np.interp(row, x, part).sum() for row, part in pairs]
+            return float(sum(shares)) / logs.shape[2]
+
+        return chance, (x[0] + logs.min() - known.at[0], x[-1] + logs.max() - known.at[-1])
 
     def characteristic(self, draws: Array, probability: float, confidence: float) -> float:
         """Return the stress, Pa, whose quantile is higher in a fraction `confidence` of the draws.
@@ -555,50 +530,6 @@ class Prediction(NamedTuple):
         return [name for name, mass in self.grid.families.items() if mass > OUTER_MASS]
 
 
-class WithFactors:
-    """Source whose interfaces also have factors of constants, such as the preload of new joints."""
-
-    _between: Mapping[str, Any]
-
-    def with_between(self, between: Mapping[str, Any]) -> Self:
-        """Return the source for new specimens, in which constants scatter between specimens.
-
-        Scatter that was already present in the tests explains a part of
-        their scatter, and is stated before `infer` in
-        ``RandomInterface(between=)``. Scatter that only new joints have
-        is stated here.
-
-        Parameters
-        ----------
-        between : mapping
-            Distributions with mean 1, as in `RandomInterface`, such as
-            ``{"pressing_force": Lognormal(mean=1.0, cv=0.05)}``. The
-            factor of the strength is inferred, and cannot be given.
-
-        Examples
-        --------
-        >>> import stiction as st
-        >>> problem = st.paper.problem(nodes=512)
-        >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
-        >>> tests = st.infer(
-        ...     problem, strength, [0.70e6, 0.71e6, 0.74e6], method=st.LocalCriterion(), samples=100
-        ... )
-        >>> joints = tests.with_between({"normal_pressure": st.Lognormal(mean=1.0, cv=0.05)})
-        >>> sorted(joints.interfaces(1)[0].between)
-        ['normal_pressure', 'strength']
-        """
-        if "strength" in between:
-            raise InputError("between: strength: is inferred. State it in prior= of st.infer")
-        return replace(self, _between=dict(between))  # type: ignore[type-var]
-
-    def _scattered(self, interfaces: Sequence[RandomInterface]) -> list[RandomInterface]:
-        if not self._between:
-            return list(interfaces)
-        return [
-            replace(one, between={**(one.between or {}), **self._between}) for one in interfaces
-        ]
-
-
 def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
     """Return family, s, and the places of the draws (draws, 4) with both."""
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
@@ -612,35 +543,27 @@ def tables_of(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
 ) -> Tables:
     """Return the likelihood of peaks, from onsets simulated for each specimen type (step 1)."""
-    variable = variable_of(problem, profiles.fields[0], measured.unit)
-    kinds = [
-        _onsets(
-            of_length(problem, length), profiles, simulation, number, peaks, error, variable
-        )
-        for number, (length, peaks) in enumerate(
-            zip(measured.lengths, measured.values, strict=True)
-        )
-    ]
-    return Tables(profiles, simulation.method, tuple(kinds), error, measured.values)
+    variable_of(problem, profiles.fields[0], measured.unit)  # checks it
+    kinds = range(len(measured.values))
+    onsets = tuple(
+        _onsets(problem, profiles, simulation, measured, kind, error) for kind in kinds
+    )
+    return Tables(profiles, simulation.method, onsets, error, measured.values)
 
 
 def _onsets(
-    problem: Problem,
-    profiles: Profiles,
-    simulation: Simulation,
-    kind: int,
-    peaks: Array,
+    problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, kind: int,
     error: float,
-    variable: str,
-) -> Onsets:
-    """Return the onsets of all fields for a specimen type. Its `peaks` need not be measured."""
-    method, meter, workers = simulation.method, simulation.meter, simulation.workers
+) -> Onsets:  # fmt: skip
+    """Return the onsets of all fields for a specimen type. Its peaks need not be measured."""
+    problem, peaks = of_length(problem, measured.lengths[kind]), measured.values[kind]
+    method, workers, of = simulation.method, simulation.workers, measured.variable
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)
     samples = 1 if profiles.whole else samples
     simulation = simulation._replace(samples=samples, workers=1)  # fields run in threads
-    forces = variable == "critical_force"
-    area = (problem.area or math.nan) if forces else 1.0
-    of = "critical_stress" if forces else variable
+    area = 1.0
+    if of == "critical_force":
+        area, of = problem.area or math.nan, "critical_stress"
 
     def onsets(place: int, at: Array) -> tuple[Array, Any]:
         """Return onsets (steps, samples) divided by c/reference, and their densities."""
@@ -658,21 +581,20 @@ def _onsets(
 
     at, fields = np.zeros(1), range(len(profiles.fields))
     if not scales_with_strength(problem, profiles.fields[0], method):
-        # The onsets at the reference show over which strengths the
-        # peaks range.
-        ratios, known = onsets(0, at)
-        peaks = peaks if peaks.size else area * ratios.ravel()
+        # The onsets at the reference show over which strengths the peaks range.
+        first, known = onsets(0, at)
+        peaks = peaks if peaks.size else area * first.ravel()
         known = () if profiles.whole else (known,)
-        low, high, _ = Onsets(at, ratios[None], known, area).ranges(peaks, error)
+        low, high, _ = Onsets(at, first[None], known, area).ranges(peaks, error)
         at = np.linspace(low - LOG_STRENGTH_MARGIN, high + LOG_STRENGTH_MARGIN, ONSET_MEANS)
     total = len(fields) * at.size * samples
     warn_if_long(Experiment(problem, profiles.fields[0], method), total, workers)
-    meter.stage("simulated onsets", total)
-    by_field = in_threads(lambda place: onsets(place, at), fields, workers or usable_cores())
+    simulation.meter.stage("simulated onsets", total)
+    run = in_threads(lambda place: onsets(place, at), fields, workers or usable_cores())
+    ratios, densities = map(tuple, zip(*run, strict=True))
     if profiles.whole:
-        return Onsets(at, np.stack([ratios for ratios, _ in by_field]), (), area)
-    # Standardised densities differ little between fields. Their mean
-    # has a smaller error.
-    table = np.log(np.mean([np.exp(known.table) for _, known in by_field], axis=0))
-    densities = tuple(known._replace(table=table) for _, known in by_field)
-    return Onsets(at, np.stack([ratios for ratios, _ in by_field]), densities, area)
+        return Onsets(at, np.stack(ratios), (), area)
+    # Standardised densities differ little between fields. Their mean has a smaller error.
+    table = np.log(np.mean([np.exp(known.table) for known in densities], axis=0))
+    densities = tuple(known._replace(table=table) for known in densities)
+    return Onsets(at, np.stack(ratios), densities, area)

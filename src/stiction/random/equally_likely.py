@@ -12,10 +12,10 @@ for failures covers all members. For several members:
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,49 @@ class Source(Protocol):
 
     def interfaces(self, count: int, seed: int = 0) -> list[RandomInterface]:
         """Return `count` equally likely interfaces."""
+
+
+class WithFactors:
+    """Source whose interfaces also have factors of constants, such as the preload of new joints."""
+
+    _between: Mapping[str, Any]
+
+    def with_between(self, between: Mapping[str, Any]) -> Self:
+        """Return the source for new specimens, in which constants scatter between specimens.
+
+        Scatter that was already present in the tests explains a part of
+        their scatter, and is stated before `infer` in
+        ``RandomInterface(between=)``. Scatter that only new joints have
+        is stated here.
+
+        Parameters
+        ----------
+        between : mapping
+            Distributions with mean 1, as in `RandomInterface`, such as
+            ``{"pressing_force": Lognormal(mean=1.0, cv=0.05)}``. The
+            factor of the strength is inferred, and cannot be given.
+
+        Examples
+        --------
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=512)
+        >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+        >>> tests = st.infer(
+        ...     problem, strength, [0.70e6, 0.71e6, 0.74e6], method=st.LocalCriterion(), samples=100
+        ... )
+        >>> joints = tests.with_between({"normal_pressure": st.Lognormal(mean=1.0, cv=0.05)})
+        >>> sorted(joints.interfaces(1)[0].between)
+        ['normal_pressure', 'strength']
+        """
+        if "strength" in between:
+            raise InputError("between: strength: is inferred. State it in prior= of st.infer")
+        return replace(self, _between=dict(between))  # type: ignore[type-var]
+
+    def _scattered(self, interfaces: Sequence[RandomInterface]) -> list[RandomInterface]:
+        if not self._between:
+            return list(interfaces)
+        factors = [{**(one.between or {}), **self._between} for one in interfaces]
+        return [replace(one, between=own) for one, own in zip(interfaces, factors, strict=True)]
 
 
 @runtime_checkable
