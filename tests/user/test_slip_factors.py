@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from joint import FIELD, PROBLEM
 from refusals import refuses
 from setups import EXACT
@@ -142,3 +143,28 @@ def test_bad_input_is_refused(written):
     refuses("method: is needed with a random", lambda: st.infer(JOINT, FIELD, peaks))
     prior = {"marginal.cv": (0.1, 0.2)}
     refuses("can hold mean and between", lambda: st.infer(JOINT, None, peaks, prior=prior))
+
+
+def test_statistics_without_a_name_are_no_tests(written):
+    """Below an empty line, or with nothing in the first column; a further test is one."""
+    rows = lines_of(FACTORS)
+    loads = np.array([float(row.split(";")[1]) for row in rows])
+    for value in (loads.mean(), loads.std(ddof=1)):
+        for last in ([f";{value:.3f};"], ["", f"6;{value:.3f};390.0"]):
+            refuses(
+                "the mean or the deviation of the tests above ... Write 'mean' or 'SD' in front",
+                lambda last=last: written([*rows, *last], normal=None),
+            )
+    further = written([*rows, "", f"6;{loads.mean() + 0.01:.3f};390.0"])
+    assert further.values[0].size == 11
+
+
+def test_an_agreement_compares_specimens_not_slip_loads(written):
+    """Repeated slip loads count as their mean, whose error is that of the prediction, too."""
+    peaks = written(lines_of(FACTORS))
+    rng = np.random.default_rng(1)
+    predicted = xr.Dataset({"friction_coefficient": ("sample", rng.normal(0.44, 0.02, 400))})
+    found = st.statistics.agreement(predicted, peaks)
+    np.testing.assert_allclose(found.peaks.values[0], FACTORS.mean(axis=1), rtol=1e-5)
+    assert found.peaks.loads is peaks
+    assert found.p_values["cramer_von_mises"] > 0.05
