@@ -138,16 +138,29 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     True
     """
     sample = as_sample(values, 16)
-    # 1. and 2. Grid and counts.
-    low, high = _ends(sample, bounds)
+    smallest, largest = float(sample.min()), float(sample.max())
+    low = -math.inf if bounds[0] is None else bounds[0]
+    high = math.inf if bounds[1] is None else bounds[1]
+    if not low <= smallest < largest <= high:
+        raise InputError(
+            f"values: must differ, and lie between the bounds {low:g} and {high:g}. They lie"
+            f" between {smallest:g} and {largest:g}"
+        )
+    # 1. A bound far from the sample would waste cells, as the kernel
+    # never reaches half a spread.
+    spread = largest - smallest
+    low, high = max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
     width = high - low
+    # 2.
     counts = np.bincount(
         np.minimum(((sample - low) / width * GRID_CELLS).astype(int), GRID_CELLS - 1),
         minlength=GRID_CELLS,
     )
     # 3. A narrower kernel would resolve the cells of the grid instead
     # of the sample.
-    bandwidth = max(_bandwidth(sample), 0.5 * width / GRID_CELLS)
+    deviation, middle = float(sample.std()), np.quantile(sample, [0.25, 0.75])
+    silverman = 0.9 * (min(deviation, float(np.ptp(middle)) / 1.34) or deviation)
+    bandwidth = max(silverman * float(sample.size) ** -0.2, 0.5 * width / GRID_CELLS)
     # 4. and 5. The smooth density and its error.
     smooth = gaussian_filter1d(
         1.0 * counts, bandwidth / width * GRID_CELLS, mode="reflect", truncate=KERNEL_END
@@ -156,27 +169,3 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     value = smooth / smooth.sum() * GRID_CELLS / width
     error = np.sqrt(value / (2.0 * math.sqrt(math.pi) * bandwidth * sample.size))
     return Density(x, value, error, bandwidth)
-
-
-def _ends(sample: Array, bounds: tuple[float | None, float | None]) -> tuple[float, float]:
-    """Step 1: return the ends of the grid."""
-    smallest, largest = float(sample.min()), float(sample.max())
-    spread = largest - smallest
-    if spread == 0.0:
-        raise InputError(f"values: must differ to have a density, all are {smallest:g}")
-    low = -math.inf if bounds[0] is None else bounds[0]
-    high = math.inf if bounds[1] is None else bounds[1]
-    if smallest < low:
-        raise InputError(f"values: {smallest:g} is below the lower bound {low:g}")
-    if largest > high:
-        raise InputError(f"values: {largest:g} is above the upper bound {high:g}")
-    # A bound far from the sample would waste cells, as the kernel never
-    # reaches half a spread.
-    return max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
-
-
-def _bandwidth(values: Array) -> float:
-    """Step 3: return the standard deviation of the kernel."""
-    low, high = np.quantile(values, [0.25, 0.75])
-    spread = min(float(values.std()), float(high - low) / 1.34) or float(values.std())
-    return 0.9 * spread * float(values.size) ** -0.2

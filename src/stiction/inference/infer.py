@@ -242,7 +242,14 @@ def _of_parameters(
         mean_in_stress(experiment.problem, experiment.random.members[0], "strength"),
     )
     # 2.
-    _check_reach(prior, simulation.method, measured, error)
+    points = np.array(list(itertools.product(*prior.ends.T)))
+    problems = []
+    for length, peaks in zip(measured.lengths, measured.values, strict=True):
+        experiments = experiments_at(prior, points, simulation.method, length)
+        reach = [bounds_of(own, measured.variable, NEVER) for own in experiments]
+        problems += out_of_reach(prior, points, np.transpose(reach), error, peaks)
+    if problems:
+        raise InputError(problems)
 
     def likelihood_of(simulation: Simulation, box: Array) -> Likelihood:
         given: Any = {"lengths": measured.lengths, "error": error, "variable": variable}
@@ -286,18 +293,6 @@ def _of_parameters(
     )
 
 
-def _check_reach(prior: Prior, method: Any, measured: Peaks, error: float) -> None:
-    """Refuse peaks that no point of the prior can produce, such as a wrong unit (step 2)."""
-    points = np.array(list(itertools.product(*prior.ends.T)))
-    problems = []
-    for length, peaks in zip(measured.lengths, measured.values, strict=True):
-        experiments = experiments_at(prior, points, method, length)
-        reach = [bounds_of(own, measured.variable, NEVER) for own in experiments]
-        problems += out_of_reach(prior, points, np.transpose(reach), error, peaks)
-    if problems:
-        raise InputError(problems)
-
-
 def _first_box(likelihood: Likelihood) -> Array:
     """Return the slightly widened box of the posterior by the local criterion (step 3).
 
@@ -323,9 +318,23 @@ def _grown(box: Array, u: Array | None) -> Array:
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
-    """Return the limitations of the posterior."""
-    prior = likelihood.prior
-    notes = _piled_up(prior, u)
+    """Return the limitations of the posterior, with draws u (draws, parameters)."""
+    prior, notes = likelihood.prior, []
+    texts = [
+        f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
+        for name, draws, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
+        for side, near, end in (
+            ("lower", draws < PRIOR_END, ends[0]),
+            ("upper", draws > 1.0 - PRIOR_END, ends[1]),
+        )
+        if np.mean(near) > PILED * PRIOR_END
+    ]
+    if texts:
+        notes.append(
+            f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
+            f" {PRIOR_END:.0%} of it. Check the unit of the peaks, and widen the prior if it is a"
+            " guess"
+        )
     # The local criterion may be inaccurate where the posterior lies,
     # not in all of the prior.
     middle = prior.theta(u.mean(axis=0, keepdims=True))
@@ -340,25 +349,6 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     return notes
 
 
-def _piled_up(prior: Prior, u: Array) -> list[str]:
-    """Return a note on ends of the prior at which draws (draws, parameters) pile up."""
-    texts = [
-        f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"
-        for name, draws, ends in zip(prior.names, u.T, prior.ends.T, strict=True)
-        for side, near, end in (
-            ("lower", draws < PRIOR_END, ends[0]),
-            ("upper", draws > 1.0 - PRIOR_END, ends[1]),
-        )
-        if np.mean(near) > PILED * PRIOR_END
-    ]
-    if not texts:
-        return []
-    return [
-        f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
-        f" {PRIOR_END:.0%} of it. Check the unit of the peaks, and widen the prior if it is a guess"
-    ]
-
-
 def _of_specimens(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
 ) -> SpecimenPosterior:
@@ -370,31 +360,33 @@ def _of_specimens(
     measured.refuse_far([k.area * mean * k.ratios[:, 0].ravel() for k in tables.onsets])
     by_profiles, grid = grid_of_profiles(profiles, tables)
     tests, onsets = sum(map(np.size, measured.values)), tables.onsets[0].ratios[:, 0].size
-    common: dict[str, Any] = {
-        "problem": problem, "likelihood": tables, "seed": simulation.seed,
-        "by_profiles": by_profiles, "monte_carlo_error": math.sqrt(tests / onsets),
-    }  # fmt: skip
+
+    def posterior(grid: FactorGrid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
+        u = grid.draws(POSTERIOR_DRAWS, np.random.default_rng(simulation.seed))
+        return SpecimenPosterior(
+            peaks=peaks, draws=grid.described(u), u=u, grid=grid, by_profiles=by_profiles,
+            problem=problem, likelihood=tables, seed=simulation.seed,
+            monte_carlo_error=math.sqrt(tests / onsets), **more,
+        )  # fmt: skip
+
     comparison = None
     if known:
         # The prediction must not know the peaks with which it is compared.
         nothing = replace(measured, values=tuple(np.empty(0) for _ in measured.values))
-        alone = _result(by_profiles, nothing, **common)
-        comparison = agreement(alone, measured, seed=simulation.seed)
+        comparison = agreement(posterior(by_profiles, nothing), measured, seed=simulation.seed)
     # Without profiles and with a prior of the mean that is flat in its
     # logarithm, the prior has no density, and neither the evidence nor
     # the information on the mean is defined.
     proper = known or profiles.prior.mean is not None
-    return _result(
+    axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
+    information = {
+        name: float(entropy(grid.mass.sum(axis=of), by_profiles.mass.sum(axis=of)))
+        for name, of in axes.items()
+    }
+    return posterior(
         grid, measured, notes=tuple(_specimen_notes(grid, comparison)), agreement=comparison,
-        log_evidence=grid.log_evidence if proper else math.nan,
-        information=_information(grid, by_profiles, proper), **common,
+        log_evidence=grid.log_evidence if proper else math.nan, information=information,
     )  # fmt: skip
-
-
-def _result(grid: FactorGrid, peaks: Peaks, **more: Any) -> SpecimenPosterior:
-    u = grid.draws(POSTERIOR_DRAWS, np.random.default_rng(more["seed"]))
-    options: dict[str, Any] = {"information": {}, "log_evidence": math.nan, "notes": ()} | more
-    return SpecimenPosterior(peaks=peaks, draws=grid.described(u), u=u, grid=grid, **options)
 
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
@@ -424,15 +416,6 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
             " scatter. Pass the fit itself to combine profiles and peaks"
         )
     return Profiles.of_interfaces(likely.members, **more)
-
-
-def _information(grid: FactorGrid, before: FactorGrid, proper: bool) -> dict[str, float]:
-    """Return the divergence, nats, of mean and scatter from their distribution without peaks."""
-    axes = {SCATTER_KEY: (0, 1, 3)} | ({MEAN_KEY: (0, 1, 2)} if proper else {})
-    return {
-        name: float(entropy(grid.mass.sum(axis=of), before.mass.sum(axis=of)))
-        for name, of in axes.items()
-    }
 
 
 def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]:

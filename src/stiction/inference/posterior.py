@@ -23,6 +23,7 @@ Steps:
    shrinks by a tenth.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -161,10 +162,10 @@ class Posterior(WithFactors, Result):
 
     peaks: Peaks
     draws: Mapping[str, Array]
-    information: Mapping[str, float]
-    log_evidence: float
+    information: Mapping[str, float] = field(default_factory=dict)
+    log_evidence: float = math.nan
     monte_carlo_error: float
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
     likelihood: Any = field(repr=False, compare=False)
     u: Array = field(repr=False, compare=False)
     problem: Any = field(default=None, repr=False, compare=False)
@@ -340,11 +341,8 @@ class SpecimenPosterior(Posterior):
         profiles = self.grid.profiles
         if profiles.whole or profiles.levels.size or len(profiles.fields) > 1:
             return {}
-        field = profiles.fields[0].strength
-        values = {
-            "marginal.cv": getattr(field.marginal, "cv", None),
-            "correlation_length": getattr(field.spectrum, "correlation_length", None),
-        }
+        keys = ("marginal.cv", "correlation_length")
+        values = {key: value_at(profiles.fields[0], full_key(key)[7:]) for key in keys}
         return {key: value for key, value in values.items() if value is not None}
 
     @property
@@ -385,12 +383,8 @@ class SpecimenPosterior(Posterior):
         constant of the tests changes if it has the same value as in the
         problem.
         """
-        of_problem = {
-            key.removeprefix("problem."): value
-            for key, value in changes.items()
-            if key.startswith("problem.")
-        }
-        of_field = {full_key(k)[7:]: v for k, v in changes.items() if k[:8] != "problem."}
+        of_problem = {key[8:]: v for key, v in changes.items() if key[:8] == "problem."}
+        of_field = {full_key(key)[7:]: v for key, v in changes.items() if key[:8] != "problem."}
         profiles = self.grid.profiles
         fields = tuple(with_values(one, of_field) for one in profiles.fields[:FEW_FIELDS])
         profiles = profiles._replace(fields=fields, within=profiles.within[:FEW_FIELDS])
@@ -400,24 +394,27 @@ class SpecimenPosterior(Posterior):
             if value_at(self.problem, key) == value_at(problem, key)
         }
         tested = with_values(self.problem, in_tests, "problem")
-        simulation = Simulation(self.likelihood.method, None, self.seed, workers)
-        tests = tables_of(tested, profiles, simulation, self.peaks, self.likelihood.error)
-        _, grid = grid_of_profiles(profiles, tests)
         joint = with_values(problem, of_problem, "problem")
-        same = joint == tested and method == simulation.method and self.peaks.lengths == (None,)
-        if same and self.peaks.unit != "1":
-            return Prediction(tests, grid)
-        return Prediction.of(grid, joint, simulation._replace(method=method))
+        tests = self._inferred_again(tested, profiles, workers)
+        same = joint == tested and method == self.likelihood.method
+        if same and self.peaks.lengths == (None,) and self.peaks.unit != "1":
+            return tests
+        return Prediction.of(tests.grid, joint, Simulation(method, None, self.seed, workers))
+
+    def _inferred_again(
+        self, problem: Problem, profiles: Profiles, workers: int | None
+    ) -> Prediction:
+        simulation = Simulation(self.likelihood.method, None, self.seed, workers)
+        tables = tables_of(problem, profiles, simulation, self.peaks, self.likelihood.error)
+        return Prediction(tables, grid_of_profiles(profiles, tables)[1])
 
     def without_field(self, problem: Problem, method: Any) -> Prediction:
         """Return the prediction from the same tests if specimens differ only as a whole."""
-        own, tests = self.grid.profiles, self.likelihood
-        options: dict[str, Any] = {"families": own.families, "prior": own.prior}
-        profiles = Profiles.without_field(self.problem, self.peaks, **options)
-        simulation = Simulation(tests.method, None, self.seed, None)
-        tables = tables_of(self.problem, profiles, simulation, self.peaks, tests.error)
-        _, grid = grid_of_profiles(profiles, tables)
-        return Prediction.of(grid, problem, simulation._replace(method=method))
+        own = self.grid.profiles
+        more = {"families": own.families, "prior": own.prior}
+        profiles = Profiles.without_field(self.problem, self.peaks, **more)
+        grid = self._inferred_again(self.problem, profiles, None).grid
+        return Prediction.of(grid, problem, Simulation(method, None, self.seed, None))
 
     def law(self, problem: Problem, method: Any) -> Prediction | None:
         """Return the prediction if it needs no samples: specimens differ only as a whole."""
