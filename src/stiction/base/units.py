@@ -206,8 +206,17 @@ def is_quantity(value: Any) -> bool:
 def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
     """Return a quantity as a number in the first SI unit that fits, and the unit.
 
-    A value without a unit is returned as given.
+    A list of quantities becomes an array. A value without a unit is
+    returned as given.
     """
+    if isinstance(value, list | tuple) and any(map(is_quantity, value)):
+        pairs = [magnitude_in_one_of(item, units) for item in value]
+        if len({unit for _, unit in pairs}) > 1:
+            raise InputError(
+                "holds quantities of several kinds, or numbers without a unit: give all of them in"
+                " the same unit"
+            )
+        return np.array([number for number, _ in pairs], dtype=np.float64), pairs[0][1]
     if not is_quantity(value):
         return value, None
     for si in units:
@@ -226,49 +235,25 @@ def units_of_argument(name: str) -> tuple[str, ...]:
     return ("Pa", "1", "m") if name in OF_THE_FIELD else ("1",)
 
 
-def plain(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
-    """Return numbers in SI, with NaN for missing values, and the unit that they state.
-
-    A list of quantities becomes an array. Other values are returned as given.
-    """
-    units = tuple(units)
-    if isinstance(value, list | tuple) and any(map(is_quantity, value)):
-        if not all(map(is_quantity, value)):
-            raise InputError(
-                "holds quantities and numbers without a unit: give all of them a unit"
-            )
-        pairs = [magnitude_in_one_of(item, units) for item in value]
-        if len({unit for _, unit in pairs}) > 1:
-            raise InputError(
-                "holds quantities of several kinds: give all of them in the same unit"
-            )
-        return np.array([number for number, _ in pairs], dtype=np.float64), pairs[0][1]
-    number, unit = magnitude_in_one_of(value, units)
-    if isinstance(number, np.ma.MaskedArray):
-        if number.size and np.ma.getmaskarray(number).all():
-            raise InputError("has no value: its mask covers all entries")
-        number = np.ma.filled(number.astype(np.float64), np.nan)
-    has_none = isinstance(number, list | tuple) and any(item is None for item in number)
-    if has_none or (isinstance(number, np.ndarray) and number.dtype == object):
-        try:
-            number = np.array(number, dtype=np.float64)  # None becomes NaN
-        except OverflowError:
-            raise InputError("must be numbers below 1e308") from None
-        except (TypeError, ValueError):
-            pass  # texts are refused where numbers are checked
-    return number, unit
-
-
 def as_numbers(value: Any) -> Array:
-    """Return `value` as a float64 array, or raise an `InputError` that names its type."""
-    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
-        raise InputError(
-            "must be numbers, got a masked array; fill it, as in np.ma.filled(values, np.nan)"
-        )
+    """Return `value` as a float64 array, or raise an `InputError` that names its type.
+
+    None and masked entries are missing values, NaN.
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        if value.size and np.ma.getmaskarray(value).all():
+            raise InputError("has no value: its mask covers all entries")
+        value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         given = np.asarray(value)
-    except (ValueError, OverflowError):
-        raise InputError("must be numbers, got rows of unequal length") from None
+        if given.dtype == object and given.ndim:
+            given = given.astype(np.float64)  # None becomes NaN
+    except OverflowError:
+        raise InputError("must be numbers below 1e308") from None
+    except (TypeError, ValueError):
+        raise InputError(
+            f"must be numbers in rows of equal length, got {value!r:.40}"
+        ) from None
     if given.dtype.kind not in "fiu":
         kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
         text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
@@ -288,24 +273,19 @@ def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[A
     The unit is that of a quantity, of the caller, `given`, or of the source.
     """
     numbers, stated = array.data, stated_unit(array)
-    if type(numbers) is not np.ndarray or numbers.dtype.kind not in "fiu":
-        numbers, of_quantity = plain(numbers, units)
+    if type(numbers) is not np.ndarray or numbers.dtype != np.float64:
+        numbers, of_quantity = magnitude_in_one_of(numbers, units)
         numbers, stated = as_numbers(numbers), of_quantity or stated
     factor, si = conversion(given or stated or units[0], units)
     if given:
         check_agreement(given, stated)
-    values = np.ascontiguousarray(numbers, dtype=np.float64).reshape(numbers.shape)
-    return np.asarray(values * factor), si
+    return np.multiply(numbers, factor, order="C"), si
 
 
 def check_agreement(given: str, stated: str) -> None:
     """Refuse a unit of the caller that differs from the unit that the source states."""
     ours, theirs = parse(given), parse(stated)
-    if (
-        ours
-        and theirs
-        and not np.allclose(ours.factor / theirs.factor, 1.0, rtol=1e-12, atol=0.0)
-    ):
+    if ours and theirs and not math.isclose(ours.factor, theirs.factor, rel_tol=1e-12):
         raise InputError(
             f"is given in {given}, but the source states {stated}. Leave the unit out, or correct"
             " the source"
@@ -339,35 +319,89 @@ def check_measured(
     are written as `given`, with their line in a table or their number.
     """
     shown = np.ravel(values if given is None else given)
-
-    def place(wrong: Any) -> str:
-        entry = int(np.argmax(wrong))
-        return f"line {lines[entry]}" if np.size(lines) == wrong.size else f"entry {entry}"
-
-    if (beyond := np.abs(shown) >= OVERLOAD).any():
-        number = f"{shown[beyond][0]:.9g}"
+    known = shown[np.isfinite(shown)]
+    if known.size and np.abs(known).max() >= OVERLOAD:
+        number = f"{known[np.abs(known).argmax()]:.9g}"
         raise InputError(
-            f"{quantity} holds {number} in {place(beyond)}, which marks an overload of the"
-            f" instrument. Cut the record there, or pass missing={number} if a value is missing"
+            f"{quantity} holds {number} in {_entry(np.abs(shown) >= OVERLOAD, lines)}, which marks"
+            f" an overload. Cut the record there, or pass missing={number} if a value is missing"
         )
     if quantity in POSITIVE and (wrong := np.ravel(values) <= 0.0).any():
         number = f"{shown[wrong][0]:.9g}"
         raise InputError(
-            f"{quantity} must be positive, is {number} in {place(wrong)}"
+            f"{quantity} must be positive, is {number} in {_entry(wrong, lines)}"
             f" ({np.count_nonzero(wrong)} such values). If it means that a value is missing, pass"
             f" missing={number} to st.read_profile, or make it NaN"
         )
-    known = shown[np.isfinite(shown)]
     for end in (known.min(), known.max()) if doubted and known.size else ():
         rest = known[known != end]
         usual = np.isclose(end, MARKS, rtol=1e-5, atol=0.0).any()
         if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
             warn_user(
-                f"{quantity}: {end:.9g} occurs in {place(shown == end)}"
+                f"{quantity}: {end:.9g} occurs in {_entry(shown == end, lines)}"
                 f" ({known.size - rest.size} such values), and often means that a value is missing."
                 f" Pass missing={end:.9g}, or missing=()",
                 AccuracyWarning,
             )
+
+
+def _entry(wrong: Array, lines: Any) -> str:
+    """Describe where the first wrong value stands: its line in a table, or its number."""
+    entry = int(np.argmax(wrong))
+    return f"line {lines[entry]}" if np.size(lines) == wrong.size else f"entry {entry}"
+
+
+def profile_in_si(
+    value: Any,
+    quantity: str,
+    units: Sequence[str] = (),
+    *,
+    unit: str | None = None,
+    x_unit: str | None = None,
+    doubted: bool = True,
+) -> Any:
+    """Return a profile with its values, and its coordinates x and y, in SI and checked.
+
+    Numbers become an array. A DataArray states its unit in the
+    attribute `units`: a strength may also be a friction coefficient, 1.
+    """
+    units = units or (QUANTITIES[quantity].units, *["1"] * (quantity in STRENGTHS))
+    if not hasattr(value, "dims"):
+        return as_numbers(magnitude_in_one_of(value, units[:1])[0])
+    parts = {quantity: (value, units, unit)}
+    parts |= {dim: (value[dim], ("m",), x_unit) for dim in ("x", "y") if dim in value.coords}
+    converted, lines = {}, value.attrs.get("lines", ())
+    for name, (array, valid, given) in parts.items():
+        try:
+            converted[name] = in_si(array, valid, given)
+        except InputError as error:
+            raise InputError(f"{name} {text}" for text in error.problems) from None
+    values, si = converted.pop(quantity)
+    shown = value.values if isinstance(value.data, np.ndarray) else values
+    check_measured(values, quantity, lines, shown, doubted)
+    if quantity == "height" and not (unit or stated_unit(value)):
+        known = np.isfinite(values)
+        span = values.max(where=known, initial=-np.inf) - values.min(
+            where=known, initial=np.inf
+        )
+        if span > TALL:
+            warn_user(
+                f"height: has no unit and is read in m. The heights span {span:.3g} m. Pass"
+                " unit='um' or another unit, or unit='m' if metres are right",
+                UnitWarning,
+            )
+    profile = value.copy(data=values)
+    profile.attrs = {"units": si}
+    for dim, (places, _) in converted.items():
+        if not np.isfinite(places).all():
+            raise InputError(
+                f"{dim} must be finite, not as {_entry(~np.isfinite(places), lines)}"
+            )
+        profile = profile.assign_coords({dim: (value[dim].dims, places)})
+    return profile
+
+
+# -- doubts -------------------------------------------------------------------------------------
 
 
 class Doubt(NamedTuple):
@@ -390,52 +424,3 @@ def doubt_units(doubts: Iterable[Doubt]) -> bool:
     if unusual:
         warn_user(unusual[0].text, UnitWarning)
     return bool(unusual)
-
-
-def profile_in_si(
-    value: Any,
-    quantity: str,
-    units: Sequence[str] = (),
-    *,
-    unit: str | None = None,
-    x_unit: str | None = None,
-    doubted: bool = True,
-) -> Any:
-    """Return a profile with its values, and its coordinates x and y, in SI and checked.
-
-    Numbers become an array. A DataArray states its unit in the
-    attribute `units`: a strength may also be a friction coefficient, 1.
-    """
-    units = units or (QUANTITIES[quantity].units, *["1"] * (quantity in STRENGTHS))
-    if not hasattr(value, "dims"):
-        return as_numbers(plain(value, units[:1])[0])
-    parts = {quantity: (value, units, unit)}
-    parts |= {dim: (value[dim], ("m",), x_unit) for dim in ("x", "y") if dim in value.coords}
-    converted, lines = {}, value.attrs.get("lines", ())
-    for name, (array, valid, given) in parts.items():
-        try:
-            converted[name] = in_si(array, valid, given)
-        except InputError as error:
-            raise InputError(f"{name} {text}" for text in error.problems) from None
-    values, si = converted.pop(quantity)
-    shown = value.values if isinstance(value.data, np.ndarray) else values
-    check_measured(values, quantity, lines, shown, doubted)
-    if quantity == "height" and not (unit or stated_unit(value)):
-        known = values[np.isfinite(values)]
-        if known.size and np.ptp(known) > TALL:
-            warn_user(
-                f"height: has no unit and is read in m. The heights span {np.ptp(known):.3g} m."
-                " Pass unit='um' or another unit, or unit='m' if metres are right",
-                UnitWarning,
-            )
-    profile = value.copy(data=values)
-    profile.attrs = {"units": si}
-    for dim, (places, _) in converted.items():
-        if not np.isfinite(places).all():
-            entry = int(np.argmin(np.isfinite(places)))
-            where = (
-                f"line {lines[entry]}" if np.size(lines) == places.size else f"entry {entry}"
-            )
-            raise InputError(f"{dim} must be finite, and {where} is not")
-        profile = profile.assign_coords({dim: (value[dim].dims, places)})
-    return profile

@@ -27,7 +27,7 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name, warn_accuracy
 from stiction.base.model import FilePath, Number, check, checked
-from stiction.base.units import STRENGTHS, as_numbers, check_measured, profile_in_si
+from stiction.base.units import as_numbers, check_measured, profile_in_si
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.checks import check_resolution, steepest_weakening_rate
 from stiction.problem.interface import Interface
@@ -36,12 +36,11 @@ from stiction.problem.reading.labels import OF_A_PLANE, Missing, labelled, named
 from stiction.problem.reading.tables import Options
 from stiction.problem.sample import (
     Sample,
+    accepted_again,
     as_rows,
-    given_again,
     given_twice,
     made,
     on_nodes,
-    own_sample,
     pressing_of,
     refuse_missing,
 )
@@ -76,51 +75,51 @@ def named_profiles(given: Any) -> dict[str, Any]:
 
 def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> Sample:
     """Return a sample made from users' data. See `Problem.sample` for the arguments."""
-    interface = problem.interface
     if isinstance(profiles, Sample):
-        sample = own_sample(problem, given_again(problem, profiles), accept)
-        check_resolution(problem, sample.steepest_weakening_rate)
-        return sample
-    # 1. to 4. The steps for each profile.
-    given, mistakes, nodes = named_profiles(profiles), {}, (interface,)
+        return accepted_again(problem, profiles, accept)
+    interface = problem.interface
+    given, mistakes = named_profiles(profiles), {}
     placed: dict[str, Any] = {
         name: value.to_xarray(interface) if isinstance(value, ProfileFile) else value
         for name, value in given.items()
     }
-    for step, known in (
-        (named, (interface.dims,)), (profile_in_si, ()), (on_nodes, nodes), (as_rows, nodes)
-    ):  # fmt: skip
+    # 1. to 4. The steps for each profile.
+    steps: tuple[tuple[Any, Any], ...] = (
+        (named, interface.dims), (profile_in_si, ()), (on_nodes, interface), (as_rows, interface)
+    )  # fmt: skip
+    for step, known in steps:
         for name, value in [*placed.items()]:
             try:
-                placed[name] = step(value, name, *known)
+                placed[name] = step(value, name, known)
             except InputError as error:
                 mistakes[name] = [f"{name}: {text}" for text in error.problems]
                 del placed[name]
-    coefficients = [name for name in STRENGTHS if name in placed]
-    coefficients = [n for n in coefficients if placed[n].quantity == "friction_coefficient"]
-    names = {*given, *["friction_coefficient"] * bool(coefficients)}
-    problems = given_twice(problem, names, "profiles")
-    problems += [text for name in given for text in mistakes.get(name, ())]
-    if isinstance(problem.specimen, Slider):
-        stresses = [name for name in placed if name not in coefficients]
-        problems += [f"{n}: {UNFIT_FOR_SLIDER[n]}" for n in stresses if n in UNFIT_FOR_SLIDER]
     rows = {name: profile.values for name, profile in placed.items()}
+    quantities = {name: profile.quantity for name, profile in placed.items()}
     samples = len(rows.get("strength", rows.get("friction_coefficient", (None,))))
+    problems = given_twice(problem, {*given, *quantities.values()}, "profiles")
+    problems += [text for name in given for text in mistakes.get(name, ())]
     problems += [
         f"{name}: must have {samples} or one sample, as the strength, got {len(values)}"
         for name, values in rows.items()
         if values.ndim and len(values) not in (1, samples)
     ]
+    if isinstance(problem.specimen, Slider):
+        unfit = {name: UNFIT_FOR_SLIDER.get(what) for name, what in quantities.items()}
+        problems += [f"{name}: {text}" for name, text in unfit.items() if text]
     if problems:
         raise InputError(problems)
     # 5. Coefficients become stresses, and profiles a sample.
     if "normal_pressure" in rows and rows["normal_pressure"].size in (1, samples):
         rows["normal_pressure"] = rows["normal_pressure"] * pressing_of(problem)
     pressure = rows.get("normal_pressure", problem.normal_pressure)
-    for name in coefficients:
-        rows[name] = rows[name] * pressure
+    rows |= {
+        name: rows[name] * pressure
+        for name, what in quantities.items()
+        if what == "friction_coefficient"
+    }
     if "friction_coefficient" in rows:
-        rows["strength"] = rows.pop("friction_coefficient") * pressure
+        rows["strength"] = rows.pop("friction_coefficient")
     sample = made(problem, rows, accept)
     if (constant := sample.strength <= sample.residual_strength).any():
         warn_accuracy(

@@ -60,7 +60,7 @@ class _Profiles(NamedTuple):
     initial_stress: Array
     load_profile: Array
     normal_pressure: Array
-    problem: Any = None
+    problem: Any
 
 
 class Sample(Result, _Profiles):
@@ -77,9 +77,9 @@ class Sample(Result, _Profiles):
         p, dimensionless, positive.
     normal_pressure : (samples, *shape) array
         In Pa, NaN if the problem has no pressure.
-    problem : Problem, optional
+    problem : Problem
         The problem that made the sample. Other problems do not accept
-        the sample. A sample made by hand has no problem.
+        the sample.
     """
 
     def _summary(self) -> Summary:
@@ -122,8 +122,6 @@ class Sample(Result, _Profiles):
 
     def mean(self, profiles: Array) -> Array:
         """Return the mean of each profile over the nodes that can break: (..., *shape) to (...)."""
-        if self.problem is None:
-            return np.asarray(profiles.mean(axis=self.axes))
         return np.asarray(self.problem.interface.mean(profiles))
 
     @property
@@ -133,13 +131,11 @@ class Sample(Result, _Profiles):
 
     @property
     def steepest_weakening_rate(self) -> float:
-        """Largest weakening rate at any slip, Pa/m, among nodes that may break.
-
-        A sample without a problem has a law that does not steepen.
-        """
-        W = self.weakening_rate
-        steepest = steepest_weakening_rate(self.strength, self.residual_strength, W)
-        return steepest if self.problem is None else steepest * self.problem.friction.steepening
+        """Largest weakening rate at any slip, Pa/m, among nodes that may break."""
+        first = steepest_weakening_rate(
+            self.strength, self.residual_strength, self.weakening_rate
+        )
+        return first * float(self.problem.friction.steepening)
 
     def mean_stress(self, load: Array) -> Array:
         """Return <tau_i> + tau_0 <p>, Pa, at loads tau_0 with shape (samples,)."""
@@ -360,8 +356,6 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     pressed = problem.given_pressure is not None or "normal_pressure" in names
     if "friction_coefficient" in names and not pressed:
         twice.append(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
-    if isinstance(problem.specimen, Slider) and not pressed:
-        twice.append(f"load: a slider needs a normal force. {GIVE_PRESSURE}")
     if problem.specimen is not None and problem.specimen.pressing == "glued" and not pressed:
         text = "'glued' has no effect without a normal pressure"
         twice.append(f"problem.specimen.pressing: {text}. {GIVE_PRESSURE}")
@@ -393,15 +387,9 @@ def own_sample(
     the problem. The caller checks the resolution, and the nodes
     that do not weaken, for all samples together.
     """
-    problems: list[str] = []
     for name, rows in profiles.items():
-        try:
-            with prefixed(name):
-                check_values(name, rows, problem.interface)
-        except InputError as error:
-            problems += error.problems
-    if problems:
-        raise InputError(problems)
+        with prefixed(name):
+            check_values(name, rows, problem.interface)
     return made(problem, profiles, accept)
 
 
@@ -456,16 +444,11 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
     return Sample(strength, residual, W, initial, load_profile, pressure, problem)
 
 
-def given_again(problem: Any, sample: Sample) -> dict[str, Array]:
-    """Return the profiles of a given `Sample` by name, or refuse a foreign sample."""
-    if sample.shape != problem.interface.shape:
-        shapes = f"shape {sample.shape}, the interface {problem.interface.shape}"
-        raise InputError(f"profiles: the sample has {shapes}")
-    alike = np.allclose(sample.load_profile, problem.load_profile, rtol=1e-6)
-    if not alike or sample.problem not in (None, problem):
+def accepted_again(problem: Any, sample: Sample, accept: Collection[str]) -> Sample:
+    """Return a given `Sample`, or refuse a sample that another problem made."""
+    if sample.problem != problem:
         raise InputError("profiles: the sample was made by another problem. Make it anew")
-    given = {name: rows for name, rows in sample._asdict().items() if name in PROFILES}
-    given["strength"] = np.where(np.isinf(sample.strength), 1.0, sample.strength)
-    if np.isnan(sample.normal_pressure).all():
-        del given["normal_pressure"]
-    return given
+    profiles = sample.strength, sample.residual_strength, sample.initial_stress
+    if problems := contradictions_of(problem.interface, *profiles, "overstress" in accept):
+        raise InputError(problems)
+    return sample

@@ -24,14 +24,13 @@ import numpy as np
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, unknown_name
-from stiction.base.model import describe
 from stiction.base.units import (
     as_numbers,
     check_agreement,
     check_measured,
     conversion,
     is_in,
-    plain,
+    magnitude_in_one_of,
     profile_in_si,
     stated_unit,
 )
@@ -101,19 +100,19 @@ def column_in_si(
     return column.values * factor, si
 
 
-def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Any, str | None]:
+def with_stated_unit(value: Any, units: Iterable[str]) -> tuple[Array, str | None]:
     """Return numbers without labels, and the unit if the source states a unit.
 
     The unit belongs to a quantity, is the attribute `units`, or is part
     of the name of a Series.
     """
     stated = ""
-    if is_labelled(value) and not hasattr(value, "data_vars"):
+    if hasattr(value, "dims") and not hasattr(value, "data_vars"):
         stated, value = stated_unit(value), value.data
     elif hasattr(value, "to_xarray") and hasattr(value, "name"):
         stated, value = name_and_unit(str(value.name or ""))[1], value.to_numpy()
-    numbers, si = plain(value, units)
-    return numbers, si or stated or None
+    numbers, si = magnitude_in_one_of(value, tuple(units))
+    return as_numbers(numbers), si or stated or None
 
 
 def without_missing(values: Array, options: Options) -> Array:
@@ -124,11 +123,6 @@ def without_missing(values: Array, options: Options) -> Array:
 
 
 # -- from a source to a profile ------------------------------------------------------------------
-
-
-def is_labelled(value: Any) -> bool:
-    """Return whether a value has labels: a table or an xarray object."""
-    return isinstance(value, Table) or (hasattr(value, "dims") and hasattr(value, "coords"))
 
 
 def is_coefficient(value: Any) -> bool:
@@ -177,16 +171,11 @@ def _of_array(values: Any, quantity: str) -> Any:
     """Return an array without labels as a profile along a line or over a plane."""
     import xarray as xr
 
-    numbers, si = plain(values, (QUANTITIES[quantity].units,))
-    try:
-        array = as_numbers(numbers)
-    except InputError as error:
-        raise InputError(
-            f"must be a path, an array, or a table with labels, got {describe(values)}: {error}"
-        ) from None
+    numbers, si = magnitude_in_one_of(values, (QUANTITIES[quantity].units,))
+    array = as_numbers(numbers)
     if array.ndim not in (1, 2) or array.size == 0:
         raise InputError(f"must have shape (nodes,) or (nx, ny), got shape {array.shape}")
-    return xr.DataArray(array, dims=("x", "y")[: array.ndim], attrs={"units": si} if si else {})
+    return xr.DataArray(array, dims=("x", "y")[: array.ndim], attrs={"units": si or ""})
 
 
 # -- step 2: names ---------------------------------------------------------------------------------
@@ -260,8 +249,8 @@ def _of_table(
         raise InputError(texts)
     array = xr.DataArray(
         chosen.values,
-        {dim: ("row", column.values, _units(column)) for dim, column in places.items()},
-        ("row",), str(chosen.name), _units(chosen),
+        {d: ("row", at.values, {"units": at.unit}) for d, at in places.items()},
+        ("row",), str(chosen.name), {"units": chosen.unit},
     )  # fmt: skip
     return array, reading_of(table, chosen, QUANTITIES[quantity].units, places)
 
@@ -304,10 +293,6 @@ def _with_places(array: Any, dims: tuple[str, ...], x: Wanted) -> Any:
     places = {name if len(dims) == 2 else "x": along[name] for name in called}
     dropped = [name for name in array.coords if name not in array.dims]
     return array.drop_vars(dropped).assign_coords(places)
-
-
-def _units(column: Column) -> dict[str, str]:
-    return {"units": column.unit} if column.unit else {}
 
 
 def several_tables(table: Table) -> str:
