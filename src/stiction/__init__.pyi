@@ -28,7 +28,7 @@ from stiction.problem.friction import LinearWeakening as LinearWeakening
 from stiction.problem.friction import PiecewiseWeakening as PiecewiseWeakening
 from stiction.problem.interface import Ellipse as Ellipse
 from stiction.problem.interface import Interface as Interface
-from stiction.problem.load import Load as Load
+from stiction.problem.problem import Load as Load
 from stiction.problem.problem import Problem as Problem
 from stiction.problem.profiles import read_profile as read_profile
 from stiction.problem.solid import Solid as Solid

@@ -410,7 +410,7 @@ class Doubt(NamedTuple):
     text: str
     ratio: float
     usual: tuple[float, float]
-    possible: tuple[float, float]
+    possible: tuple[float, float] = (0.0, math.inf)
 
 
 def doubt_units(doubts: Iterable[Doubt]) -> bool:

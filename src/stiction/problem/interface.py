@@ -172,9 +172,9 @@ class Interface(Listed):
     width : float, optional
         Width of a line, m, which turns its stresses into forces, N. A
         plane does not need a width. A specimen has a thickness instead.
-    ends : {"periodic", "free"}
-        Set by a `Problem`: "free" if it has a `specimen`. The nodes are
-        then the centres of cells, x_i = (i + 1/2) length/nodes, and the
+    ends : {"periodic", "free"}, optional
+        Set by a `Problem`: "free" if it has a `specimen`, which refuses
+        "periodic". The nodes are then the centres of cells, x_i = (i + 1/2) length/nodes, and the
         interface stops at its ends.
     extent : (float, float), ((float, float), (float, float)), Ellipse or mask, optional
         Part of the interface that can break, by default the whole
@@ -208,7 +208,7 @@ class Interface(Listed):
     length: Lengths
     nodes: Counts
     width: Positive | None = None
-    ends: Literal["periodic", "free"] = "periodic"
+    ends: Literal["periodic", "free"] | None = None
     extent: Extent = None
     _internal: ClassVar[tuple[str, ...]] = (
         "axes", "breakable_measure", "cell", "describe_node", "dims", "embedding", "first",

@@ -13,13 +13,21 @@ from pydantic import model_validator
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import Listed, Mode, describe, is_unplaced, model
+from stiction.base.model import (
+    Listed,
+    Mode,
+    OptionalProfile,
+    Positive,
+    Profile,
+    describe,
+    is_unplaced,
+    model,
+)
 from stiction.base.units import Doubt, doubt_units
 from stiction.elasticity.protocol import HalfSpaces
 from stiction.problem.checks import check_resolution, warn_if_short
 from stiction.problem.friction import Friction, contradictions
 from stiction.problem.interface import Interface
-from stiction.problem.load import Load
 from stiction.problem.profiles import at_nodes, placed_sample
 from stiction.problem.sample import GIVE_PRESSURE, Sample, pressing_of, turned
 from stiction.problem.solid import Solid
@@ -38,6 +46,59 @@ NO_AREA = (
     " interface.width of a line (m)"
 )
 """Advice for a force if the area is unknown."""
+
+
+@model
+class Load(Listed):
+    """Shear stress tau_i(x) + tau_0 p(x) on an interface without slip. The load factor tau_0 rises.
+
+    Parameters
+    ----------
+    profile : float or (nodes,) array
+        p, dimensionless, positive. Divide it by its mean: tau_0 is then
+        the mean stress.
+    initial_stress : float or (nodes,) array
+        tau_i, Pa, below the peak strength everywhere. `Rupture` also
+        takes nodes at which it is higher, which break at once.
+    normal_pressure : float or (nodes,) array, optional
+        Pa, positive on average. Every onset then has a
+        `friction_coefficient`.
+    pressing_force : float, optional
+        Force, N, positive, in place of `normal_pressure`. The force
+        over the area of the interface, which must be known, is the
+        uniform pressure, or the mean pressure between glued plates.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stiction as st
+    >>> x = st.Interface(length=0.1, nodes=512).x
+    >>> profile = 1.0 + 2.0 * np.exp(-x / 0.01)
+    >>> load = st.Load(profile=profile / profile.mean(), normal_pressure=5e6)
+    """
+
+    profile: Profile = 1.0  # type: ignore[assignment]  # converted
+    initial_stress: Profile = 0.0  # type: ignore[assignment]
+    normal_pressure: OptionalProfile = None  # type: ignore[assignment]
+    pressing_force: Positive | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Load:
+        profile, pressure, problems = self.profile, self.normal_pressure, []
+        if not is_unplaced(profile) and np.min(profile) <= 0.0:
+            problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
+        if not (pressure is None or is_unplaced(pressure) or np.mean(pressure) > 0.0):
+            mean = np.mean(pressure)
+            problems.append(
+                f"normal_pressure must be positive on average. Its mean is {mean:g}"
+            )
+        if pressure is not None and self.pressing_force is not None:
+            problems.append(
+                "pressing_force: give either normal_pressure (Pa) or pressing_force (N), not both"
+            )
+        if problems:
+            raise InputError(problems)
+        return self
 
 
 @model
@@ -118,12 +179,12 @@ class Problem(Listed):
         """Let the interface end with the specimen, and return what does not fit a specimen."""
         interface, specimen = self.interface, self.specimen
         if specimen is None:
-            text = (
-                "interface.ends: free ends belong to a specimen, give specimen=st.Blocks(...)"
-            )
+            text = "interface.ends: free ends belong to a specimen. Give specimen=st.Blocks(...)"
             return [text] * interface.is_free
         if interface.is_plane:
             return ["specimen: blocks meet on a line; give length and nodes one number each"]
+        if interface.ends == "periodic":
+            return ["interface.ends: the ends of a specimen are free. Leave it out"]
         object.__setattr__(self, "interface", dataclasses.replace(interface, ends="free"))
         problems = []
         if interface.width is not None:
@@ -132,7 +193,7 @@ class Problem(Listed):
             problems.append("load.profile: comes from the drive of a specimen. Leave it out")
         if isinstance(specimen, Slider):
             return problems + self._of_slider(specimen)
-        if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure or 0.0):
+        if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure):
             problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
@@ -154,9 +215,7 @@ class Problem(Listed):
             "friction.residual_strength": np.any(self.friction.residual_strength),
             "interface.extent": interface.is_held,
             "load.initial_stress": np.any(load.initial_stress),
-            "load.normal_pressure": np.ndim(
-                0.0 if load.normal_pressure is None else load.normal_pressure
-            ),
+            "load.normal_pressure": np.ndim(load.normal_pressure),
         }
         problems = slider.misfits(interface.measure, interface.spacing, self.solid, self.mode)
         problems += [
@@ -185,9 +244,7 @@ class Problem(Listed):
                 f"specimen.drive.stiffness: {machine:.3g} N/m hardly differs from dead load, 0,"
                 f" next to the stiffness of the blocks, {blocks:.3g} N/m. Check its unit (N/m)"
             )
-            doubt_units(
-                [Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf), (0.0, math.inf))]
-            )
+            doubt_units([Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf))])
 
     def _place_profiles(self) -> list[str]:
         """Put profiles that have coordinates on the nodes, and return errors of profiles."""
@@ -198,8 +255,7 @@ class Problem(Listed):
             for name, value in vars(owner).items():
                 if is_unplaced(value):
                     try:
-                        at = at_nodes(f"{part}.{name}", value, self.interface)
-                        value = np.asarray(at)  # of a pandas object too
+                        value = at_nodes(f"{part}.{name}", value, self.interface)
                     except InputError as error:
                         problems += error.problems
                     placed[name] = value
@@ -215,10 +271,8 @@ class Problem(Listed):
     @property
     def blocks(self) -> Driven:
         """Stiffness and profiles of the specimen, which must be given."""
-        if self.specimen is None:
-            raise InputError("problem.specimen: is not given, so the solids are half-spaces")
         if not isinstance(self.specimen, Blocks):
-            raise InputError("problem.specimen: must be Blocks here, got a Slider")
+            raise InputError("problem.specimen: must be Blocks here")
         interface = self.interface
         return self.specimen.driven(interface.measure, interface.size, self.solid, self.mode)
 

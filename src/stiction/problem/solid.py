@@ -85,7 +85,7 @@ class Solid(Listed):
             f" {self.shear_modulus:g} Pa and density = {self.density:g} kg/m3"
         )
         usual = (SLOWEST_STIFF if dense else slowest), fastest
-        doubt_units([Doubt(text, speed, usual, (0.0, math.inf))])
+        doubt_units([Doubt(text, speed, usual)])
         return self
 
     @property
