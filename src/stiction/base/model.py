@@ -37,7 +37,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 
 from stiction.base.errors import InputError, nearest, unknown
 from stiction.base.progress import Show
-from stiction.base.representation import brief, equal, hash_of, html_of
+from stiction.base.representation import brief, equal, hash_of
 from stiction.base.units import (
     as_numbers,
     is_quantity,
@@ -413,7 +413,7 @@ def model(cls: Any = None, *, kw_only: bool = False) -> Any:
     # Validation inside another model must keep calling pydantic's own
     # path, not this wrapper.
     init.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # pydantic's own marker
-    wrapped.__init__, wrapped.__repr__, wrapped._repr_html_ = init, brief, html_of
+    wrapped.__init__, wrapped.__repr__ = init, brief
     wrapped.__eq__, wrapped.__hash__ = equal, hash_of
     hints = typing.get_type_hints(cls, include_extras=True)
     keys = {name: hints[name] for name in keys_of(wrapped)}

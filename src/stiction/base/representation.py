@@ -2,7 +2,7 @@
 
 A model shows its fields. A result shows the
 requested number with its interval and unit, and its
-basis (`Summary`), as text and as an HTML table.
+basis (`Summary`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 from functools import cache
-from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,18 +69,6 @@ class Summary(NamedTuple):
             [self.title, *(f"  {line}".rstrip() for line in [*lines, *self.notes])]
         )
 
-    @property
-    def html(self) -> str:
-        """The summary as a table for notebooks."""
-        head, *rows = zip(*self.columns, strict=True)
-        lines = [f"<table><caption>{escape(self.title)}</caption>", _row(head, "th")]
-        lines += [*(_row(row, "td") for row in rows), "</table>"]
-        return "\n".join([*lines, *(f"<div>{escape(note)}</div>" for note in self.notes)])
-
-
-def _row(texts: Sequence[str], tag: str) -> str:
-    return f"<tr>{''.join(f'<{tag}>{escape(text)}</{tag}>' for text in texts)}</tr>"
-
 
 @cache
 def _public_names(kind: Any) -> tuple[str, ...]:
@@ -138,11 +125,6 @@ def rows_of(value: Any, prefix: str = "") -> Iterator[Row]:
             yield Row(prefix + name, entry, (), UNITS.get(name, ""))
 
 
-def html_of(self: Any) -> str:
-    """Use as `_repr_html_` of a dataclass: a table of fields that differ from their default."""
-    return Summary(type(self).__name__, list(rows_of(self))).html
-
-
 def equal(self: Any, other: object) -> bool:
     """Use as `__eq__`: objects of a class are equal if all public fields are equal."""
     return _key(self) == _key(other) if type(self) is type(other) else NotImplemented
@@ -181,9 +163,6 @@ class Result:
 
     def __str__(self) -> str:
         return self._summary().text
-
-    def _repr_html_(self) -> str:
-        return self._summary().html
 
     def to_dict(self) -> dict[str, Any]:
         """Return the public fields as dicts, lists and numbers for JSON. NaN becomes None."""

@@ -178,8 +178,11 @@ class Problem(Listed):
     def _of_specimen(self) -> list[str]:
         """Let the interface end with the specimen, and return what does not fit a specimen."""
         interface, specimen = self.interface, self.specimen
+        pressure: Any = self.load.normal_pressure
         if specimen is None:
-            text = "interface.ends: free ends belong to a specimen. Give specimen=st.Blocks(...)"
+            text = (
+                "interface.ends: free ends belong to a specimen. Give specimen=st.Blocks(...)"
+            )
             return [text] * interface.is_free
         if interface.is_plane:
             return ["specimen: blocks meet on a line; give length and nodes one number each"]
@@ -193,7 +196,7 @@ class Problem(Listed):
             problems.append("load.profile: comes from the drive of a specimen. Leave it out")
         if isinstance(specimen, Slider):
             return problems + self._of_slider(specimen)
-        if specimen.pressing == "glued" and np.ndim(self.load.normal_pressure):
+        if specimen.pressing == "glued" and np.shape(pressure):
             problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
@@ -210,7 +213,8 @@ class Problem(Listed):
 
     def _of_slider(self, slider: Slider) -> list[str]:
         """Return what does not fit a slider."""
-        load, interface = self.load, self.interface
+        load: Any = self.load
+        interface = self.interface
         given = {
             "friction.residual_strength": np.any(self.friction.residual_strength),
             "interface.extent": interface.is_held,

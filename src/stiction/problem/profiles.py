@@ -31,8 +31,15 @@ from stiction.base.units import as_numbers, check_measured, profile_in_si
 from stiction.base.variables import PROFILES, QUANTITIES
 from stiction.problem.checks import check_resolution, steepest_weakening_rate
 from stiction.problem.interface import Interface
-from stiction.problem.reading.columns import Wanted
-from stiction.problem.reading.labels import OF_A_PLANE, Missing, labelled, named
+from stiction.problem.reading.columns import Reading, Wanted
+from stiction.problem.reading.files import load
+from stiction.problem.reading.labels import (
+    OF_A_PLANE,
+    Missing,
+    named,
+    of_array,
+    without_missing,
+)
 from stiction.problem.reading.tables import Options
 from stiction.problem.sample import (
     Sample,
@@ -258,12 +265,18 @@ def read_profile(
         raise InputError("strength: maps heights to strengths. Leave quantity='strength'")
     options = Options(skip, sheet, missing, decimal)
     dims = None if interface is None else interface.dims
-    with prefixed(str(source) if isinstance(source, str | Path) else "source"):
-        array = labelled(
-            source, "height" if strength else quantity, dims, x=x, value=value, unit=unit,
-            x_unit=x_unit, options=options,
+    of_source, is_file = "height" if strength else quantity, isinstance(source, str | Path)
+    with prefixed(str(source) if is_file else "source"):
+        data: Any = load(Path(source), options) if is_file else source
+        array = named(data, of_source, dims, x=x, value=value)
+        if not getattr(array, "dims", ()):
+            array = named(of_array(array, of_source), of_source, dims, x=x, value=value)
+        array = array.copy(data=without_missing(array.data, options))
+        read: Reading | None = array.attrs["read"]
+        array = profile_in_si(
+            array, of_source, (QUANTITIES[of_source].units,), unit=unit, x_unit=x_unit,
+            doubted=missing is None,
         )  # fmt: skip
-        read = array.attrs
         if strength is not None:
             array = array.copy(data=_mapped(strength, array.values))
         single = [dim for dim in {*array.dims} - {"x", "y", "row"} if array.sizes[dim] == 1]
@@ -279,8 +292,11 @@ def read_profile(
             array = xr.DataArray(values, interface.coordinates, interface.dims)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")
-    names = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
-    array.attrs = names | read
+    array.attrs = {"units": QUANTITIES[quantity].units, "long_name": quantity.replace("_", " ")}
+    if read is not None:
+        name = Path(source).name if is_file else type(source).__name__
+        about = read._replace(source=name, unit=unit or read.unit).attributes
+        array.attrs |= {key: entry for key, entry in about.items() if entry}
     return array.rename(quantity)
 
 

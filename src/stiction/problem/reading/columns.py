@@ -112,6 +112,7 @@ class Table(NamedTuple):
     headed: bool = True  # whether columns have names
     left_out: tuple[str, ...] = ()  # rows that were not read, and why
     begins: tuple[int, ...] = ()  # lines at which tables begin, if remarks separate several
+    mark: str | None = None  # the decimal mark, if a cell has one
 
 
 class Reading(NamedTuple):

@@ -25,6 +25,7 @@ import zipfile
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,10 +40,8 @@ from stiction.problem.reading.tables import (
     GROUPS,
     NUMBER,
     Grid,
-    Numbers,
     Options,
     Row,
-    numbers_of,
     split_at_blanks,
     table_of,
 )
@@ -108,20 +107,19 @@ def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008
     """
     content = content_of(path)
     if path.suffix.lower() == EXCEL:
-        grid = _sheet(content, options)
-        return table_of(grid, numbers_of(grid, options), path.name)
-    return table_of(*_table_of_text(content, options), path.name)
+        return table_of(_sheet(content, options), options, path.name)
+    return _table_of_text(content, options, path.name)
 
 
 # -- cells of a text -----------------------------------------------------------------------------
 
 
-def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Numbers]:
-    """Return the cells and the numbers in a text."""
+def _table_of_text(content: bytes, options: Options, source: str) -> Table:
+    """Return the table in a text."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         content = _text(content).encode()
     if len(content) > LARGE:
-        if (large := _large(content, options)) is not None:
+        if (large := _large(content, options, source)) is not None:
             return large
         marks = max(map(content.count, (b",", b";", b"\t"))) + content.count(b"\n")
         cells = max(marks, len(content.split()))
@@ -130,8 +128,7 @@ def _table_of_text(content: bytes, options: Options) -> tuple[Grid, Numbers]:
                 f"has about {cells} cells in lines of different kinds, at most {MAX_UNEVEN_CELLS}"
                 " can be read. Remove remarks, and give each line the same number of cells"
             )
-    grid = _lines(_text(content), options)
-    return grid, numbers_of(grid, options)
+    return table_of(_lines(_text(content), options), options, source)
 
 
 def _text(data: bytes) -> str:
@@ -224,7 +221,7 @@ def _check_line(number: int, line: str, separator: str) -> None:
         )
 
 
-def _large(content: bytes, options: Options) -> tuple[Grid, Numbers] | None:
+def _large(content: bytes, options: Options, source: str) -> Table | None:
     """Return a large table if all its lines are alike, and None for any other text."""
     import pandas as pd
 
@@ -233,17 +230,15 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Numbers] | None:
         return None
     with suppress(InputError, UnicodeDecodeError, ValueError):
         grid = _lines(_text(content[:end]), options)
-        table = numbers_of(grid, options)
+        table = table_of(grid, options, source)
         if table.left_out or table.begins:
             return None
-        body, width = content[end:].rstrip(), len(table.columns)
-        lines, cells = body.count(b"\n") + 1, len(grid.rows[-1].cells)
-        blank = grid.separator == " "
+        body, cells = content[end:].rstrip(), len(grid.rows[-1].cells)
+        lines, blank = body.count(b"\n") + 1, grid.separator == " "
         even = blank or body.count(grid.separator.encode()) == lines * (cells - 1)
         whole_numbers = b"." not in body and (grid.separator == "," or b"," not in body)
         if b"#" in body or not (even and (table.mark or whole_numbers)):
             return None
-        numeric = [column for column in range(width) if column not in table.texts]
         words = [w for word in options.words for w in (word, word.upper(), word.title())]
         # From pandas 3 on, numbers are always read to the last digit.
         exact: Any = {"float_precision": "round_trip"} if pd.__version__ < "3" else {}
@@ -253,15 +248,16 @@ def _large(content: bytes, options: Options) -> tuple[Grid, Numbers] | None:
             keep_default_na=False, na_values=words, skip_blank_lines=False, encoding="utf-8",
             **exact,
         )  # fmt: skip
-        frame = frame[numeric]  # with `usecols` pandas would drop further cells in silence
+        # With `usecols` pandas would drop further cells in silence.
+        frame = frame[[column.number for column in table.columns if not column.text]]
         whole = all(kind.kind in "fiu" for kind in frame.dtypes) and len(frame) == lines
         if whole and not (blank and frame.isna().to_numpy().any()):
-            columns = frame.reindex(columns=range(width)).to_numpy(np.float64).T
-            return grid, table._replace(
-                columns=np.hstack([table.columns, columns]),
-                lines=np.r_[table.lines, table.lines[-1] + 1 + np.arange(lines)],
-                words={},
-            )
+            gaps, columns = np.full(lines, np.nan), []
+            for column in table.columns:
+                below = frame.get(column.number, gaps)
+                columns.append(replace(column, values=np.r_[column.values, below], cells=()))
+            numbers = np.r_[table.lines, table.lines[-1] + 1 + np.arange(lines)]
+            return table._replace(columns=tuple(columns), lines=numbers)
     return None
 
 

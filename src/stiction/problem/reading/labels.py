@@ -1,23 +1,21 @@
-"""Take a profile from labelled data: choose the variable and its coordinates, convert to SI.
+"""Names of labelled data: choose the variable and its coordinates, and name the dimensions.
 
-A source is a file, an xarray object, a table of pandas, a quantity with
-a unit or an array. It may hold many variables, and their names and
-units follow no standard. A wrong choice would give a wrong number, so
-an ambiguous choice is refused. `labelled` takes these steps:
+A source is a file, an xarray object or a table of pandas. It may hold
+many variables, and their names and units follow no standard. A wrong
+choice would give a wrong number, so an ambiguous choice is refused.
+`named` takes these steps:
 
-1. Make the source a table, a DataArray or a Dataset.
-2. Names (`named`): choose the variable and its coordinates by the
-   argument. Without an argument, choose by the name, and then by the
-   unit. Call the dimensions 'x' and 'y', or 'row' for a list of points.
-   The sample comes first.
-3. Convert values and coordinates to SI, and check them
-   (`profile_in_si`).
+1. Choose the variable and its coordinates by the argument. Without an
+   argument, choose by the name, and then by the unit.
+2. Call the dimensions 'x' and 'y', or 'row' for a list of points. The
+   sample comes first.
+
+`profile_in_si` then converts values and coordinates to SI.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -31,7 +29,6 @@ from stiction.base.units import (
     conversion,
     is_in,
     magnitude_in_one_of,
-    profile_in_si,
     stated_unit,
 )
 from stiction.base.variables import QUANTITIES
@@ -48,7 +45,6 @@ from stiction.problem.reading.columns import (
     stated_column,
     unclear,
 )
-from stiction.problem.reading.files import load
 from stiction.problem.reading.tables import Options, name_and_unit, table_of_frame
 
 NAMES = {
@@ -130,44 +126,7 @@ def is_coefficient(value: Any) -> bool:
     return hasattr(value, "dims") and is_in(stated_unit(value), "1")
 
 
-def labelled(
-    source: Any,
-    quantity: str,
-    dims: tuple[str, ...] | None = None,
-    *,
-    x: Wanted = None,
-    value: Wanted = None,
-    unit: str | None = None,
-    x_unit: str | None = None,
-    options: Options = Options(),  # noqa: B008
-) -> Any:
-    """Return a quantity from `source` in SI, along `dims` or the directions of the source.
-
-    A dimension with a different name, such as the sample, comes first.
-    It is the only dimension if each sample has a single value. The
-    attributes state what was read.
-    """
-    is_file = isinstance(source, str | Path)
-    data: Any = load(Path(source), options) if is_file else source
-    array = named(data, quantity, dims, x=x, value=value)
-    if not getattr(array, "dims", ()):
-        array = named(_of_array(array, quantity), quantity, dims, x=x, value=value)
-    if options.missing is not None:
-        array = array.copy(data=without_missing(array.values, options))
-    read: Reading | None = array.attrs.get("read")
-    array = profile_in_si(
-        array, quantity, (QUANTITIES[quantity].units,), unit=unit, x_unit=x_unit,
-        doubted=options.missing is None,
-    )  # fmt: skip
-    array.attrs = {}
-    if read is not None:
-        name = Path(source).name if is_file else type(source).__name__
-        about = read._replace(source=name, unit=unit or read.unit).attributes
-        array.attrs = {key: entry for key, entry in about.items() if entry}
-    return array
-
-
-def _of_array(values: Any, quantity: str) -> Any:
+def of_array(values: Any, quantity: str) -> Any:
     """Return an array without labels as a profile along a line or over a plane."""
     import xarray as xr
 
@@ -178,7 +137,7 @@ def _of_array(values: Any, quantity: str) -> Any:
     return xr.DataArray(array, dims=("x", "y")[: array.ndim], attrs={"units": si or ""})
 
 
-# -- step 2: names ---------------------------------------------------------------------------------
+# -- steps 1 and 2 --------------------------------------------------------------------------------
 
 
 def named(
@@ -194,7 +153,7 @@ def named(
     The attributes are the unit and, of a table, what was read. Data
     without labels, and labelled single numbers, are returned as given.
     """
-    # The column and its coordinates, by the rule.
+    # 1. The column and its coordinates, by the rule.
     if hasattr(data, "to_xarray") and hasattr(data, "index"):
         if data.ndim == 1 or not all(isinstance(name, str) for name in data.columns):
             raise InputError(
@@ -218,7 +177,7 @@ def named(
             )
         if x is not None or {*array.coords} != {*dims}:
             array = _with_places(array, dims, x)
-    # The dimensions.
+    # 2. The dimensions.
     array = _directed(array, dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
         raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
@@ -332,12 +291,6 @@ def _chosen(
         places = {"x": place}
     if chosen is None:
         chosen = _by_rule([c for c in columns if c not in places.values()], quantity)
-        si = QUANTITIES[quantity].units
-        if si != "1" and not chosen.unit and is_coefficient_name(chosen):
-            raise InputError(
-                f"{chosen} is a friction coefficient, but the {quantity} is in {si}. Pass"
-                " quantity='friction_coefficient', or a heading with the unit"
-            )
     if len(dims) == 1 and not places and len(columns) > 2 and value is None:
         raise InputError(unclear(columns, "position x", "x"))
     return chosen, places
@@ -345,14 +298,14 @@ def _chosen(
 
 def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
     """Return the column of a quantity by the rule. Other names than its own exclude a column."""
-    words, si = _words(quantity), QUANTITIES[quantity].units
+    words, si = (quantity, *NAMES.get(quantity, ())), QUANTITIES[quantity].units
     others = {name: key for key in NAMES for name in NAMES[key] if name not in words}
     named = {c: others[name] for c in columns if (name := _plain(c.name)) in others}
     left = [column for column in columns if column not in named]
     if left or not named:
         says = _says(words, quantity, left)
         chosen = read_column(left, quantity, "value", None, [si], says)
-        if chosen.unit or si != "Pa" or not is_coefficient_name(chosen):
+        if chosen.unit or si == "1" or not is_coefficient_name(chosen):
             return chosen
         named = {chosen: "friction_coefficient"}
     column, other = next(iter(named.items()))
@@ -360,10 +313,6 @@ def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
         f"the heading {column.label!r} says {other}, not {quantity}. Pass quantity={other!r}, or"
         f" value={column.label!r}"
     )
-
-
-def _words(quantity: str) -> tuple[str, ...]:
-    return quantity, *NAMES.get(quantity, ())
 
 
 def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any:
@@ -376,7 +325,7 @@ def _says(words: Sequence[str], quantity: str, columns: Sequence[Column]) -> Any
 
 def _place_of(columns: Sequence[Column], quantity: str) -> Column | None:
     """Return the column of positions: by its heading, or as the only one in a unit of length."""
-    words = _words(quantity)
+    words = (quantity, *NAMES.get(quantity, ()))
     numeric = [c for c in columns if not c.text and _plain(c.name) not in words]
     called = [c for c in numeric if _plain(c.name) in PLACES]
     if not called:

@@ -30,7 +30,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.model import describe
 from stiction.base.units import parse
@@ -108,38 +107,6 @@ class Grid(NamedTuple):
     separator: str  # empty if the file is a workbook
 
 
-class Numbers(NamedTuple):
-    """The numbers of a table in columns, and its headings."""
-
-    columns: Array  # (columns, rows)
-    header: list[Row]
-    lines: Array  # the number of the line of each row
-    texts: dict[int, str]  # by column without any number: its content, in words
-    words: dict[int, list[str]]  # the cells of these columns
-    mark: str | None  # the decimal mark, if one was seen
-    left_out: tuple[str, ...]
-    begins: tuple[int, ...]
-
-
-def table_of(grid: Grid, numbers: Numbers, source: str) -> Table:
-    """Return the columns of a table with names and units (step 5)."""
-    headed = any({*row.cells} - {"", "-"} for row in numbers.header)
-    headings = _headings(numbers.header, len(numbers.columns))
-    for number, (_, _, heading) in enumerate(headings[1:], 1):  # the first may be an index
-        if headed and not heading and not np.isnan(numbers.columns[number]).all():
-            raise InputError(
-                f"column {number} has numbers, such as in line {numbers.lines[0]}, but no heading."
-                " If commas mark thousands, separate columns with ';'"
-            )
-    columns: tuple[Column, ...] = ()
-    for number, (values, (name, unit, heading)) in enumerate(
-        zip(numbers.columns, headings, strict=True)
-    ):
-        text, words = numbers.texts.get(number, ""), numbers.words.get(number, ())
-        columns += (Column(name, unit, values, number, heading, text, words),)
-    return Table(columns, source, numbers.lines, headed, numbers.left_out, numbers.begins)
-
-
 def table_of_frame(frame: Any) -> Table:
     """Convert a DataFrame with headings to the form of a table from a file."""
     import pandas as pd
@@ -168,11 +135,11 @@ def split_at_blanks(line: str, words: set[str]) -> list[str]:
     return [cell.strip() for cell in WORDS.findall(line)]
 
 
-# -- steps 1 to 4: numbers -----------------------------------------------------------------------
+# -- the table -----------------------------------------------------------------------------------
 
 
-def numbers_of(grid: Grid, options: Options) -> Numbers:
-    """Return the numbers of a table (steps 1 to 4)."""
+def table_of(grid: Grid, options: Options, source: str) -> Table:
+    """Return the columns of a table with names, units and numbers (steps 1 to 5)."""
     words, separator = options.words, grid.separator
     rows = [row for row in grid.rows if any(row.cells)]
     # 1.
@@ -194,26 +161,34 @@ def numbers_of(grid: Grid, options: Options) -> Numbers:
         cells = [comment] if width == 1 else [cell.strip() for cell in cells]
         header = [Row(0, cells)] if len(cells) == width else []
     header = [_of_width(row, width, separator) for row in header]
-    columns = [list(cells) for cells in zip(*(row.cells[:width] for row in rows), strict=True)]
+    contents = [list(cells) for cells in zip(*(row.cells[:width] for row in rows), strict=True)]
     if separator == "," and not header and width == 2:
-        _check_pairs(columns, rows[0])
+        _check_pairs(contents, rows[0])
     numeric = [column for column in numeric if column < width]
     # 3.
-    mark = _decimal_mark(columns, numeric, rows, separator, options.decimal)
-    # 4.
-    numbers, texts = np.full((width, len(rows)), math.nan), {}
-    for column, cells in enumerate(columns):
-        values = _numbers(cells, words, mark)
-        if None not in values:
-            numbers[column] = values
-            continue
-        wrong = values.index(None)
-        texts[column] = _not_a_number(rows[wrong].number, cells[wrong])
-        if column in numeric:
-            raise InputError(texts[column])
+    mark = _decimal_mark(contents, numeric, rows, separator, options.decimal)
+    # 4. and 5.
+    headed = any({*row.cells} - {"", "-"} for row in header)
+    headings, columns = _headings(header, width), []
+    for number, (cells, heading) in enumerate(zip(contents, headings, strict=True)):
+        values, text = _numbers(cells, words, mark), ""
+        if None in values:
+            wrong = values.index(None)
+            text = _not_a_number(rows[wrong].number, cells[wrong])
+            if number in numeric:
+                raise InputError(text)
+        array = np.full(len(rows), math.nan) if text else np.array(values, dtype=np.float64)
+        # The first column may be an index.
+        if headed and number and not heading[-1] and not np.isnan(array).all():
+            raise InputError(
+                f"column {number} has numbers, such as in line {rows[0].number}, but no heading."
+                " If commas mark thousands, separate columns with ';'"
+            )
+        columns.append(
+            Column(*heading[:2], array, number, heading[-1], text, cells if text else ())
+        )
     lines = np.array([row.number for row in rows])
-    texted = {column: columns[column] for column in texts}
-    return Numbers(numbers, header, lines, texts, texted, mark, tuple(left_out), begins)
+    return Table(tuple(columns), source, lines, headed, tuple(left_out), begins, mark)
 
 
 def _not_a_number(line: int, cell: str) -> str:
