@@ -65,7 +65,7 @@ class Load(Listed):
         `friction_coefficient`.
     pressing_force : float, optional
         Force, N, positive, in place of `normal_pressure`. The force
-        over the area of the interface, which must be known, is the
+        over the interface area, which must be known, is the
         uniform pressure, or the mean pressure between glued plates.
 
     Examples
