@@ -44,6 +44,8 @@ from stiction.random.stresses import (
     profiles_in_stress,
 )
 
+CHECKED_NODES = 1 << 14
+"""About the number of sampled nodes whose strength is compared with the residual strength."""
 MOST_NUMBERS = 1 << 20
 """Most nodes or draws of the samples of a plane that are solved at once: 8 MiB per profile."""
 
@@ -155,7 +157,6 @@ class Experiment:
                         " Check its unit. Scatter between specimens is between= of RandomInterface",
                         UnitWarning,
                     )
-            check_residual(self.problem, member)
             # Stresses and slips of a solid lie in known ranges. Others
             # are in another unit.
             means = {name: mean_in_stress(self.problem, member, name) for name in member.names}
@@ -167,6 +168,8 @@ class Experiment:
                 means["strength"], means.get("residual_strength", residual), scales,
                 initial=abs(means["initial_stress"]) if "initial_stress" in means else None,
             )  # fmt: skip
+        count = max(1, CHECKED_NODES // self.problem.interface.size)
+        check_residual(self.problem, self.profiles(self.draws(0, count)))
 
     def draws(self, first: int, count: int) -> Array:
         """Return standard normal draws (count, dimension), beginning with sample `first`."""

@@ -39,6 +39,7 @@ length is varied for all parameters.
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -47,7 +48,6 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
-from stiction.ensemble.batches import in_threads
 from stiction.inference.estimate import NAMES, BestFit, estimate
 from stiction.inference.marginal_fit import LEAST_SHAPE, WIDEST, Family, beta_of
 from stiction.inference.whittle import RANGES, offset
@@ -55,6 +55,10 @@ from stiction.random.dotted_keys import full_key, with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
 
+CONFIDENCE = 0.9
+"""Level of the intervals, as everywhere in the package."""
+TAILS = 0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE)
+"""Probabilities below the ends of an interval."""
 MIN_REPETITIONS = 20
 """Fewest repetitions that determine a tail of errors."""
 LOCATION_PARAMETERS = ("mean", "marginal.mean", "marginal.loc")
@@ -88,7 +92,6 @@ class NotRepeated(InputError):
 def bootstrapped(
     fitted: BestFit,
     count: int,
-    confidence: float,
     seed: int,
     progress: Show,
     further: Sequence[tuple[BestFit, int]] = (),
@@ -101,21 +104,14 @@ def bootstrapped(
     """
 
     def repeat(truth: BestFit, count: int = count) -> Refits:
-        def refit(number: int) -> BestFit | None:
+        fits = []
+        for number in range(count):
             # The same random numbers for each field, so that
             # differences between fields are not due to chance.
             rng = np.random.default_rng([seed, number])
-            try:
-                again = estimate(truth.simulate(rng), truth.setting, truth)
-            except InputError:
-                return None
-            meter.advance()
-            return again
-
-        # More threads would wait for each other, as most of the time is
-        # in Python's own code.
-        results = in_threads(refit, range(count), workers=1)
-        fits = [result for result in results if result is not None]
+            with suppress(InputError):
+                fits.append(estimate(truth.simulate(rng), truth.setting, truth))
+                meter.advance()
         if len(fits) < MIN_REPETITIONS:
             raise NotRepeated(truth.setting.marginal, len(fits), count)
         return Refits(truth, fits)
@@ -126,19 +122,18 @@ def bootstrapped(
     with Meter("fit_field", total, progress) as meter:
         repeated = [repeat(fitted)]
         if ends:
-            repeated += [repeat(truth) for truth in at_ends(repeated[0], confidence)]
+            repeated += [repeat(truth) for truth in at_ends(repeated[0])]
         return repeated, [repeat(*other) for other in further]
 
 
-def at_ends(around: Refits, confidence: float) -> list[BestFit]:
+def at_ends(around: Refits) -> list[BestFit]:
     """Return the field with its correlation length at both ends of a first interval (step 5)."""
     fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
     moved = []
-    scale, tail = Scale("correlation_length"), 0.5 * (1.0 - confidence)
-    for share in (tail, 1.0 - tail):
+    likely_lengths = Scale("correlation_length").less(fitted, around)
+    for end in np.quantile(likely_lengths, TAILS, method="weibull"):
         vector = family.vector_of(fitted.model)
-        end = np.quantile(scale.less(fitted, around), share, method="weibull")
         vector[place] = np.clip(end, *family.limits[place])
         moved.append(replace(fitted, model=family.model(vector, fitted.model.shares)))
     return moved
@@ -199,13 +194,11 @@ def scale_of(name: str, repeated: Sequence[Refits]) -> Scale:
     return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
 
-def intervals(
-    repeated: Sequence[Refits], confidence: float, values: Array
-) -> dict[str, tuple[float, float]]:
+def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[float, float]]:
     """Return the interval of each parameter (steps 2 to 6). `values` are measured, with noise."""
     around, *moved = repeated
     fitted, estimated = around.truth, around.truth.parameters
-    tail, shapes = 0.5 * (1.0 - confidence), fitted.setting.marginal.limited_shapes
+    shapes = fitted.setting.marginal.limited_shapes
     lengths = [math.log(one.parameters["efolding_length"]) for one in around.fits]
     result = {}
     for name in estimated:
@@ -218,7 +211,7 @@ def intervals(
         # 3. and 4.
         low, high = (
             float(np.quantile(scale.less(fitted, repetitions), share, method="weibull"))
-            for repetitions, share in ((shorter, tail), (longer, 1.0 - tail))
+            for repetitions, share in zip((shorter, longer), TAILS, strict=True)
         )
         # A noise that is negative by chance is as wide as an estimate of 0.
         if name == "noise" and high <= 0.0:
@@ -226,10 +219,9 @@ def intervals(
         first, last = sorted(scale.back(end, estimated) for end in (low, high))
         # 6.
         if name in shapes and any(held(one, shapes) for one in (fitted, *around.fits)):
-            pairs = (shorter, tail), (longer, 1.0 - tail)
             least, most = (
                 float(np.quantile([one.parameters[name] for one in repetitions.fits], share))
-                for repetitions, share in pairs
+                for repetitions, share in zip((shorter, longer), TAILS, strict=True)
             )
             first, last = min(first, least), max(last, most)
         result[name] = first, last
@@ -238,12 +230,10 @@ def intervals(
     # The removed trend is added to a field, which may take a shape below its limit.
     limits |= {name: (min(LEAST_SHAPE, estimated[name]), math.inf) for name in shapes}
     # Free bounds are searched up to this distance from the values.
-    farthest = values.min() - WIDEST * np.ptp(values), values.max() + WIDEST * np.ptp(values)
-    limits["marginal.low"] = (
-        max(limits["marginal.low"][0], farthest[0]),
-        limits["marginal.low"][1],
-    )
-    limits["marginal.high"] = limits["marginal.high"][0], farthest[1]
+    farthest = WIDEST * np.ptp(values)
+    (lowest, below), (above, _) = limits["marginal.low"], limits["marginal.high"]
+    limits["marginal.low"] = max(lowest, values.min() - farthest), below
+    limits["marginal.high"] = above, values.max() + farthest
     for name in limits.keys() & result.keys():
         ends = limits[name]
         low, high = np.clip(result[name], *ends).tolist()
@@ -263,7 +253,6 @@ def held(fit: BestFit, shapes: Sequence[str]) -> bool:
 
 def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[float, float]]:
     """Return limits for parameters. Bounds of the marginal must lie outside all values."""
-    estimated = fitted.parameters
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
     # Noise may move values beyond the bounds, which lie outside the
@@ -271,19 +260,12 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
     least, most = max(float(quiet.min()), bottom), min(float(quiet.max()), top)
     # Positive values have no negative bound.
     below = 0.0 if values.min() > 0.0 and least > 0.0 else -math.inf, least
-    above = most, math.inf
-    limits = {
+    return {
         "exponent": RANGES["exponent"],
         "anisotropy": RANGES["anisotropy"],
         "marginal.low": below,
-        "marginal.high": above,
+        "marginal.high": (most, math.inf),
     }
-    loc, extent = estimated.get("marginal.loc"), estimated.get("marginal.scale")
-    if loc in (bottom, top):  # otherwise loc is not a bound, such as a mean
-        limits["marginal.loc"] = below if loc == bottom else above
-    if extent is not None and math.isclose(extent, top - bottom):  # a range, not a deviation
-        limits["marginal.scale"] = (most - least, math.inf)
-    return limits
 
 
 def in_field(values: Mapping[str, float]) -> dict[str, float]:

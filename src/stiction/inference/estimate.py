@@ -115,15 +115,10 @@ class BestFit:
     @cached_property
     def parameters(self) -> dict[str, float]:
         """All estimated parameters and derived numbers, by name."""
-        spectrum = self.model.spectrum
-        if self.model.end_seen or not hasattr(spectrum, "untruncated_correlation"):
-            efolding = spectrum.efolding_length
-        else:
-            lags = spectrum.correlation_length * LAGS
-            correlation = spectrum.untruncated_correlation(lags)
-            efolding = float(np.interp(-math.exp(-1.0), -correlation, lags))
+        lags = self.model.spectrum.correlation_length * LAGS
+        correlation = self.model.spectrum.untruncated_correlation(lags)
         values = {
-            "efolding_length": efolding,
+            "efolding_length": float(np.interp(-math.exp(-1.0), -correlation, lags)),
             "mean": float(self.marginal.distribution.mean()),
             "standard_deviation": float(self.marginal.distribution.std()),
         }

@@ -47,7 +47,9 @@ from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Prog
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
 from stiction.inference.bootstrap import (
+    CONFIDENCE,
     MIN_REPETITIONS,
+    TAILS,
     NotRepeated,
     Refits,
     bootstrapped,
@@ -95,8 +97,6 @@ FEW_SPECIMENS = 5
 """Fewest specimens whose scatter determines rare failures."""
 EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 """Step of a sequence modulo 1 that fills [0, 1) evenly."""
-CONFIDENCE = 0.9
-"""Level of the intervals, as everywhere in the package."""
 USUAL_STRENGTH = 1e4
 """Least strength of a usual solid, Pa."""
 INTERVAL_DRAWS = 4000
@@ -375,13 +375,12 @@ def fit_field(
     interface : Interface, optional
         Needed for arrays without coordinates. A warning says if it is too short or too coarse.
     marginal : str, dict or sequence of them
-        'beta', 'lognormal', 'weibull', 'gamma', 'normal' or any continuous distribution of
-        `scipy.stats`. The best of several is chosen (`families`). A table fixes parameters:
-        ``{"type": "beta", "low": 0, "high": 2e6}``. Only 'beta' has free bounds by default.
+        'beta', 'lognormal', 'weibull', 'gamma' or 'normal'. The best of several is chosen
+        (`families`). A table fixes bounds: ``{"type": "beta", "low": 0, "high": 2e6}``. Only
+        'beta' has free bounds by default.
     spectrum : str or dict
         'power_law', 'squared_exponential' or 'exponential', or a table that fixes parameters:
-        ``{"type": "power_law", "exponent": 4.0}``. With ``"power_kept"`` the
-        spectrum of the record is also truncated there.
+        ``{"type": "power_law", "exponent": 4.0}``. The spectrum of a record is not truncated.
     detrend : int
         Degree of the removed polynomial trend, 0 to 3. The mean is kept. The scatter that the
         trend takes on average is added to the estimate.
@@ -474,7 +473,7 @@ def fit_field(
         # 3.
         try:
             repeated, further = bootstrapped(
-                estimates[0], bootstrap, CONFIDENCE, seed, progress,
+                estimates[0], bootstrap, seed, progress,
                 list(zip(estimates[1:], counts, strict=False)),
             )  # fmt: skip
             break
@@ -519,7 +518,7 @@ def _judged(
     """Return parameters, intervals, p-values and doubts. Each field has `count` repetitions."""
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
-    ends = intervals(repeated, CONFIDENCE, np.concatenate(fitted.as_of_one(rows)))
+    ends = intervals(repeated, np.concatenate(fitted.as_of_one(rows)))
     tests = {"marginal": "distance", "spectrum": "roughness"}
     p_values = {name: _p_value(of, fitted, fits) for name, of in tests.items()}
     if levels.size > 1 and not fitted.setting.between:
@@ -535,11 +534,10 @@ def _judged(
         mean, within = parameters["mean"], fitted.within[None]
         grid, _ = grid_of_profiles(Profiles(interfaces, mean, levels, within, families))
         draws = grid.described(grid.draws(INTERVAL_DRAWS, np.random.default_rng(0)))
-        tails = 0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE
         for name in {"mean", "marginal.mean"} & parameters.keys():
-            ends[name] = tuple(np.quantile(draws[MEAN_KEY], tails).tolist())
+            ends[name] = tuple(np.quantile(draws[MEAN_KEY], TAILS).tolist())
         parameters["between"] = float(np.median(draws[SCATTER_KEY]))
-        low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], tails).tolist())
+        low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], TAILS).tolist())
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
                 f"{len(rows)} specimen(s) leave the scatter between specimens at {low:.2g} to"

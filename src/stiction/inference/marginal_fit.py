@@ -24,8 +24,8 @@ Steps:
    information M. Divide the damping by 10 after a step that raises the
    likelihood, and multiply it by 10 otherwise. Hold parameters that are
    at their limits. Stop after a small gain.
-4. scipy fits families of `scipy.stats`. The values are first shrunk to
-   the variance that they would have without noise.
+4. A normal marginal has the mean of the values, and the variance that
+   they would have without noise.
 """
 
 import math
@@ -34,7 +34,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.stats
 from scipy.special import betainc, betaln, gammainc, ndtr
 
 from stiction.base.arrays import Array
@@ -43,6 +42,7 @@ from stiction.base.model import Real, check, describe
 from stiction.random.dotted_keys import with_values
 from stiction.random.marginals import MARGINALS, Beta, ScipyMarginal, marginal_of
 
+NORMAL = "normal"
 BINS = 160
 NOISE_DEVIATIONS = 5.0
 """Standard deviations of the noise up to which its distribution is summed."""
@@ -91,8 +91,6 @@ KINDS: dict[str, tuple[Callable[..., Array], Callable[..., Array]]] = {
 }
 """Families that are fitted here: distribution function and log density of (value - loc)/scale.
 The functions of scipy check their arguments, which takes longer than the functions themselves."""
-SCIPYS = {"normal": "norm"}
-"""Names of scipy for our names of families."""
 
 
 class Search(NamedTuple):
@@ -119,8 +117,8 @@ class Family:
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
         """Fit the marginal to values with noise of this standard deviation (steps 1 to 4)."""
         quiet = self.quiet(values, noise)
-        if self.name not in KINDS:
-            return self._by_scipy(quiet)
+        if self.name == NORMAL:  # 4.
+            return normal_of(float(quiet.mean()), float(quiet.std()))
         # 1. Without noise, values must lie within the bounds of the family.
         if noise**2 <= NEGLIGIBLE_NOISE * values.var():
             noise, values = 0.0, quiet
@@ -162,16 +160,6 @@ class Family:
         mean, variance = map(float, family._scipy_family.stats(*parameters))
         return family(mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
 
-    def _by_scipy(self, values: Array) -> Any:
-        # 4.
-        family = getattr(scipy.stats, SCIPYS.get(self.name, self.name))
-        places = {"loc": "floc", "scale": "fscale"}
-        fixed = {places.get(key, f"fix_{key}"): value for key, value in self.fixed.items()}
-        try:
-            return marginal_of(family(*family.fit(values, **fixed)))
-        except Exception as error:  # families of scipy raise many kinds of errors
-            raise InputError(f"marginal: scipy cannot fit {self.name!r}: {error}") from None
-
     def quiet(self, values: Array, noise: float) -> Array:
         """Return values shrunk to their variance without noise, within the bounds."""
         mean, variance = float(values.mean()), float(values.var())
@@ -190,26 +178,19 @@ class Family:
     def widened(self, marginal: Any, factor: float) -> Any:
         """Return the marginal with the same mean and `factor` times the standard deviation.
 
-        Fixed parameters do not change. A distribution of scipy with a
-        fixed loc or scale is returned unchanged.
+        Fixed parameters do not change.
         """
-        free, mean = self.parameters(marginal), float(marginal.distribution.mean())
-        moved: dict[str, Any] = {
-            n: mean + factor * (free[n] - mean) for n in ("low", "high", "loc") if n in free
-        }
-        if isinstance(marginal, ScipyMarginal):
-            if "loc" not in free or "scale" not in free:
-                return marginal
-            return marginal_of(with_values(marginal, moved | {"scale": factor * free["scale"]}))
+        mean = float(marginal.distribution.mean())
+        deviation = factor * float(marginal.distribution.std())
+        if self.name == NORMAL:
+            return normal_of(mean, deviation)
         if not isinstance(marginal, Beta):
             return replace(marginal, cv=factor * marginal.cv)
-        if "low" in moved and marginal.low >= 0.0:
-            moved["low"] = max(moved["low"], 0.0)
+        low, high = (mean + factor * (end - mean) for end in (marginal.low, marginal.high))
+        if marginal.low >= 0.0:
+            low = max(low, 0.0)
         # A fixed bound stays, so the shapes must follow from the moments.
-        deviation = factor * float(marginal.distribution.std())
-        return beta_of(
-            mean, deviation, moved.get("low", marginal.low), moved.get("high", marginal.high)
-        )
+        return beta_of(mean, deviation, **{"low": low, "high": high} | self.fixed)
 
     @property
     def limited_shapes(self) -> tuple[str, ...]:
@@ -238,6 +219,11 @@ def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
     u, extent = (mean - low) / (high - low), high - low
     total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
     return Beta(alpha=total * u, beta=total * (1.0 - u), low=low, high=high)
+
+
+def normal_of(mean: float, deviation: float) -> Any:
+    """Return the normal distribution with these moments."""
+    return marginal_of({"type": "norm", "loc": mean, "scale": deviation})
 
 
 def _all_parameters(marginal: Any) -> dict[str, float]:
@@ -269,18 +255,13 @@ def family_of(given: Any) -> Family:
     """Return the family for a name, or for a table with some parameters."""
     fixed = family_table(given)
     name = str(fixed.pop("type", None))
-    if name in KINDS:
-        known = ["low", "high"] if name == "beta" else ["low"]
-    else:
-        family = getattr(scipy.stats, SCIPYS.get(name, name), None)
-        if not isinstance(family, scipy.stats.rv_continuous):
-            raise InputError(unknown_name("type", name, [*KINDS, *SCIPYS, "uniform"]))
-        known = [*(family.shapes or "").replace(" ", "").split(","), "loc", "scale"]
+    if name not in (*KINDS, NORMAL):
+        raise InputError(unknown_name("type", name, [*KINDS, NORMAL]))
+    known = {"beta": ["low", "high"], NORMAL: []}.get(name, ["low"])
     if problems := [unknown_name(name, key, known) for key in fixed if key not in known]:
         raise InputError(problems)
-    zero = {"low": 0.0} if name in KINDS and name != "beta" else {}
-    stated = {key: check(f"{name}.{key}", value, Real) for key, value in fixed.items()}
-    return Family(name, zero | stated)
+    usual = {"low": 0.0} if known == ["low"] else {}
+    return Family(name, usual | {k: check(f"{name}.{k}", v, Real) for k, v in fixed.items()})
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:

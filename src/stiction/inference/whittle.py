@@ -45,6 +45,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from stiction.base.arrays import Array
+from stiction.base.errors import InputError
 from stiction.base.kinds import from_table
 from stiction.inference.marginal_fit import climb, family_table
 from stiction.inference.window import RecordWindow
@@ -116,10 +117,9 @@ def periodograms_of(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> l
 class Model(NamedTuple):
     """Prediction of records from a spectrum, the Hermite fractions of a marginal and noise.
 
-    `end_seen` states whether the truncation of the spectrum was given.
-    If not, the truncation is left out: it lies at a multiple of 1/xi_0,
-    and would determine the correlation length if it fell among the
-    wavenumbers of a record.
+    The truncation of the spectrum is left out: it lies at a multiple of
+    1/xi_0, and would determine the correlation length if it fell among
+    the wavenumbers of a record.
     """
 
     spectrum: Any
@@ -127,7 +127,6 @@ class Model(NamedTuple):
     noise_share: float  # of the variance; negative only during the search
     variance: float  # of the values with noise
     shares: Array
-    end_seen: bool
 
     @property
     def noise(self) -> float:
@@ -136,7 +135,7 @@ class Model(NamedTuple):
 
     def power(self, window: RecordWindow) -> Array:
         """Return the variance of z in each mode on the periodic grid of a window."""
-        return window.power(self.spectrum, self.anisotropy, end_seen=self.end_seen)
+        return window.power(self.spectrum, self.anisotropy)
 
     def correlation(self, window: RecordWindow) -> Array:
         """Return the correlation of values without noise at all lags (step 2)."""
@@ -162,6 +161,10 @@ def offset(name: str) -> float:
 def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name and the fixed parameters of a spectrum family, after checks."""
     table = family_table(given)
+    if "power_kept" in table:
+        raise InputError(
+            "power_kept: does not apply to a fit of the whole spectrum. Leave it out"
+        )
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
 
@@ -204,11 +207,8 @@ class SpectrumFamily:
         anisotropy = values.pop("anisotropy", self.anisotropy or 1.0)
         known = min((self.noise or 0.0) ** 2 / variance, RANGES["noise_share"][1])
         noise = values.pop("noise_share", known)
-        options = self.fixed | values
-        end_given = "power_kept" in options
-        return Model(
-            SPECTRA[self.name](**options), anisotropy, noise, variance, shares, end_given
-        )
+        spectrum = SPECTRA[self.name](**self.fixed, **values)
+        return Model(spectrum, anisotropy, noise, variance, shares)
 
     def vector(self, values: Sequence[float]) -> Array:
         """Return free parameters on the scale of the search."""

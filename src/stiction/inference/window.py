@@ -33,7 +33,8 @@ aliases in step 4.
 
 import itertools
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,15 +59,8 @@ FOLDS = 6
 NEAR, FEW = 1, {1: 65, 2: 33}
 """Multiples that need all wavenumbers, and number of wavenumbers per direction for the others."""
 
-SHARES_OF_LINE = np.linspace(0.0, 1.0, FEW[1])
 
-
-class Edge(NamedTuple):
-    """Wavenumber at the end of a spectrum, and width of the range over which it fades out,
-    rad/m."""
-
-    at: float
-    width: float
+Density = Callable[[Array], Array]
 
 
 class RecordWindow:
@@ -158,27 +152,30 @@ class RecordWindow:
         result[self._low] = self._exact @ covariance.ravel()
         return result
 
-    def power(self, spectrum: Any, anisotropy: float = 1.0, *, end_seen: bool = True) -> Array:
+    def power(self, spectrum: Any, anisotropy: float = 1.0) -> Array:
         """Return the variance of z in each mode on a periodic grid. The sum is 1 (step 4).
 
         Power above `FOLDS` sampling wavenumbers is spread evenly. The
-        spectrum fades out at its truncation. If `end_seen` is false,
-        the spectrum is not truncated, because the missing power of a
-        rough spectrum would be mistaken for noise.
+        spectrum is not truncated, because the missing power of a rough
+        spectrum would be mistaken for noise.
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
         sampling = [a * 2.0 * math.pi / d for a, d in zip(stretch, self.spacings, strict=True)]
-        if end_seen:
-            cutoff = spectrum.cutoff(dimensions)
-        else:
-            cutoff = max(spectrum.quantile(1.0 - LEFT_OUT, dimensions), *sampling)
+        cutoff = max(spectrum.quantile(1.0 - LEFT_OUT, dimensions), *sampling)
         folds = [min(FOLDS, math.ceil(cutoff / s + 0.5)) for s in sampling]
         end = min(cutoff, *(s * (f + 0.5) for s, f in zip(sampling, folds, strict=True)))
         axes = [s * of_period for s, of_period in zip(sampling, self._of_period, strict=True)]
         width = EDGE * max(s / n for s, n in zip(sampling, self._period, strict=True))
         folded = _folded_line if dimensions == 1 else _folded_plane
-        total = folded(spectrum, axes, folds, sampling, Edge(end, width))
+
+        def density(k: Array) -> Array:
+            """Return the density, which fades out at its end."""
+            fade = np.minimum(np.maximum((end - k) / width + 0.5, 0.0), 1.0)
+            faded: Array = spectrum.density(k, dimensions) * fade
+            return faded
+
+        total = folded(density, axes, folds, sampling, end + width)
         missed = 0.0
         if end < cutoff:
             kept = [spectrum.power_within(k, dimensions) for k in (end, cutoff)]
@@ -222,42 +219,34 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
     return np.linalg.qr(np.stack([term[measured] for term in terms], axis=1))[0]
 
 
-def _fade(k: Array, end: Edge) -> Array:
-    return np.minimum(np.maximum((end.at - k) / end.width + 0.5, 0.0), 1.0)
-
-
 def _folded_line(
-    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
+    density: Density, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
     """Return the sum of the density over all wavenumbers with the same alias on the grid."""
 
     def added(at: Array, multiples: Array) -> Array:
-        k = np.abs(at + multiples[:, None] * sampling[0])
-        total: Array = (spectrum.density(k) * _fade(k, end)).sum(axis=0)
+        total: Array = density(np.abs(at + multiples[:, None] * sampling[0])).sum(axis=0)
         return total
 
     near = min(folds[0], NEAR)
     line = added(axes[0], np.arange(-near, near + 1))
     if folds[0] > near:  # smooth from there on
         far = np.arange(near + 1, folds[0] + 1)
-        few = axes[0][-1] * SHARES_OF_LINE
+        few = np.linspace(0.0, axes[0][-1], FEW[1])
         line += np.interp(axes[0], few, added(few, np.concatenate([-far, far])))
     return line
 
 
 def _folded_plane(
-    spectrum: Any, axes: list[Array], folds: list[int], sampling: list[float], end: Edge
+    density: Density, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
     few = [np.linspace(axis.min(), axis.max(), FEW[2]) for axis in axes]
     near, far = np.zeros((axes[0].size, axes[1].size)), np.zeros((FEW[2], FEW[2]))
-    for p in range(-folds[0], folds[0] + 1):
-        for q in range(-folds[1], folds[1] + 1):
-            is_near = max(abs(p), abs(q)) <= NEAR
-            total, at = (near, axes) if is_near else (far, few)
-            kx, ky = at[0] + p * sampling[0], at[1] + q * sampling[1]
-            k = np.hypot(kx[:, None], ky[None, :])
-            if k.min() <= end.at + end.width:
-                total += spectrum.density(k, 2) * _fade(k, end)
+    for p, q in itertools.product(*(range(-fold, fold + 1) for fold in folds)):
+        total, at = (near, axes) if max(abs(p), abs(q)) <= NEAR else (far, few)
+        k = np.hypot(*np.ix_(at[0] + p * sampling[0], at[1] + q * sampling[1]))
+        if k.min() <= end:
+            total += density(k)
     rows = np.stack([np.interp(axes[1], few[1], row) for row in far])
     columns = [np.interp(axes[0], few[0], column) for column in rows.T]
     return near + np.stack(columns, axis=1)

@@ -1,23 +1,9 @@
-"""Random properties as stresses. Friction coefficients are multiplied by the pressure.
+"""Random properties as stresses. Friction coefficients are multiplied by the pressure."""
 
-`share_below_residual` estimates the fraction of the strength that does not
-exceed the residual strength. The algorithm is our own:
-
-1. Replace the residual strength by equally likely values.
-2. Some factors apply to only one of the two strengths: factors between
-   specimens, and the pressure if one strength is a coefficient.
-   Multiply or divide by equally likely values of each such factor.
-3. Average the distribution function of the strength over these values.
-   If the two strengths are correlated, take the distribution of the
-   strength given the residual strength.
-"""
-
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
@@ -26,12 +12,8 @@ from stiction.problem.sample import constants_of, pressing_of
 from stiction.problem.specimen import UNFIT_FOR_SLIDER, Slider
 from stiction.random.fields import FACTOR, RandomInterface
 
-# Fractions of the strength at or below the residual strength: the largest
-# without a warning, and the largest that is accepted.
-MAX_SILENT_SHARE, MAX_SHARE = 1e-6, 0.5
-# Numbers of equally likely values of a random residual strength, and of
-# a pressure or factor.
-RESIDUAL_QUANTILES, PRESSURE_QUANTILES = 2000, 64
+MAX_SHARE = 0.5
+"""Largest fraction of nodes that do not weaken."""
 
 
 def coefficients_of(random: RandomInterface) -> list[str]:
@@ -120,26 +102,6 @@ def support_in_stress(
     return float(low), float(high)
 
 
-def _equally_likely(marginal: Any, count: int) -> Array:
-    return marginal.distribution.ppf((np.arange(count) + 0.5) / count)
-
-
-def _pressures(problem: Problem, random: RandomInterface) -> Array:
-    """Return equally likely pressures at a point, Pa."""
-    pressure = problem.normal_pressure
-    if "normal_pressure" in random.names:
-        field = random.properties["normal_pressure"]
-        levels = _equally_likely(field.marginal, PRESSURE_QUANTILES)
-        pressure = np.multiply.outer(levels, pressing_of(problem))
-    for key in {"normal_pressure", "pressing_force"} & {*(random.between or {})}:
-        factors = _equally_likely((random.between or {})[key], PRESSURE_QUANTILES)
-        pressure = np.multiply.outer(factors, pressure)
-    flat = np.sort(np.ravel(pressure))
-    # Evenly spaced ranks of the sorted pressures are equally likely, too.
-    ranks = np.linspace(0, flat.size - 1, min(flat.size, PRESSURE_QUANTILES))
-    return flat[ranks.round().astype(int)]
-
-
 def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> float:
     """Return the mean of a property, Pa. Factors between specimens have mean 1."""
     field, pressure = random.properties[name], problem.normal_pressure
@@ -150,53 +112,23 @@ def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> floa
     return field.mean * float(np.mean(pressure))
 
 
-def share_below_residual(problem: Problem, random: RandomInterface) -> float:
-    """Return the probability that the strength at a point is not above the residual strength.
+def check_residual(problem: Problem, profiles: Mapping[str, Array]) -> None:
+    """Warn if the strength of some nodes in sampled profiles, Pa, is not above the residual one.
 
-    Properties are assumed to be independent, except strength and
-    residual strength.
+    These nodes do not weaken. If they are more than half of all nodes,
+    an `InputError` is raised.
     """
-    fields, between = random.properties, random.between or {}
-    pressed = coefficients_of(random)
-    # 1.
-    residual = np.asarray(problem.friction.residual_strength)
-    if "residual_strength" in fields:
-        residual = _equally_likely(fields["residual_strength"].marginal, RESIDUAL_QUANTILES)
-    # 2. A pressure on both strengths cancels.
-    one_sided = ("strength" in pressed) != ("residual_strength" in pressed)
-    for name, power in (("residual_strength", 1.0), ("strength", -1.0)):
-        if name in between:
-            factors = _equally_likely(between[name], PRESSURE_QUANTILES)
-            residual = np.outer(residual, factors**power)
-        if one_sided and name in pressed:
-            residual = np.outer(residual, _pressures(problem, random) ** power)
-    # 3.
-    below = fields["strength"].marginal.distribution.cdf(residual)
-    rho = (random.correlation or {}).get("strength", {}).get("residual_strength", 0.0)
-    if rho:  # given a residual strength, the strength's z is normal with mean rho z
-        z = ndtri((np.arange(RESIDUAL_QUANTILES) + 0.5) / RESIDUAL_QUANTILES)[:, None]
-        deviation = math.sqrt(max(1.0 - rho**2, 1e-12))
-        below = ndtr((ndtri(below.reshape(RESIDUAL_QUANTILES, -1)) - rho * z) / deviation)
-    return float(np.mean(below))
-
-
-def check_residual(problem: Problem, random: RandomInterface) -> None:
-    """Warn if a fraction of the strength above 1e-6 does not exceed the residual strength.
-
-    Nodes with such a strength do not weaken. A fraction above a half
-    raises an `InputError`.
-    """
-    share = share_below_residual(problem, random)
-    if share <= MAX_SILENT_SHARE:
-        return
-    low, high = support_in_stress(problem, random, "strength")
+    strength = profiles["strength"]
+    residual = profiles.get("residual_strength", problem.friction.residual(strength))
+    share = float(np.mean(strength <= residual))
     text = (
-        f"strength: {100.0 * share:.3g} % of its marginal, which reaches from {low:g} to"
-        f" {high:g} Pa, lies at or below the residual strength"
+        f"strength: {100.0 * share:.3g} % of the nodes in the first {len(strength)} sample(s) lies"
+        " at or below the residual strength"
     )
     if share > MAX_SHARE:
         raise InputError(
             f"{text}: most of the interface would not weaken at all. Raise the strength, lower"
             " the residual strength, or check the unit of both (Pa)"
         )
-    warn_accuracy(f"{text}, so that these nodes do not weaken. Lower it if they should")
+    if share:
+        warn_accuracy(f"{text}, so that these nodes do not weaken. Lower it if they should")
