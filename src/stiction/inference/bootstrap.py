@@ -153,23 +153,23 @@ class Scale(NamedTuple):
 
     def to(self, values: Mapping[str, float]) -> float:
         """Return a parameter on this scale."""
-        name, value = self.name, values[self.name]
-        if name == "noise":
+        value, (origin, side) = values[self.name], self._origin(values)
+        if self.name == "noise":
             return value**2
-        if self.linear:
-            return value
-        away = SIDES[name] * (value - values["mean"]) if name in SIDES else value - offset(name)
-        return math.log(max(away, 1e-300))
+        return value if self.linear else math.log(max(side * (value - origin), 1e-300))
 
     def back(self, at: float, values: Mapping[str, float]) -> float:
         """Return a parameter from this scale."""
-        name = self.name
-        if name == "noise":
+        origin, side = self._origin(values)
+        if self.name == "noise":
             return math.sqrt(max(at, 0.0))
-        if self.linear:
-            return at
-        away = math.exp(at)
-        return values["mean"] + SIDES[name] * away if name in SIDES else offset(name) + away
+        return at if self.linear else origin + side * math.exp(at)
+
+    def _origin(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Return the origin of the logarithm, and the side of it on which values lie."""
+        if self.name in SIDES:
+            return values["mean"], SIDES[self.name]
+        return offset(self.name), 1.0
 
     def of(self, fitted: BestFit) -> tuple[float, float]:
         """Return an estimate on this scale, and the width of step 3."""

@@ -51,11 +51,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2
+from scipy.stats import chi2, ks_1samp
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, UnitWarning, collect_warnings, issue
-from stiction.inference.marginal_fit import Family, kolmogorov_distance, mean_log_likelihood
+from stiction.inference.marginal_fit import Family, mean_log_likelihood
 from stiction.inference.records import Record
 from stiction.inference.whittle import (
     Model,
@@ -132,15 +132,12 @@ class BestFit:
 
     def field(self, quantity: str) -> RandomField:
         """Return the field for simulations."""
-        anisotropy = self.model.anisotropy if self.model.anisotropy != 1.0 else None
-        of: Any = quantity if quantity == "friction_coefficient" else None
-        return RandomField(
-            self.marginal,
-            self.model.spectrum,
-            mean_mode=True,
-            anisotropy=anisotropy,
-            quantity=of,
-        )
+        options: Any = {"mean_mode": True}
+        if self.model.anisotropy != 1.0:
+            options["anisotropy"] = self.model.anisotropy
+        if quantity == "friction_coefficient":
+            options["quantity"] = quantity
+        return RandomField(self.marginal, self.model.spectrum, **options)
 
     def simulate(self, rng: np.random.Generator) -> list[Array]:
         """Simulate the measured values (points,) of each record, with noise."""
@@ -191,9 +188,8 @@ class BestFit:
         """Number of correlation lengths (on planes, correlation areas) in all records together."""
         windows, length = self.setting.windows, self.model.spectrum.correlation_length
         area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
-        if windows[0].measured.ndim == 1:
-            return area / length
-        return area / (length * length * self.model.anisotropy)
+        across = length * self.model.anisotropy if windows[0].measured.ndim == 2 else 1.0
+        return area / (length * across)
 
     def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
         """Return records without the scatter between specimens, if it is estimated."""
@@ -250,13 +246,14 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
         for group in observed
         for _, measured, predicted in bands(group, model.expectation(group.window))
     ]
+    quiet = setting.marginal.quiet(values, model.noise)
     # 3.
     return BestFit(
         setting=setting,
         marginal=setting.marginal.widened(marginal, _left(setting.windows, model) ** -0.5),
         of_values=marginal,
         model=model,
-        distance=kolmogorov_distance(marginal, setting.marginal.quiet(values, model.noise)),
+        distance=float(ks_1samp(quiet, marginal.distribution.cdf, method="asymp").statistic),
         roughness=float(np.mean(np.square(ratios))),
         noise=likelihood.noise_variance(vector, state) if family.noise is None else (0.0, 0.0),
     )

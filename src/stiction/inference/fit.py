@@ -82,7 +82,6 @@ from stiction.random.fields import RandomField, RandomInterface
 USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
 """Correlation lengths that a record must hold to constrain parameters well."""
-FIXED = {"exponent": ", as in spectrum={'type': 'power_law', 'exponent': 4}"}
 MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
@@ -248,9 +247,8 @@ class FieldFit(WithFactors, Result):
             return self._scattered([RandomInterface(strength=field) for field in chosen])
         # The mean and the factor follow from the posterior given the
         # chosen field.
-        numbers = {field: number for number, field in enumerate(self._every)}
         rng = np.random.default_rng([seed, 6])
-        drawn = self._posterior.draws(count, rng, [numbers[field] for field in chosen])
+        drawn = self._posterior.draws(count, rng, [self._numbers[field] for field in chosen])
         return self._scattered(list(map(self._posterior.interface, drawn)))
 
     def prediction(
@@ -287,14 +285,15 @@ class FieldFit(WithFactors, Result):
         return [self._likely[number][next(orders[number])] for number in family.tolist()]
 
     @cached_property
-    def _every(self) -> list[RandomField]:
-        """All likely fields, in the order in which the posterior numbers the fields."""
-        return list(dict.fromkeys(chain.from_iterable(self._likely)))
+    def _numbers(self) -> dict[RandomField, int]:
+        """All likely fields, with their numbers in the posterior."""
+        fields = dict.fromkeys(chain.from_iterable(self._likely))
+        return {field: number for number, field in enumerate(fields)}
 
     @cached_property
     def _posterior(self) -> FactorGrid:
         """Posterior of mean and scatter between specimens, given the levels of the profiles."""
-        return grid_of_profiles(self._with_levels(self._every))[0]
+        return grid_of_profiles(self._with_levels(list(self._numbers)))[0]
 
     def profiles(self, count: int, seed: int) -> Profiles:
         """Return likely fields and the record levels, for the posterior with peaks."""
@@ -575,7 +574,7 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
         )
     doubts += [
         f"{name} {value:.3g} lies at an end of the searched range. The data do not determine it."
-        f" Fix its value{FIXED.get(name, '')}"
+        " Fix its value in spectrum= or anisotropy="
         for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [

@@ -348,13 +348,6 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     return float(counts @ np.log(expected) / values.size)
 
 
-def kolmogorov_distance(marginal: Any, values: Array) -> float:
-    """Return Kolmogorov's distance, the largest difference between the distribution functions."""
-    below = marginal.distribution.cdf(np.sort(values))
-    steps = np.arange(values.size + 1) / values.size
-    return float(max((steps[1:] - below).max(), (below - steps[:-1]).max()))
-
-
 def climb(
     at: Array,
     limits: Array,

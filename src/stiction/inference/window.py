@@ -86,14 +86,12 @@ class RecordWindow:
         self.basis = _polynomials(measured, degree)
         ones = np.ones(int(measured.sum()))
         self.pairs = self.products(ones)  # number of pairs of measured points by lag
-        trend = np.zeros_like(self.pairs)
-        self._of_trend = sum((self.products(one) for one in self.basis.T[1:]), start=trend)
+        self._of_trend: Any = sum(self.products(term) for term in self.basis.T[1:])
         # 2.
         tapers = np.ix_(*[tukey(2 * n + 1, TAPERED)[1::2] for n in self.shape])  # nowhere zero
         self.taper = np.prod(np.broadcast_arrays(measured, *tapers), axis=0)
         self.taper /= np.sqrt(np.sum(self.taper**2))
-        lags = tuple(2 * n for n in self.shape)
-        self._spread = fft.irfftn(np.abs(fft.rfftn(self.taper, lags)) ** 2, lags)
+        self._spread = self.products(self.taper[measured])
         # 3.
         most = [min(exact, (n - 1) // 2) for n in self.shape]
         numbers = [np.arange(-m, m + 1) for m in most]
@@ -101,14 +99,14 @@ class RecordWindow:
         low = np.array(list(itertools.product(*numbers)))
         self._low = tuple(low.T)
         self._exact = np.stack([self._autocorrelation(wave) for wave in low])
-        unit = np.zeros(lags)
-        unit[(0,) * unit.ndim] = 1.0
+        unit = np.zeros_like(self.pairs)
+        unit.flat[0] = 1.0
         self.white = self.expectation(unit)  # of white noise
         # One half if both k and -k are there or k is its own opposite,
         # and 0 for the mean.
         self.weights = np.ones(self.white.shape)
         self.weights[..., [0, -1] if self.shape[-1] % 2 == 0 else 0] = 0.5
-        self.weights[(0,) * unit.ndim] = 0.0
+        self.weights.flat[0] = 0.0
 
     def products(self, weights: Array) -> Array:
         """Return, for each lag, the sum of w_i w_j over measured pairs."""

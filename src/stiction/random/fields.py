@@ -177,8 +177,9 @@ class RandomField(Listed):
         too short for a field without mean mode.
         """
         self._alone.warn_if_inaccurate(interface)
-        profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
-        return profiles["strength"]
+        return self._alone.profiles(interface, samples=samples, seed=seed, first=first)[
+            "strength"
+        ]
 
     @cached_property
     def _alone(self) -> RandomInterface:
@@ -360,11 +361,10 @@ class RandomInterface(Listed):
         if len(scales) > 1:
             problems.append(f"give one of {', '.join(SCALES)}, got {' and '.join(scales)}")
         correlated, between = self.correlation or {}, self.between or {}
-        tables = (
-            ("correlation", [*correlated, *chain(*correlated.values())], self.names),
-            ("between", [*between], FACTORS),
-        )
-        for table, given, valid in tables:
+        named = [*correlated, *chain(*correlated.values())]
+        for table, given, valid in (
+            ("correlation", named, self.names), ("between", between, FACTORS)
+        ):  # fmt: skip
             problems += [
                 unknown_name(table, name, valid) for name in given if name not in valid
             ]
