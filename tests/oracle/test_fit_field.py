@@ -190,12 +190,12 @@ def test_families_are_compared_by_one_number_of_independent_values():
     rho = fit._estimate.model.correlation(window)[:64]
     places = np.arange(64)
     independent = 3 * 64**2 / np.sum(rho[abs(places[:, None] - places)] ** 3)
-    assert fit.independent == pytest.approx(independent, rel=0.01)
+    assert fit._estimate.independent == pytest.approx(independent, rel=0.01)
     scores = {}
     for given, parameters in zip(several["marginal"], (2, 2, 2, 3), strict=True):
         family = family_of(given)
         likelihood = family.fit(rows.ravel()).distribution.logpdf(rows.ravel()).mean()
-        scores[family.label] = fit.independent * likelihood - parameters
+        scores[family.label] = fit._estimate.independent * likelihood - parameters
     best = max(scores.values())
     found = {name: one.score for name, one in fit.families.items()}
     assert found == pytest.approx({n: s - best for n, s in scores.items()}, abs=0.01)

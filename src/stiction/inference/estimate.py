@@ -325,8 +325,8 @@ def windowed(
 
 def ranking(
     settings: Sequence[FitSetting], rows: Sequence[Array]
-) -> tuple[list[BestFit], dict[str, Goodness], float]:
-    """Return estimates (best family first), their qualities, and the number of values (step 5).
+) -> tuple[list[BestFit], dict[str, Goodness]]:
+    """Return estimates (best family first), and their qualities by name of the family.
 
     Families that cannot be fitted are left out. If all families fail,
     an `InputError` is raised.
@@ -365,7 +365,7 @@ def ranking(
         )
         for place, member in zip(best_first, estimates, strict=True)
     }
-    return estimates, families, independent
+    return estimates, families
 
 
 def levels_of(rows: Sequence[Array]) -> Array:
@@ -382,13 +382,11 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     `within` holds the variances v_k.
     """
     levels = levels_of(rows)
-    if levels.size < 2:
-        return list(rows)
     logarithms = np.log(levels)
     # Records of a uniform field have no variance of their own.
     weight = 1.0 / np.maximum(within, 1e-300)
     away = logarithms - weight @ logarithms / weight.sum()
-    excess = max(float(weight @ away**2) / (levels.size - 1), 1e-300)
+    excess = max(float(weight @ away**2) / max(levels.size - 1, 1), 1e-300)
     wanted = np.exp(away / math.sqrt(excess))
     # The mean over all records stays.
     factors = wanted / wanted.mean() * levels.mean() / levels

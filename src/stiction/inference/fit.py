@@ -151,8 +151,6 @@ class FieldFit(WithFactors, Result):
     families : dict from str to Goodness
         Quality of the fit for each requested family. The best family
         comes first.
-    independent : float
-        Independent values on which the scores in `families` are based.
     p_values : dict from str to float
         Probability that records with the fitted ``marginal`` and
         ``spectrum`` differ from their fits as much as the data do. A
@@ -171,7 +169,6 @@ class FieldFit(WithFactors, Result):
     interval: Mapping[str, tuple[float, float]]
     repetitions: tuple[RandomField, ...]
     families: Mapping[str, Goodness]
-    independent: float
     p_values: Mapping[str, float]
     missing: tuple[int, int]
     quantity: str
@@ -463,7 +460,7 @@ def fit_field(
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
     while True:
         # 2.
-        estimates, families, independent = ranking(settings, rows)
+        estimates, families = ranking(settings, rows)
         # A family that is rarely drawn needs few repetitions.
         weights = [one.weight for one in families.values() if one.weight > 0.0]
         counts = [
@@ -491,7 +488,6 @@ def fit_field(
         field=field,
         repetitions=tuple(one.field(quantity) for one in repeated[0].fits),
         families=families,
-        independent=independent,
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
         _repeated=[repeated[0], *further],

@@ -81,8 +81,7 @@ MAX_ERRORS_OUTSIDE = 4.0  # errors by which a measured value may lie beyond a bo
 MAX_Z = 37.0  # largest z whose tail of the normal distribution is a float
 HALF_WIDTH = 8.0  # half a range, in standard deviations
 RANGE_NODES = 49  # across a range
-MIN_END_FALL = 18.0  # drop of a log density from its peak to the ends of a complete range
-MAX_NARROWINGS = 6  # of a range around a peak, each to two of its intervals at least
+MAX_NARROWINGS = 10  # of a range around a peak, each to two of its intervals at least
 MIN_HALF_RANGE = 1e-12
 LOG_OF_IMPOSSIBLE = -1e9  # lowest logarithm of a likelihood
 
@@ -231,38 +230,21 @@ class Measured(NamedTuple):
         above = np.concatenate([law.sf(part) for law, part in parts])
         likely = np.where(below < 0.5, ndtri(below), -ndtri(above)).clip(-MAX_Z, MAX_Z).T
         width = HALF_WIDTH * np.sqrt(variance)
-        low, high = np.maximum(likely[0], mean - width), np.minimum(likely[1], mean + width)
-        overlap = low < high
-        low, high = np.where(overlap, (low, high), (mean - width, mean + width))
-
-        def evaluate() -> tuple[Array, Array, Array]:
+        # If a value contradicts the others, the product peaks between both
+        # ranges. Search both, and narrow the search around the peak.
+        low, high = np.minimum(likely[0], mean - width), np.maximum(likely[1], mean + width)
+        rows, last_node = np.arange(len(mean)), RANGE_NODES - 1
+        for _ in range(MAX_NARROWINGS):
             half_range = np.maximum(0.5 * (high - low), MIN_HALF_RANGE)[:, None]
             z = 0.5 * (low + high)[:, None] + half_range * np.linspace(-1.0, 1.0, RANGE_NODES)
             square = (z - mean[:, None]) ** 2 / variance[:, None]
             log_density = self.log_likelihood(z) - 0.5 * square
-            return half_range, z, log_density
-
-        half_range, z, log_density = evaluate()
-        # If a value contradicts the others, the product peaks outside
-        # the range or at its end. Then search both ranges, and narrow
-        # the search around the peak.
-        ends = log_density[:, [0, -1]].max(axis=1)
-        apart = ~overlap | (ends > log_density.max(axis=1) - MIN_END_FALL)
-        if apart.any():
-            low = np.where(apart, np.minimum(likely[0], mean - width), low)
-            high = np.where(apart, np.maximum(likely[1], mean + width), high)
-            rows, last_node = np.arange(len(z)), RANGE_NODES - 1
-            half_range, z, log_density = evaluate()
-            for _ in range(MAX_NARROWINGS):
-                peak = log_density.max(axis=1, keepdims=True)
-                near = log_density > peak - 0.5 * HALF_WIDTH**2
-                first, last = near.argmax(axis=1), last_node - near[:, ::-1].argmax(axis=1)
-                first, last = np.maximum(first - 1, 0), np.minimum(last + 1, last_node)
-                if not (2 * (last - first) < RANGE_NODES)[apart].any():  # fine enough
-                    break
-                low = np.where(apart, z[rows, first], low)
-                high = np.where(apart, z[rows, last], high)
-                half_range, z, log_density = evaluate()
+            near = log_density > log_density.max(axis=1, keepdims=True) - 0.5 * HALF_WIDTH**2
+            first, last = near.argmax(axis=1), last_node - near[:, ::-1].argmax(axis=1)
+            first, last = np.maximum(first - 1, 0), np.minimum(last + 1, last_node)
+            if not (2 * (last - first) < RANGE_NODES).any():  # fine enough
+                break
+            low, high = z[rows, first], z[rows, last]
         # Mean and variance of the product, and
         # the Gaussian that gives the same.
         weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))

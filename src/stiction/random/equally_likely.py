@@ -230,11 +230,6 @@ class EquallyLikely:
         # select its neighbour.
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
-    def larger(self, count: int, seed: int) -> "EquallyLikely":
-        """Return a mixture of `count` members from the same source."""
-        assert self.source is not None
-        return drawn_from(self.source, count, seed)
-
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return the number of the member that each sample selects."""
         if not self.several:
@@ -333,9 +328,9 @@ def specimens_of_fit(random: EquallyLikely) -> int | None:
 
 def as_random(given: Any, seed: int = 0) -> EquallyLikely:
     """Return one interface, or several from a list or a source."""
-    if isinstance(given, EquallyLikely):
-        return given
-    if isinstance(given, Source):
-        return drawn_from(given, FIRST_MEMBERS, seed)
-    given = given if isinstance(given, list | tuple) else [given]
-    return EquallyLikely(tuple(map(as_random_interface, given)))
+    known = _known(given)
+    if isinstance(known, EquallyLikely):
+        return known
+    if isinstance(known, Source):
+        return drawn_from(known, FIRST_MEMBERS, seed)
+    return EquallyLikely(tuple(known) if isinstance(known, list) else (known,))

@@ -30,7 +30,7 @@ from stiction.ensemble.limit_state import LimitState
 from stiction.ensemble.monte_carlo import check_fields
 from stiction.methods.onset import exact_counterpart
 from stiction.methods.protocol import optional_member, seconds_per_sample
-from stiction.random.equally_likely import MAX_MEMBERS, specimens_of_fit
+from stiction.random.equally_likely import MAX_MEMBERS, drawn_from, specimens_of_fit
 from stiction.reliability.answer import Answer
 from stiction.reliability.tail import Tail, TailPoint
 
@@ -229,7 +229,7 @@ def with_enough_members(
         if not count or spent + cost > budget:
             return experiment, solution, spent
         meter.note = f"{count:,} interfaces, cv by the list {solution.members_cv:.2g}"
-        larger = known.larger(count, experiment.seed)
+        larger = drawn_from(known.source, count, experiment.seed)
         # A posterior over a list has hardly more different members,
         # however many are drawn.
         if larger.kinds.max() + 1 < FRESH * (known.kinds.max() + 1):
