@@ -15,7 +15,7 @@ import stiction as st
 QUIET = {"progress": False}
 RECORDS = st.Interface(0.12, 512)
 ROUGH = st.PowerLawSpectrum(2e-3, exponent=1.5, power_kept=0.99)
-FIXED = {"type": "power_law", "exponent": 1.5, "power_kept": 0.99}
+FIXED = {"type": "power_law", "exponent": 1.5}
 TRUTHS = {
     "beta": st.Beta(alpha=1.5, beta=3.0, low=0.6e6, high=1.66e6),
     "lognormal": st.Lognormal(mean=1e6, cv=0.2),

@@ -10,7 +10,7 @@ from stiction.inference.whittle import Observed, SpectrumFamily, Whittle
 from stiction.inference.window import RecordWindow
 
 SPACING = 1e-4
-SPECTRUM = st.PowerLawSpectrum(1.5e-3, exponent=1.5, power_kept=0.999)
+SPECTRUM = st.PowerLawSpectrum(1.5e-3, exponent=1.5)
 
 
 def window_of(points, *options, spacing=SPACING):
@@ -40,8 +40,10 @@ def test_expectation_of_a_line(degree, gap):
     # Up to wave number 16 the trend is in it exactly; above, the taper hides it to a per cent.
     np.testing.assert_allclose(found[1:17], expected[1:17], rtol=1e-9)
     np.testing.assert_allclose(found[17:], expected[17:], rtol=0.02)
-    # And the correlation is that of the spectrum on an infinite line; it fades where it is cut.
-    np.testing.assert_allclose(rho[:96], SPECTRUM.correlation(at * SPACING), atol=1e-3)
+    # And the correlation is that of the whole spectrum on an infinite line.
+    np.testing.assert_allclose(
+        rho[:96], SPECTRUM.untruncated_correlation(at * SPACING), atol=1e-3
+    )
 
 
 def test_expectation_and_trend_of_a_map():
@@ -65,7 +67,7 @@ def test_expectation_and_trend_of_a_map():
     np.testing.assert_allclose(powers[1:], [powers[0]] * 2, rtol=1e-8, atol=1e-12)
 
 
-def test_a_spectrum_whose_end_is_not_given_is_whole():
+def test_a_spectrum_is_whole():
     """What its usual truncation leaves out, 1 % of a rough one, would be taken for noise."""
     family, window = SpectrumFamily("exponential", {}, 1.0, 0.0, (1e-4, 1.0)), window_of(512)
     model = family.model(np.log([1.0, 1e-3]), np.array([0.0, 1.0]))
@@ -76,25 +78,25 @@ def test_a_spectrum_whose_end_is_not_given_is_whole():
 
 def test_power_above_the_sampling_wavenumber_is_folded_back():
     """A third of this spectrum's power lies above what its points resolve."""
-    rough = st.ExponentialSpectrum(5e-4, power_kept=0.99)
+    rough = st.ExponentialSpectrum(5e-4)
     assert 1.0 - rough.power_within(np.pi / 1e-3) > 0.3
     window = window_of(64, spacing=1e-3)
     rho = window.correlation(window.power(rough))
     assert rho[0] == pytest.approx(1.0)
-    # What is folded more than six times is taken for white, and a sharp cut leaves ripples.
-    np.testing.assert_allclose(rho[1:32], rough.correlation(1e-3 * np.arange(1, 32)), atol=2e-3)
+    # What is folded more than six times is taken for white.
+    expected = rough.untruncated_correlation(1e-3 * np.arange(1, 32))
+    np.testing.assert_allclose(rho[1:32], expected, atol=2e-3)
 
 
 def test_a_map_has_the_correlation_of_the_plane():
-    spectrum = st.PowerLawSpectrum(1e-3, exponent=2.0, power_kept=0.99)
+    spectrum = st.PowerLawSpectrum(1e-3, exponent=2.0, power_kept=0.9999)
     window = RecordWindow((1e-4, 1.2e-4), np.ones((48, 40), dtype=bool))
     rho = window.correlation(window.power(spectrum, 1.5))
     plane = st.Interface(length=(192 * 1e-4, 160 * 1.2e-4), nodes=(192, 160))
     marginal = beta_strength(1.0).marginal
     field = st.RandomField(marginal, spectrum, mean_mode=True, anisotropy=1.5)
     expected = field.correlation(plane, of="z")
-    # The truncation fades here and is sharp there: a per cent of the power lies beside it.
-    np.testing.assert_allclose(rho[:20, :20], expected[:20, :20], atol=3e-3)
+    np.testing.assert_allclose(rho[:20, :20], expected[:20, :20], atol=1e-3)
 
 
 def test_simulated_records_have_the_expectation():

@@ -37,7 +37,7 @@ def test_intervals_are_those_of_three_sets_of_repetitions():
     """By hand: errors in units of root length; the ends from fields of either length."""
     plain = fitted(RECORD)
     truth = plain.parameters
-    sets, _ = bootstrapped(plain._estimate, 20, 0.9, 0, False)
+    sets, _ = bootstrapped(plain._estimate, 20, 0, False)
 
     def end(of, share):
         true = of.truth.parameters[LENGTH]
