@@ -223,7 +223,8 @@ def _estimate(rows: Sequence[Array], setting: FitSetting, start: BestFit | None)
     values = np.concatenate(rows)
     observed = periodograms_of(rows, setting.windows)
     vector: Any = None
-    marginal, noise = None, family.noise or 0.0
+    marginal: Any = None
+    noise = family.noise or 0.0
     if start is not None:
         vector = family.vector_of(start.model)
         marginal, noise = start.marginal, start.model.noise
