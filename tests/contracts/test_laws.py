@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 from scipy.integrate import quad
 
 import stiction as st
+from stiction import extensions
 from stiction.problem.friction.laws import LAWS
+from stiction.random.dotted_keys import with_values
 from stiction.random.marginals import MARGINALS
 from stiction.random.spectra import SPECTRA
+from stiction.statistics import density
 
 FRICTION = {
     "linear": st.LinearWeakening(weakening_rate=1e11),
@@ -42,6 +46,55 @@ def test_every_kind_has_an_example():
     for kinds, examples in ((LAWS, FRICTION), (MARGINALS, STRENGTHS), (SPECTRA, DENSITIES)):
         own = {name for name in kinds if kinds[name].__module__.startswith("stiction.")}
         assert own == {example.type for example in examples.values()}
+
+
+LINE = st.Interface(0.05, 128)
+CLASSES = {  # examples of all classes that a study file names, by the key of their table
+    "problem.friction": FRICTION, "random.strength.marginal": STRENGTHS,
+    "random.strength.spectrum": DENSITIES,
+    "method": {"local": st.LocalCriterion(), "exact": st.Equilibrium(),
+               "rupture": st.Rupture(loading_rate=1e8)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("key", "name"), [(key, name) for key in CLASSES for name in CLASSES[key]]
+)
+def test_an_unregistered_subclass_is_not_written_as_its_parent(key, name, tmp_path):
+    example = CLASSES[key][name]
+    own = extensions.model(type("Own", (type(example),), {}))
+    fields = [field.name for field in dataclasses.fields(example) if field.init]
+    instance = own(**{field: getattr(example, field) for field in fields if field != "type"})
+    problem = st.Problem(
+        st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1170.0), LINE, FRICTION["linear"]
+    )
+    field = st.RandomField(STRENGTHS["lognormal"], DENSITIES["power_law"])
+    study = st.Study(
+        problem=problem, random=field, method=CLASSES["method"]["rupture"], samples=2
+    )
+    given = {part: getattr(study, part) for part in ("problem", "random", "method")}
+    study = dataclasses.replace(study, **with_values(given, {key: instance}))
+    for call in (
+        lambda: study.to_toml(tmp_path / "study.toml"), lambda: study.to_dict(),
+        lambda: study.run(out=tmp_path / "run", progress=False),
+    ):  # fmt: skip
+        with pytest.raises(st.InputError, match="Own is a class of your own"):
+            call()
+    assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("bound", [-3.0, 0.0, 2.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_density_moves_and_turns_with_its_sample_and_bounds(bound, side):
+    """Whatever the bound, an exponential sample has its full density there."""
+    sample = -np.log1p(-(np.arange(4000) + 0.5) / 4000)
+    ends = (bound, None) if side > 0.0 else (None, bound)
+    at = np.array([0.0, 0.5, 2.0])
+    found = density(bound + side * sample, bounds=ends)
+    values = np.interp(bound + side * at, found.x, found.value)
+    np.testing.assert_allclose(values, np.exp(-at), atol=0.12)  # half of it without the bound
+    with pytest.raises((st.InputError, ValueError)):
+        density(np.append(bound + side * sample, bound - 0.1 * side), bounds=ends)
 
 
 @pytest.mark.parametrize("name", FRICTION)

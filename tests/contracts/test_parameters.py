@@ -151,6 +151,20 @@ def test_samples_of_an_ensemble_are_drawn_alone():
     np.testing.assert_array_equal(whole, alone.critical_stress)
 
 
+def test_a_pilot_compares_the_samples_of_its_run():
+    """Wherever a run begins: with the exact onsets of the same samples."""
+    part = {"first": 3, "samples": 6}
+    told = ask("monte_carlo", pilot=True, **part).attrs
+    local, exact = (
+        ask("monte_carlo", method=method, **part).critical_stress.values
+        for method in (LOCAL, EXACT)
+    )
+    relative = (local - exact) / exact.mean()
+    assert told["pilot_samples"] == 6
+    assert told["pilot_bias"] == pytest.approx(relative.mean(), rel=1e-9)
+    assert told["pilot_scatter"] == pytest.approx(relative.std(ddof=1), rel=1e-9)
+
+
 @pytest.mark.parametrize("call", ["failure_probability", "design_stress"])
 def test_no_call_takes_more_evaluations_than_it_may(call):
     assert ask(call, max_evaluations=150, target_cv=0.05).evaluations <= 150

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
 from functools import cache
 from typing import Any
@@ -37,7 +38,7 @@ def drawn_by(name: str, call: str, *more: str) -> Any:
 
     def draw(w: World, **options: Any) -> Any:
         given = [w.profiles()] if "profiles" in more else []
-        options |= {"problem": w.problem} if "problem" in more else {}
+        options = ({"problem": w.problem} if "problem" in more else {}) | options
         return getattr(st.plot, name)(of(call, w), *given, **options)
 
     return draw
@@ -62,6 +63,10 @@ DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body
 }  # fmt: skip
 ELSEWHERE = {"film", "fit"}
 """A film is a file, see test_files, and a fit has no units of a world, see tests/user."""
+TAKE_A_PROBLEM = {
+    name for name in st.plot.__all__
+    if "problem" in [*inspect.signature(getattr(st.plot, name)).parameters][1:]
+}  # fmt: skip
 SAMPLES = [name for name in DRAWN if name.split()[0] in ("onset", "specimen")]
 
 
@@ -134,6 +139,20 @@ def test_a_figure_of_a_sample_is_the_figure_of_its_row_alone(name):
     for sample in (3, -1, 0.5, "a"):
         with pytest.raises(st.InputError, match="sample: "):
             draw(w, sample=sample)
+    assert not plt.get_fignums()
+
+
+@pytest.mark.parametrize("name", [n for n in DRAWN if n.split()[0] in TAKE_A_PROBLEM])
+def test_a_figure_refuses_a_problem_on_another_grid(name):
+    make, body, draw = DRAWN[name]
+    w = make(body)
+    nodes = np.add(w.interface.shape, 8).tolist()
+    nodes = nodes if w.interface.is_plane else nodes[0]
+    interface = st.Interface(w.interface.length, nodes, width=w.interface.width)
+    law = st.LinearWeakening(weakening_rate=0.3e12)
+    other = st.Problem(w.problem.solid, interface, law, specimen=w.problem.specimen)
+    with pytest.raises(st.InputError, match="problem|nodes|shape"):
+        draw(w, problem=other)
     assert not plt.get_fignums()
 
 

@@ -158,3 +158,24 @@ def test_a_table_has_the_same_numbers_in_each_format(reader, tmp_path):
         comma, refusal = attempt(lambda p=path, g=given: getattr(st, reader)(p, **g))
         results.add((numbers_of(comma) if not refusal else "", refusal))
         assert len(results) == 1, (option, results)
+
+
+BARE = [row[:1] + row[2:] for row in PROFILE[1:]]
+"""Three columns without headings."""
+
+
+@pytest.mark.parametrize("column", range(3))
+@pytest.mark.parametrize("table", [BARE, PROFILE, CURVE, PEAKS], ids=["bare", *OPTIONS])
+def test_values_that_repeat_in_a_column_change_no_choice_of_columns(table, column, tmp_path):
+    """The same column is read, or the same words refuse the table; steps are no map."""
+    steps = [list(row) for row in table]
+    for number, row in enumerate(steps[1:] if table is not BARE else steps):
+        row[column] = steps[number - number % 2 + (table is not BARE)][column]
+    reader = {id(CURVE): "read_curve", id(PEAKS): "read_peaks"}.get(id(table), "read_profile")
+    shapes = []
+    for rows in (table, steps):
+        path = as_text(rows, tmp_path)
+        result, refusal = attempt(lambda p=path: getattr(st, reader)(p))
+        shapes.append(re.sub(r"-?\d[\d.]*(e-?\d+)?", "#", refusal or numbers_of(result)))
+    repeated = ("twice", "repeat", "only rises", "different")
+    assert shapes[0] == shapes[1] or any(word in shapes[1] for word in repeated), shapes

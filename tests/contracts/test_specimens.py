@@ -182,3 +182,28 @@ def test_an_initial_stress_in_proportion_to_the_load_is_a_load(name, kind):
     for key in ("critical_stress", "first_instability"):
         np.testing.assert_allclose(after[key], before[key], rtol=1e-6, err_msg=key)
     np.testing.assert_allclose(after.critical_load + 2e4, before.critical_load, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_the_sensitivity_of_a_node_is_the_derivative_by_its_strength(name):
+    """In pascals, for the nodes on which the onset depends most."""
+    law = st.LinearWeakening(weakening_rate=0.09e12, residual_ratio=0.3)
+    problem, mu = (
+        dataclasses.replace(BODIES[name], friction=law),
+        world(name, "equilibrium").strength,
+    )
+
+    def onset(strength: Any, **options: Any) -> Any:
+        method = st.Equilibrium(**options)
+        given = {"friction_coefficient": strength}
+        return st.onset(problem, given, method=method, progress=False).isel(sample=0)
+
+    found = onset(mu[:1], sensitivity=True)
+    nodes = np.argsort(np.abs(found.sensitivity.values))[[-1, -3, -8]]
+    pascals = problem.sample({"friction_coefficient": mu[:1]}).strength[0] / mu[0]
+    for node in nodes:
+        raised, step = mu[:1].copy(), 1e-6
+        raised[0, node] += step
+        change = float(onset(raised).first_instability - found.first_instability)
+        derivative = change / (step * pascals[node])
+        assert float(found.sensitivity[node]) == pytest.approx(derivative, rel=1e-3), node

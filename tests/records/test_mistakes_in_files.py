@@ -174,7 +174,7 @@ LAWS = [
     (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
     (exponential, lambda f: f, exponential_area),
     (exponential, lambda f: 0.9 * logarithm(f), exponential_area),
-    (lambda law, u: (np.exp(-u), 2.0 * np.exp(-u)), logarithm, exponential_area, 2.0),
+    (lambda law, u: (np.exp(-u), 1.002 * np.exp(-u)), logarithm, exponential_area, 1.002),
 ]
 
 OWN = [own_law(*law) for law in LAWS]

@@ -81,16 +81,16 @@ FACTOR = 2.0
 
 @pytest.mark.parametrize("start", ["", WITHOUT], ids=["internals", "plain"])
 def test_kernels_of_a_law_from_elsewhere_are_kept_by_its_state(tmp_path, monkeypatch, start):
-    """Its module, or one that it calls, may change or be missing; numba would not notice."""
+    """Its module, whatever its name, or one that it calls, may change: numba would not notice."""
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     cache = tmp_path / "cache"
     places = {"cwd": tmp_path, "PYTHONPATH": SOURCES, "STICTION_CACHE_DIR": cache}
 
     def kernels(laws, helper):
         """What a process prints, and the files that are in the cache afterwards."""
-        (tmp_path / "own_module.py").write_text(start + laws)
+        (tmp_path / "stiction_laws.py").write_text(start + laws)
         (tmp_path / "helper.py").write_text(helper)
-        printed = python("-B", "-c", "import own_module", **places).splitlines()
+        printed = python("-B", "-c", "import stiction_laws", **places).splitlines()
         assert printed[1] == "[0.5 0.5 0.5]"
         return printed[0], {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")}
 
@@ -104,7 +104,9 @@ def test_kernels_of_a_law_from_elsewhere_are_kept_by_its_state(tmp_path, monkeyp
         # A list may change while a process runs: nothing is kept.
         listed = HELPER.replace("FACTOR *", "FACTOR[0] *").replace("2.0", "(5.0,)")
         assert kernels(LAWS, listed)[0] == "[10. 10. 10.]"
-    own = {path.parent for path in cache.rglob("*.nbi") if b"own_module" in path.read_bytes()}
+    own = {
+        path.parent for path in cache.rglob("*.nbi") if b"stiction_laws" in path.read_bytes()
+    }
     others = {path.parent for path in cache.rglob("*.nbi")} - own
     assert others
     assert bool(own) is kept
