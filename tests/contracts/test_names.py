@@ -1,5 +1,8 @@
 """One key for each parameter: printed by fits and posteriors, accepted by priors and sweeps."""
 
+import dataclasses
+import re
+
 import pytest
 from joint import FIELD, PROBLEM
 from setups import LOCAL
@@ -40,6 +43,60 @@ def test_a_key_is_accepted_by_every_call(key):
         members = [point.random.members[0].strength for point in study.experiments]
         part, _, attribute = full_key(key).removeprefix("random.strength.").rpartition(".")
         assert [getattr(getattr(one, part), attribute) for one in members] == list(ends)
+
+
+def refusal(call):
+    """The text with which a call is refused."""
+    with pytest.raises(st.InputError) as caught:
+        call()
+    return str(caught.value)
+
+
+def table_of(count, folder):
+    """A table with so many columns, any of which could be the strength."""
+    heads = ";".join(["x (mm)", *(f"c{i} (MPa)" for i in range(count))])
+    rows = [";".join(map(str, [k, *[1 + 0.1 * k] * count])) for k in range(9)]
+    path = folder / "table.csv"
+    path.write_text("\n".join([heads, *rows]))
+    return path
+
+
+def stated(count):
+    """What is assumed of tests with so many stated fields."""
+    fields = [
+        dataclasses.replace(FIELD, marginal=st.Gamma(mean=0.2 + 0.01 * i, cv=0.15))
+        for i in range(count)
+    ]
+    given = {"method": LOCAL, "samples": 100, "progress": False}
+    return str(st.infer(PROBLEM, fields, [0.95e6, 1e6, 1.05e6], **given).assumptions)
+
+
+COUNTED = {  # a text about so many things, and what it says of each that it shows
+    "stated fields": (lambda n, _: stated(n), "not measured: "),  # at most four
+    "columns": (
+        lambda n, folder: refusal(lambda: st.read_profile(table_of(n, folder))), r"column \d+ 'c"
+    ),
+    "mistakes": (
+        lambda n, _: refusal(lambda: st.Solid(**{f"k{i}": 1 for i in range(n)})), "'k\\d+'"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        (name, count)
+        for name in COUNTED
+        for count in (2, 3, 60)
+        if name != "stated fields" or count == 2
+    ],
+)
+def test_a_text_counts_what_it_does_not_show(name, count, tmp_path):
+    text, each = COUNTED[name]
+    said = text(count, tmp_path)
+    hidden = sum(map(int, re.findall(r"and (\d+) more", said)))
+    shown = {*re.findall(each, said)}
+    assert len(shown) + hidden == count, said
 
 
 def test_a_fit_and_a_posterior_print_the_same_keys():
