@@ -56,7 +56,7 @@ def test_a_design_is_for_specimens_of_the_problem():
     groups = {0.025: peaks[0.025], 0.0375: peaks[0.05]}
     other = st.infer(PROBLEM, FIELD, groups, samples=200, **GIVEN)
     refuses(
-        "no peaks are of specimens",
+        "no peak is from a specimen of the problem",
         lambda: st.design_of_tests(PROBLEM, other, **numbers, **GIVEN),
     )
 

@@ -163,9 +163,9 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
 
 
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
-    """Return the arrays in an .npz file from `write_arrays`, or raise an error in `UNREADABLE`.
+    """Return the arrays in an .npz file that `write_arrays` wrote.
 
-    Refuses compressed members, and members that together are larger
+    Raise an error of `UNREADABLE` for compressed members, and for members that together are larger
     than the archive.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:

@@ -89,7 +89,7 @@ def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
 
 
 def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
-    """Return first node and end of the shortest runs on which K (n, n) is unstable at a rate, Pa/m.
+    """Return where the shortest runs begin and end on which K (n, n) is unstable at a rate, Pa/m.
 
     If a block of K shrinks, its lowest eigenvalue rises.
     Therefore a shortest run that begins later also ends later, and a

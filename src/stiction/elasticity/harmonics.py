@@ -149,7 +149,8 @@ class Harmonics:
     def reflected(
         self, weights: Array, along_x: Polynomial, x: Array, along_s: Polynomial, s: Array
     ) -> Array:
-        """Step 3: return the sum (x, s) of weights times 4 k³ P(d/dx) Q(d/ds) remainder over k."""
+        """Step 3: sum, over k, the weights times 4 k³ P(d/dx) Q(d/ds) of the
+        remainder, at (x, s)."""
         # The remainder couples the solutions in x with the solutions in s.
         left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
         total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))

@@ -256,7 +256,7 @@ def solve_spans(
 
 
 def _result(future: Future[Table], span: Span) -> Table:
-    """Return the table of a finished piece."""
+    """Return the results of a finished piece as a table."""
     try:
         table = future.result()
     except InputError:

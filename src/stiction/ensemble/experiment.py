@@ -245,7 +245,7 @@ class Measured(Experiment):
 
     @property
     def dimension(self) -> int:
-        """Number of draws in a sample, which needs none."""
+        """Number of draws in a sample, counted without drawing."""
         return 0
 
     @property

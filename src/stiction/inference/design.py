@@ -341,7 +341,9 @@ def _present(
         same = [length is None or math.isclose(length, size) for length in random.peaks.lengths]
         order = np.argsort(np.logical_not(same), kind="stable")
         if not any(same):
-            raise InputError(f"random: no peaks are of specimens of the problem, {size:g} m")
+            raise InputError(
+                f"random: no peak is from a specimen of the problem, {size:g} m long"
+            )
         tables = tables.of([tables.peaks[kind] for kind in order], order)
         mass = random.grid.mass.sum(axis=(1, 2, 3))
     else:

@@ -199,7 +199,7 @@ class BestFit:
 def estimate(
     rows: Sequence[Array], setting: FitSetting, start: BestFit | None = None
 ) -> BestFit:
-    """Fit measured values (points,) without trend for each record, from a start if given."""
+    """Fit measured values (points,) of each record, less the trend, from a start if it is given."""
     with collect_warnings() as caught:
         if not setting.between:
             fitted = _estimate(rows, setting, start)

@@ -206,8 +206,8 @@ def infer(
     several = bool(others) or problem.interface.is_plane
     if not (several or length is None or math.isclose(length, size)):
         raise InputError(
-            f"peaks: are of specimens of {length:g} m, but the problem is of {size:g} m. Pass the"
-            " problem of the tests. The posterior serves other problems, too"
+            f"peaks: the specimens are {length:g} m long, but the problem {size:g} m. Pass the"
+            " problem of the tests. The posterior is valid for other problems, too"
         )
     with Meter("infer", show=progress) as meter:
         simulation = Simulation(method, samples, seed, workers, meter)

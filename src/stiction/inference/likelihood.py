@@ -146,7 +146,7 @@ def of_length(problem: Problem, length: float | None) -> Problem:
         return problem
     if problem.load.pressing_force is not None:
         raise InputError(
-            "peaks: on specimens of another length the same pressing force is another pressure."
+            "peaks: the pressure that a pressing force causes depends on the length of specimens."
             " Give Load(normal_pressure=...) in Pa"
         )
     nodes = 2 * max(4, round(0.5 * length / interface.spacing))

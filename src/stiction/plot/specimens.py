@@ -67,9 +67,7 @@ def specimen(
     check("problem", problem, Problem)
     if isinstance(problem.specimen, Slider):
         if strength is None:
-            raise InputError(
-                "strength: give it, because the pressure of a slider depends on it"
-            )
+            raise InputError("strength: is missing. The pressure of a slider depends on it")
         given = problem.sample(strength)
         chosen_row(given.strength, {} if result is None else {"onset": result}, sample)
         return _draw_slider(problem, given.part(slice(int(sample), int(sample) + 1)))

@@ -210,9 +210,8 @@ class EquallyLikely:
         return _numbered([(member.between or {}).get("strength") for member in self.members])
 
     def factor_column(self, interface: Interface) -> int | None:
-        """Return the column of the draw for the strength's factor, or `None`.
-
-        Return `None` if any member has no factor.
+        """Return the column of the draw for the strength's factor, or `None` if
+        a member has no factor.
         """
         if None in self.factor_laws[0]:
             return None

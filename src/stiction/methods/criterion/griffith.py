@@ -92,7 +92,7 @@ def griffith_length(
     True
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
-        raise InputError(f"load: must be a finite number or list of them, got {describe(load)}")
+        raise InputError(f"load: must be finite, a number or a list, got {describe(load)}")
     tau = load.reshape(-1, 1, 1)
 
     def runs(lengths: Array, tau: Array) -> Any:

@@ -181,7 +181,7 @@ class LocalCriterion(Listed):
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
-        """Return why no length of patches is the same in all samples, or `None`."""
+        """Return why the length of patches differs between samples, or `None`."""
         W = problem.friction.uniform_weakening_rate
         if isinstance(problem.specimen, Slider):
             return "the pressure under a slider changes with the push"

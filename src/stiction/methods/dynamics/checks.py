@@ -119,7 +119,8 @@ def warn_of_cut_events(cut: Iterable[bool]) -> None:
 
 
 def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
-    """Warn about first instabilities above those of equilibrium. Both have shape (samples,), Pa."""
+    """Warn about first instabilities of ruptures that lie above equilibrium.
+    Both have shape (samples,), Pa."""
     excess = 100.0 * (found / np.array(in_equilibrium) - 1.0)
     warn_of_samples(
         "first_instability is up to {worst:.2g} % above the first instability in equilibrium in"

@@ -356,7 +356,7 @@ class SliderSolver:
         return tabulate(measured, push_variables(interface), most)
 
     def at_loads(self, rows: Sample, loads: Array) -> dict[str, Array]:
-        """Return values of `equilibrium_path` at rising loads, Pa."""
+        """Return the values that `equilibrium_path` needs at rising loads, Pa."""
         # The path to sliding gives all events, and a second path the states at the loads.
         push, path = self.path(rows, 0).follow(), self.path(rows, 0)
         end = push.last.load

@@ -180,7 +180,7 @@ def named(
     # 2. The dimensions.
     array = _directed(array, dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
-        raise InputError("has the coordinate x or y only. Give a map both, or leave both out")
+        raise InputError("has only one of the coordinates x and y. Give both or none")
     array.attrs |= {"read": read, "lines": getattr(data, "lines", ())}
     return array
 

@@ -119,7 +119,8 @@ def doubled(coarse: Array) -> Array:
 
 
 def halved_strength(fine: Array) -> Array:
-    """Return `halved` for strengths, averaged only over nodes with finite strength."""
+    """Halve the grid of strengths, as `halved` does, and average only over
+    nodes with finite strength."""
     finite = np.isfinite(fine)
     if finite.all():
         return halved(fine)
@@ -170,11 +171,10 @@ def plane_onset(
     `excess` is the peak strength minus the initial stress (Pa).
     `profile` is the load profile p > 0. `W` is the weakening rate
     (Pa/m, zero at residual nodes). `slip` (m) belongs to an
-    equilibrium at a lower load, from which the search starts
-    rather than coarse grids. `corner` is the slip at the next
-    corner (m, 0 without a corner). The search stops when the
-    bounds agree to a relative `gap`. If a node of a coarse grid
-    slips beyond its corner, the bracket of this grid is returned.
+    equilibrium at a lower load, from which the search starts in place of coarse
+    grids. `corner` is the slip at the next corner (m, 0 without a corner). The
+    search stops when the bounds agree to a relative `gap`. If a node of a
+    coarse grid slips beyond its corner, the bracket of this grid is returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner
