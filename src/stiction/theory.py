@@ -91,7 +91,7 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
     assert weakening_rate is not None  # checked by `stationary`
     (window,) = windows_of(problem, weakening_rate, stretches=(1.0,))
     # The spectrum of the strength is the transform of its correlation, and
-    # a mode stands for its conjugate, too.
+    # a mode includes its conjugate.
     interface = problem.interface
     power = interface.transform(strength.correlation(interface)).real / interface.size
     power[..., 1 : interface.shape[-1] // 2] *= 2.0

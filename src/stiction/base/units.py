@@ -346,7 +346,7 @@ def check_measured(
 
 
 def _entry(wrong: Array, lines: Any) -> str:
-    """Describe where the first wrong value stands: its line in a table, or its number."""
+    """Describe the place of the first wrong value: its line in a table, or its number."""
     entry = int(np.argmax(wrong))
     return f"line {lines[entry]}" if np.size(lines) == wrong.size else f"entry {entry}"
 

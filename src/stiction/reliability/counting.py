@@ -261,7 +261,7 @@ def _by_law(laws: Sequence[Any], law: NDArray[np.int64], shares: Array) -> Array
 
 
 def _expands(state: LimitState) -> bool:
-    """Return whether each solved sample stands for many specimens."""
+    """Return whether each solved sample represents many specimens."""
     experiment = state.experiment
     problem, random = experiment.problem, experiment.random
     return random.factor_column(problem.interface) is not None and scales_with_strength(
@@ -316,7 +316,7 @@ def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts | Non
         tail, samples = counts.tail, len(counts.values)
         stress = tail.quantile(goal.probability) if goal.probability else goal.stress
         chance, cv = goal.probability or tail.probability(stress), tail.cv(stress)
-        # At a quantile, the share of plain samples below it is given.
+        # At a quantile, the fraction of plain samples below it is given.
         # Its error is not in the families, since each family has a
         # single specimen.
         if counts.values.shape[1] == 1 and goal.probability:
