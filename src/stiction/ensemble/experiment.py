@@ -231,7 +231,7 @@ class Measured(Experiment):
             raise InputError(problems)
         with prefixed("profiles"), collect_warnings():  # `check_fields` issues them
             if (count := len(self._sample.strength)) != 1:
-                raise InputError(f"must be one profile of each name, got {count} samples")
+                raise InputError(f"must be a single sample, got {count}")
 
     @cached_property
     def _sample(self) -> Sample:

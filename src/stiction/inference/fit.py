@@ -297,7 +297,7 @@ class FieldFit(WithFactors, Result):
         return self._with_levels(list(dict.fromkeys(self._chosen(count, seed))))
 
     def _with_levels(self, fields: Sequence[RandomField]) -> Profiles:
-        """Return fields with the record levels, and for each field their variances."""
+        """Return the fields, the record levels, and the variance of each level by each field."""
         truth, levels = self._estimate, self._levels
         mean, deviation = (truth.parameters[k] for k in ("mean", "standard_deviation"))
         length = truth.field(self.quantity).spectrum.efolding_length

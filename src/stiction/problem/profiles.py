@@ -262,7 +262,7 @@ def read_profile(
     if quantity not in QUANTITIES:
         raise InputError(unknown_name("quantity", quantity, QUANTITIES))
     if strength is not None and quantity != "strength":
-        raise InputError("strength: maps heights to strengths. Leave quantity='strength'")
+        raise InputError("quantity: must be 'strength' if strength= maps heights to strengths")
     options = Options(skip, sheet, missing, decimal)
     dims = None if interface is None else interface.dims
     of_source, is_file = "height" if strength else quantity, isinstance(source, str | Path)

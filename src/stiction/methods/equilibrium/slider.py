@@ -255,7 +255,7 @@ class SliderPath:
 
 
 def push_variables(interface: Interface) -> dict[str, Variable]:
-    """Return the variables of the events of a slider."""
+    """Return the event variables of a slider."""
     variables = event_variables(interface).items()
     return {name: known for name, known in variables if name not in WITH_FIXED_PRESSURE}
 

@@ -368,7 +368,7 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def plateau(self) -> float:
-        """The u up to which strength does not fall."""
+        """The slip u up to which the strength does not fall."""
         return self.slip[0] if self.strength[0] == 1.0 else 0.0
 
     @cached_property

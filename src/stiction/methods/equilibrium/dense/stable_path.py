@@ -144,9 +144,9 @@ class Start(NamedTuple):
 def _find_slipping(
     state: SlipState, load: float, piece: NDArray[np.int64], q: Array
 ) -> tuple[int, bool]:
-    """Step 1: mark the slipping nodes. Write q and the diagonal of A.
+    """Step 1: mark the slipping nodes, and write q and the diagonal of A.
 
-    Returns the number of slipping nodes, and whether a node that
+    Return the number of slipping nodes, and whether a node that
     slipped before rests.
     """
     sample, slip, Kd, workspace, may_stop, _ = state
