@@ -6,6 +6,7 @@ from refusals import refuses
 from setups import LOCAL, make_problem
 
 import stiction as st
+from stiction.inference.specimens import Prediction
 
 PROBLEM = make_problem(64, 0.05, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.15), st.PowerLawSpectrum(4e-3), mean_mode=True)
@@ -42,7 +43,11 @@ def test_a_design_is_for_specimens_of_the_problem():
         found = st.design_of_tests(PROBLEM, posterior, **numbers, **GIVEN)
         kinds = [posterior.likelihood.of(peaks.values(), [k, 1 - k]) for k in (0, 1)]
         by_kind = dict(
-            zip(lengths, (k.quantile(posterior.grid, 1e-3) for k in kinds), strict=True)
+            zip(
+                lengths,
+                (Prediction(k, posterior.grid).quantile(1e-3) for k in kinds),
+                strict=True,
+            )
         )
         assert abs(by_kind[0.025] / by_kind[0.05] - 1.0) > 0.02
         assert found.design_stress[0] == pytest.approx(by_kind[0.05], rel=1e-3)

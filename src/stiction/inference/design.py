@@ -63,7 +63,6 @@ from stiction.base.model import (
     is_whole,
 )
 from stiction.base.progress import Meter
-from stiction.base.variables import Variable
 from stiction.ensemble.experiment import Experiment
 from stiction.inference.infer import profiles_of
 from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
@@ -82,7 +81,6 @@ from stiction.inference.specimens import (
 )
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
-from stiction.problem.results import to_dataset
 from stiction.random.spectra import Share
 
 CAMPAIGN_GRID_POINTS = 8_000
@@ -158,7 +156,7 @@ def design_of_tests(
     Raises
     ------
     InputError
-        If any argument is invalid. The message lists every problem.
+        If any argument is invalid.
 
     Notes
     -----
@@ -213,71 +211,61 @@ def design_of_tests(
         for tests, free in plans.values():
             likelihood = simulated.of((), [lengths.index(length) for length in tests])
             counts = list(tests.values())
-            rows.append(_information(likelihood, counts, free, repetitions, seed, meter))
-    dims = ("design", "parameter")
-    variables = {
-        "information": Variable("1", "expected information about a parameter, nats", dims),
-        "standard_error": Variable("1", "standard error of the information, nats", dims),
-    }
-    values = dict(zip(variables, np.stack(rows, axis=1), strict=True))
-    coordinates = {
-        "design": (np.array(list(plans)), Variable("", "design of tests", ("design",))),
-        "parameter": (np.array(parameters.names), Variable("", "parameter", ("parameter",))),
-    }
-    return to_dataset(values, variables, coordinates, {"repetitions": repetitions})
+            rows.append(_information(likelihood, counts, free, repetitions, simulation))
+    dims, (information, errors) = ("design", "parameter"), np.stack(rows, axis=1)
+    return xr.Dataset(
+        {"information": (dims, information), "standard_error": (dims, errors)},
+        {"design": list(plans), "parameter": list(parameters.names)},
+        {"repetitions": repetitions},
+    )
 
 
-def _as_table(
-    name: str, design: Any, keys: tuple[str, str], problems: list[str]
-) -> dict[str, Any]:
-    """Return a design as a table with some of the keys, and add unknown keys to `problems`.
+def _as_table(name: str, design: Any, second: str) -> dict[str, Any]:
+    """Return a design as a table with tests and the key `second`.
 
     A number, or a mapping of lengths, states the tests.
     """
     is_table = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
-    table = dict(design) if is_table else {"tests": design}
-    problems += [
-        unknown_name(f"designs: {name}", str(key), keys) for key in table if key not in keys
-    ]
-    return table
+    table, keys = dict(design) if is_table else {"tests": design}, ("tests", second)
+    if unknown := [
+        unknown_name(f"designs: {name}", str(k), keys) for k in table if k not in keys
+    ]:
+        raise InputError(unknown)
+    return {"tests": 0} | table
 
 
 def _plans(
     designs: dict[str, Any], names: tuple[str, ...]
 ) -> dict[str, tuple[dict[float | None, int], list[int]]]:
     """Return the numbers of tests by length (m), and the positions of the unknown parameters."""
-    problems = [] if designs else ["designs: must not be empty"]
+    if not designs:
+        raise InputError("designs: must not be empty")
     plans = {}
     for name, design in designs.items():
-        table = _as_table(name, design, ("tests", "known"), problems)
-        given: Any = table.get("tests")
-        tests = dict(given) if isinstance(given, Mapping) else {None: given}
-        known = check("known", table.get("known", ()), Names)  # from other measurements
+        table, path = _as_table(name, design, "known"), f"designs: {name}: known"
+        tests = (
+            table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
+        )
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
-            problems.append(
+            raise InputError(
                 f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
             )
-        path = f"designs: {name}: known"
-        problems += [unknown_name(path, key, names) for key in known if key not in names]
-        if set(known) >= set(names):
-            problems.append(f"{path}: every parameter would be known")
+        known = check("known", table.get("known", ()), Names)  # from other measurements
+        if unknown := [unknown_name(path, key, names) for key in known if key not in names]:
+            raise InputError(unknown)
         free = [place for place, parameter in enumerate(names) if parameter not in known]
-        plans[name] = tests, free
-    if problems:
-        raise InputError(problems)
+        if not free:
+            raise InputError(f"{path}: every parameter would be known")
+        plans[name] = dict(tests), free
     return plans
 
 
 def _information(
-    simulated: Likelihood,
-    tests: list[int],
-    free: list[int],
-    repetitions: int,
-    seed: int,
-    meter: Meter,
-) -> Array:
+    simulated: Likelihood, tests: list[int], free: list[int], repetitions: int,
+    simulation: Simulation,
+) -> Array:  # fmt: skip
     """Return the expected information about each parameter, and the standard error, as (2, ...)."""
-    rng, dimension = np.random.default_rng([seed, 2]), simulated.prior.dimension
+    rng, dimension = np.random.default_rng([simulation.seed, 2]), simulated.prior.dimension
     gains = np.full((repetitions, dimension), np.nan)
     for row in range(repetitions):
         # 1. and 2.
@@ -304,25 +292,22 @@ def _information(
         # 4.
         if grid is not None:
             gains[row, free] = [grid.information(place) for place in range(len(free))]
-        meter.advance()
+        simulation.meter.advance()
     finite = gains[np.isfinite(gains).any(axis=1)]
     return np.stack([finite.mean(axis=0), finite.std(axis=0) / np.sqrt(len(finite))])
 
 
 def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
     """Return the numbers of further tests and profiles. The first design is the present."""
-    problems: list[str] = []
     plans = {"now": (0, 0)}
     for name, design in designs.items():
-        table = _as_table(name, design, ("tests", "profiles"), problems)
-        plans[name] = table.get("tests", 0), table.get("profiles", 0)
+        table = _as_table(name, design, "profiles")
+        plans[name] = table["tests"], table.get("profiles", 0)
         if not all(is_whole(number, 0) for number in plans[name]) or not any(plans[name]):
-            problems.append(
+            raise InputError(
                 f"designs: {name}: tests and profiles must be whole numbers, at least one of"
                 " them >= 1"
             )
-    if problems:
-        raise InputError(problems)
     return plans
 
 
@@ -364,13 +349,9 @@ def _present(
 
 
 def _widths(
-    tables: Tables,
-    plans: dict[str, tuple[int, int]],
-    probability: float,
-    repetitions: int,
-    simulation: Simulation,
-    scale: float,
-) -> xr.Dataset:
+    tables: Tables, plans: dict[str, tuple[int, int]], probability: float, repetitions: int,
+    simulation: Simulation, scale: float,
+) -> xr.Dataset:  # fmt: skip
     """Return widths of intervals and design stresses after further measurements."""
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
         raise InputError(
