@@ -10,6 +10,7 @@ from setups import beta_strength
 import stiction as st
 from stiction.inference.agreement import _p_values, _permuted, summary_of
 from stiction.inference.curves import Curves, noise_of, turning_points
+from stiction.inference.peaks import make_peaks
 
 RNG = np.random.default_rng(0)
 TRAVEL = np.linspace(0.0, 1e-3, 2001)  # m
@@ -98,7 +99,7 @@ def test_files_of_testing_machines(tmp_path):
     several = [
         st.read_curve((TRAVEL, k * machine() * u.N), travel_unit="m")[0] for k in (1, 2, 3)
     ]
-    peaks = st.read_peaks(Curves(tuple(several)))
+    peaks = make_peaks(Curves(tuple(several)))
     assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
 
 

@@ -119,7 +119,7 @@ def test_profiles_and_peaks_are_joined():
     assert families.count("lognormal") == pytest.approx(
         200 * both.families["lognormal"], abs=28
     )
-    with pytest.warns(st.AccuracyWarning, match="contradict the profiles, p = 0.0"):
+    with pytest.warns(st.AccuracyWarning, match="contradict the prediction, p = 0.0"):
         apart = st.infer(PROBLEM, fit, 1.5 * peaks, **LOCAL)
     assert any("contradict" in note for note in apart.notes)
     # A design repeats the doubts, and says what so few specimens cannot exclude.

@@ -216,9 +216,9 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
     Drops below the largest threshold of the tests do not count, because
     a load cell could not distinguish them from noise.
     """
-    names = {"N": ("event_force", "critical_force"), "Pa": ("event_stress", "critical_stress")}
-    event, peak = names.get(curves.unit, ("", ""))
-    if event not in prediction:
+    quantity = {"N": "force", "Pa": "stress"}.get(curves.unit, "coefficient")
+    event, drop = (f"event_{name}" for name in (quantity, f"{quantity}_drop"))
+    if drop not in prediction:
         raise InputError(
             f"prediction: has no events in {curves.unit}. Give curves of force, and a thickness"
         )
@@ -228,8 +228,8 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
             f" {int(prediction['arrested_events'].max())} events. Predict with at least so many"
         )
     high = prediction[event].transpose("sample", "event").values
-    low = high - prediction[f"{event}_drop"].transpose("sample", "event").values
-    peaks = prediction[peak].values
+    low = high - prediction[drop].transpose("sample", "event").values
+    peaks = prediction[f"critical_{quantity}"].values
     threshold = max(curve.threshold for curve in curves)
     predicted = []
     for row in np.flatnonzero(np.isfinite(peaks)):
@@ -244,8 +244,7 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
 
 
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number of precursors, largest size, and force at the first precursor or else
-    the peak."""
+    """Return number and largest size of precursors, and force at the first, or else the peak."""
     starts, ends = precursors(force, threshold)
     sizes = force[starts] - force[ends]
     first = force[starts[0]] if sizes.size else force.max()
@@ -299,7 +298,8 @@ def _with_posterior(
     fitted = posterior.peaks
     if measured.unit != fitted.unit or not {*measured.lengths} <= {*fitted.lengths}:
         raise InputError(
-            f"peaks: the posterior has {fitted} in {fitted.unit}, not {measured} in {measured.unit}"
+            f"peaks: the posterior has {title_of(fitted)} in {fitted.unit}, not"
+            f" {title_of(measured)} in {measured.unit}"
         )
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():

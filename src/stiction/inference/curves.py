@@ -173,7 +173,7 @@ class Curve(Result):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Curves(Sequence[Curve], Result):
-    """Curves from repeated tests, for `read_peaks`, `infer` and figures.
+    """Curves from repeated tests, for `infer`, `agreement` and figures.
 
     Attributes
     ----------

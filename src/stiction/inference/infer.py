@@ -39,7 +39,7 @@ from stiction.base.errors import InputError, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, Progress, checked
 from stiction.base.progress import Meter
 from stiction.ensemble.pilot import compare, pilot_doubt
-from stiction.inference.agreement import DOUBTFUL_P_VALUE, Agreement, agreement
+from stiction.inference.agreement import Agreement, agreement
 from stiction.inference.fit import FieldFit
 from stiction.inference.likelihood import (
     Likelihood,
@@ -62,6 +62,7 @@ from stiction.inference.specimens import (
     Profiles,
     families_of,
     grid_of_profiles,
+    of_mean,
     tables_of,
 )
 from stiction.methods.criterion.local import LocalCriterion
@@ -409,23 +410,24 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
             "random: holds draws of mean and scatter between specimens, as a stored fit does. Pass"
             " the fit itself, or, for the fields within alone, [one.strength for one in random]"
         )
-    refuse_conditioned(likely.members)
+    members = likely.members
+    refuse_conditioned(members)
     if specimens_of_fit(likely) is not None:
         warn_accuracy(
             "random: is the field of a fit, whose profiles then have no effect on the mean and the"
             " scatter. Pass the fit itself to combine profiles and peaks"
         )
-    return Profiles.of_interfaces(likely.members, **more)
+    # Means and factors of the strength have no effect.
+    reference = float(np.mean([one.strength.mean for one in members]))
+    fields = tuple(dict.fromkeys(of_mean(one, reference) for one in members))
+    return Profiles(fields, reference, np.zeros(0), np.zeros((len(fields), 0)), **more)
 
 
 def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]:
     """Return the reasons to doubt the posterior."""
-    notes, profiles = [], grid.profiles
-    if comparison is not None and (p := min(comparison.p_values.values())) < DOUBTFUL_P_VALUE:
-        notes.append(
-            f"the peaks contradict the profiles, p = {p:.2g} of their agreement. Check units,"
-            " method and surfaces. Until then use the lower force, from peaks or profiles alone"
-        )
+    profiles, doubts = grid.profiles, comparison.notes if comparison else ()
+    until = "Until then use the lower force, from peaks or profiles alone"
+    notes = [f"{text}. {until}" for text in doubts]
     # The cells of s have equal prior probability. A prior that the user
     # states is meant.
     shares = grid.mass.sum(axis=(0, 1, 3))
@@ -438,7 +440,7 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
     if profiles.levels.size == 1:
         notes.append(
             "the profiles come from one specimen, and all others are assumed to vary along their"
-            " length as it does. Scan further"
-            " specimens. If the records are of different specimens, fit them with between=True"
+            " length as it does. Scan further specimens. If the records are of different specimens,"
+            " fit them with between=True"
         )
     return notes

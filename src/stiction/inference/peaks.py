@@ -248,7 +248,7 @@ def _in_si(given: Any, unit: str) -> Array:
 
 @checked
 def read_peaks(
-    source: FilePath | Curves,
+    source: FilePath,
     *,
     value: Wanted = None,
     unit: str | None = None,
@@ -268,11 +268,11 @@ def read_peaks(
 
     Parameters
     ----------
-    source : path or Curves
-        Curves from `stiction.read_curve`, or a table with a heading and
-        one test in each line. Rows of statistics below the tests (mean,
-        SD, n) are left out. A column ``specimen`` may hold the number or
-        name of the specimen, and a column ``length [mm]`` its length.
+    source : path
+        A table with a heading and one test in each line. Rows of
+        statistics below the tests (mean, SD, n) are left out. A column
+        ``specimen`` may hold the number or name of the specimen, and a
+        column ``length [mm]`` its length.
     value : str or int, optional
         Column of the peaks: heading, name, or number from 0. By default
         it is the column whose heading says friction, shear, slip load,
@@ -314,26 +314,10 @@ def read_peaks(
     "column 1 'peak [MPa]'"
     """
     options = Options(skip, sheet, missing, decimal)
-    if isinstance(source, Curves):
-        if value is not None or normal is not None:
-            raise InputError("value, normal: apply to a file of peaks only. Leave them out")
-        return make_peaks(source)
     with prefixed(str(source)):
         return _of_table(
             read_table(Path(source), options), options, value, unit, normal, surfaces
         )
-
-
-def _refuse_curve(columns: Sequence[Column], read: Sequence[Column]) -> None:
-    """Refuse a long table in which time or travel only rises: it is the curve of a test."""
-    for column in columns:
-        timed = any(is_in(column.unit, si) for si in ("m", "s"))
-        long = column not in read and column.values.size >= MIN_CURVE_LINES
-        if timed and long and np.all(np.diff(column.values) >= 0):
-            raise InputError(
-                f"{column.label!r} only rises over {column.values.size} lines, as in the curve of"
-                " one test. Read curves with st.read_curve, and pass them to st.read_peaks"
-            )
 
 
 def _of_table(
@@ -357,7 +341,16 @@ def _of_table(
         used["normal force"] = stated_column(columns, "normal", normal)
     left = [c for c in columns if c not in (*lengths, *names, used.get("normal force"))]
     peak = read_column(left, "peak", "value", value, VARIABLES)
-    _refuse_curve(columns, [peak, *used.values()])
+    for column in columns:
+        timed = (
+            column not in (peak, *used.values()) and column.unit and column.may_be_in("m", "s")
+        )
+        long = column.values.size >= MIN_CURVE_LINES
+        if timed and long and np.all(np.diff(column.values) >= 0):
+            raise InputError(
+                f"{column.label!r} only rises over {column.values.size} lines, as in the curve of"
+                " one test. Read curves with st.read_curve"
+            )
     _refuse_statistics(table, peak)
     known = replace(peak, values=without_missing(peak.values, options))
     values, si = column_in_si(known, "peak", unit, VARIABLES, "unit")
@@ -370,10 +363,9 @@ def _of_table(
         values, si = _coefficients(values, forces, si, surfaces), "1"
     elif surfaces != 1:
         raise InputError("surfaces: needs normal=, the normal force. Leave it out")
-    labels = (
-        np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept] if names else None
-    )
-    if labels is not None:
+    labels: Array | None = None
+    if names:
+        labels = np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept]
         stems = [part[1] for name in labels if (part := PART.fullmatch(str(name)))]
         if len(stems) == labels.size and len({*stems}) < len({*labels}):
             warn_accuracy(
@@ -386,23 +378,23 @@ def _of_table(
                 f"holds {count} specimens in {names[0]}, at least {MIN_PEAKS} are needed. Several"
                 " tests of a specimen say nothing about other specimens"
             )
-    read = reading_of(table, peak, unit or si, used)
-    sizes: Array | None = None
-    if lengths:
-        sizes = column_in_si(lengths[0], "length", None, ("m",))[0][kept]
-        if np.isnan(sizes).any():
-            row = int(np.argmax(np.isnan(sizes)))
-            raise InputError(f"length: missing in row {row}. Give the length of each specimen")
-    whole = {None: np.ones(values.size, dtype=bool)}
-    groups = whole if sizes is None else {size: sizes == size for size in np.unique(sizes)}
-    if labels is None and normal is not None:
+    elif normal is not None:
         warn_accuracy(
             "no column says which specimen was tested, so each slip load counts as a specimen."
             " Repeated slip loads of a specimen need a column 'specimen'"
         )
+    groups: dict[Any, Any] = {None: slice(None)}
+    if lengths:
+        sizes = column_in_si(lengths[0], "length", None, ("m",))[0][kept]
+        if np.isnan(sizes).any():
+            line = table.lines[kept][np.isnan(sizes).argmax()]
+            raise InputError(
+                f"length: missing in line {line}. Give the length of each specimen"
+            )
+        groups = {size: sizes == size for size in np.unique(sizes)}
     made = make_peaks({size: values[rows] for size, rows in groups.items()}, si)
     return replace(
-        made, read=read, surfaces=int(surfaces),
+        made, read=reading_of(table, peak, unit or si, used), surfaces=int(surfaces),
         normal_forces=None if forces is None else tuple(forces[rows] for rows in groups.values()),
         specimens=None if labels is None else tuple(labels[rows] for rows in groups.values()),
     )  # fmt: skip

@@ -179,13 +179,6 @@ class Profiles(NamedTuple):
         fields = (RandomInterface(strength=field),)
         return cls(fields, level, np.zeros(0), np.zeros((1, 0)), whole=True, **more)
 
-    @classmethod
-    def of_interfaces(cls, members: Sequence[RandomInterface], **more: Any) -> Self:
-        """Return fields without levels. Means and factors of the strength are removed."""
-        reference = float(np.mean([one.strength.mean for one in members]))
-        fields = tuple(dict.fromkeys(of_mean(one, reference) for one in members))
-        return cls(fields, reference, np.zeros(0), np.zeros((len(fields), 0)), **more)
-
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
     """Return a random interface with a different mean and a different factor of the strength."""
