@@ -23,7 +23,6 @@ from stiction.base.units import in_words
 from stiction.base.variables import UNITS
 from stiction.ensemble.batches import versions
 from stiction.ensemble.dataset import GridAxes
-from stiction.inference.standards import WHY
 from stiction.plot.axes import scaled, shown_quantity, with_unit
 from stiction.plot.style import PAGE, paper_style
 from stiction.problem.problem import Problem
@@ -214,9 +213,8 @@ def write_design(
     if peaks is not None and peaks.unit == "1":
         columns = ["specimen", "clamping force", "slip load", "slip factor"]
         page.table("Slip tests", columns, _slip_tests(peaks.loads or peaks))
-        values = [[name, value, WHY.get(name, "")] for name, value in peaks.standards.items()]
-        columns = ["quantity", "value", "why it differs"]
-        page.table("Slip factors by the standards", columns, values)
+        values = [[name, value] for name, value in peaks.standards.items()]
+        page.table("Slip factors by the standards", ["quantity", "value"], values)
     if assumptions := getattr(source, "assumptions", ()):
         page.table("Assumptions", ["assumption"], [[text] for text in assumptions])
     doubts = [*design.warnings, *design.doubts, *unseen_batch(design.specimens)]

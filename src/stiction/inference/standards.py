@@ -18,6 +18,12 @@ Steps:
 3. EN 1090-2 G: characteristic value m - 2.05 s of ten slip loads from
    five specimens. If s exceeds 8 % of m, more than (s/3.5)^2 specimens
    are tested in all, with s in per cent of m.
+
+A design by specimens, averaged over families, differs. In step 1, 5 % of
+the slip loads are below the value if they are normal and each counts as a
+specimen. Step 2 leaves out families with a heavier lower tail. Step 3
+takes ten slip loads as independent, with a fixed factor, and its number
+of specimens depends on the scatter alone, not on the probability.
 """
 
 import math
@@ -30,16 +36,6 @@ DESIGN = 1e-3
 """Probability below the design value of EN 1990."""
 SCATTERS, PER_SPECIMEN = 0.08, 3.5
 """Coefficient of variation above which EN 1090-2 asks for more specimens, and its divisor, %."""
-WHY = {
-    "EN 1990 characteristic value": "5 % of the slip loads are below it, if they are normal and"
-    " each counts as a specimen",
-    "EN 1990 design value": "0.1 % of the slip loads are below it, if they are normal: families"
-    " with a heavier lower tail are left out",
-    "EN 1090-2 characteristic value": "takes ten slip loads as independent, with a fixed factor"
-    " of 2.05",
-    "EN 1090-2 specimens in all": "depends on the scatter alone, not on the probability",
-}
-"""Why each value differs from a design by specimens, averaged over families."""
 
 
 def fractile_factor(count: int, probability: float = 0.05) -> float:
@@ -51,10 +47,12 @@ def standards_of(factors: Array) -> dict[str, float]:
     """Return mean, standard deviation and the values of the standards (steps 1 to 3)."""
     mean, deviation, count = float(factors.mean()), float(factors.std(ddof=1)), factors.size
     further = math.floor((100.0 * deviation / mean / PER_SPECIMEN) ** 2) + 1
-    values = (
-        mean - fractile_factor(count) * deviation,
-        mean - fractile_factor(count, DESIGN) * deviation,
-        mean - 2.05 * deviation,
-        float(max(5, further if deviation > SCATTERS * mean else 5)),
-    )
-    return {"mean": mean, "standard deviation": deviation} | dict(zip(WHY, values, strict=True))
+    specimens = max(5, further) if deviation > SCATTERS * mean else 5
+    return {
+        "mean": mean,
+        "standard deviation": deviation,
+        "EN 1990 characteristic value": mean - fractile_factor(count) * deviation,
+        "EN 1990 design value": mean - fractile_factor(count, DESIGN) * deviation,
+        "EN 1090-2 characteristic value": mean - 2.05 * deviation,
+        "EN 1090-2 specimens in all": float(specimens),
+    }
