@@ -221,11 +221,8 @@ def infer(
             posterior = _of_parameters(unknown, simulation, measured, error)
         else:
             # 1.
-            whole = random is None
-            profiles = profiles_of(
-                Profiles.without_field(problem, measured) if whole else random,
-                prior, between, seed,
-            )  # fmt: skip
+            source = Profiles.without_field(problem, measured) if random is None else random
+            profiles = profiles_of(source, prior, between, seed)
             posterior = _of_specimens(problem, profiles, simulation, measured, error)
     for text in posterior.notes:
         warn_accuracy(text)
@@ -236,12 +233,9 @@ def _of_parameters(
     prior: Prior, simulation: Simulation, measured: Peaks, error: float
 ) -> Posterior:
     """Return the posterior for the parameters in a prior (steps 2 to 5)."""
-    variable = variable_of(*prior.at(prior.middle), measured.unit)
-    (experiment,) = experiments_at(prior, prior.middle, simulation.method)
-    doubt_strengths(
-        experiment.problem,
-        mean_in_stress(experiment.problem, experiment.random.members[0], "strength"),
-    )
+    tested, middle = prior.at(prior.middle)
+    variable = variable_of(tested, middle, measured.unit)
+    doubt_strengths(tested, mean_in_stress(tested, middle, "strength"))
     # 2.
     points = np.array(list(itertools.product(*prior.ends.T)))
     problems = []
@@ -259,8 +253,13 @@ def _of_parameters(
     # 3.
     box = prior.whole
     if is_guided(prior, simulation.method):
-        local = simulation._replace(method=LocalCriterion(), samples=None)
-        box = _first_box(likelihood_of(local, box))
+        local = likelihood_of(simulation._replace(method=LocalCriterion(), samples=None), box)
+        # Other methods may produce peaks that the local criterion cannot
+        # produce, if nodes reach their residual strength before the onset.
+        first = None if local.refusals() else grid_of(local, box)
+        if first is not None:
+            room = np.maximum(WIDEN * np.diff(first.box, axis=0), 1e-3)
+            box = np.clip(first.box + room * OUTWARDS, 0.0, 1.0)
     while True:
         # 4.
         likelihood = likelihood_of(simulation, box)
@@ -273,39 +272,21 @@ def _of_parameters(
         box = wider
     # In the whole prior, no further box can
     # contain peaks that are out of reach.
-    if np.all(box == prior.whole) and (refused := likelihood.refusals()):
-        raise InputError(refused)
-    if grid is None or u is None:
+    refused = likelihood.refusals() if np.all(box == prior.whole) else []
+    if refused or grid is None or u is None:
         raise InputError(
-            "peaks: no point of the prior can produce all of them. Widen it, or give"
+            refused
+            or "peaks: no point of the prior can produce all of them. Widen it, or give"
             " load_cell_error="
         )
     relative_error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
-        peaks=measured,
-        draws=dict(zip(prior.names, prior.theta(u).T, strict=True)),
+        peaks=measured, draws=dict(zip(prior.names, prior.theta(u).T, strict=True)), u=u,
         information={name: grid.information(i) for i, name in enumerate(prior.names)},
-        log_evidence=grid.log_evidence,
-        monte_carlo_error=relative_error,
-        notes=tuple(_notes(likelihood, relative_error, u)),
-        likelihood=likelihood,
-        u=u,
+        log_evidence=grid.log_evidence, monte_carlo_error=relative_error,
+        notes=tuple(_notes(likelihood, relative_error, u)), likelihood=likelihood,
         seed=simulation.seed,
-    )
-
-
-def _first_box(likelihood: Likelihood) -> Array:
-    """Return the slightly widened box of the posterior by the local criterion (step 3).
-
-    The box is the whole prior if the local criterion cannot produce the
-    peaks. Other methods may still produce them, if nodes reach their
-    residual strength before the onset.
-    """
-    grid = None if likelihood.refusals() else grid_of(likelihood, likelihood.box)
-    if grid is None:
-        return likelihood.box
-    room = np.maximum(WIDEN * np.diff(grid.box, axis=0), 1e-3)
-    return np.clip(grid.box + room * OUTWARDS, 0.0, 1.0)
+    )  # fmt: skip
 
 
 def _grown(box: Array, u: Array | None) -> Array:

@@ -416,10 +416,8 @@ def moved(
         # The samples that both methods solved give the scale, so that
         # their error cancels.
         z = (values - same.mean()) / same.std()
-        shift = share @ np.stack(
-            [np.interp(z, standardised[node], away[node]) for node in nodes]
-        )
-        row[:] = values + same.std() * shift
+        shifts = [np.interp(z, standardised[node], away[node]) for node in nodes]
+        row[:] = values + same.std() * (share @ np.stack(shifts))
     return result
 
 

@@ -395,15 +395,14 @@ class SpecimenPosterior(Posterior):
         }
         tested = with_values(self.problem, in_tests, "problem")
         joint = with_values(problem, of_problem, "problem")
-        tests = self._inferred_again(tested, profiles, workers)
+        tests = self._again(tested, profiles, workers)
         same = joint == tested and method == self.likelihood.method
         if same and self.peaks.lengths == (None,) and self.peaks.unit != "1":
             return tests
         return Prediction.of(tests.grid, joint, Simulation(method, None, self.seed, workers))
 
-    def _inferred_again(
-        self, problem: Problem, profiles: Profiles, workers: int | None
-    ) -> Prediction:
+    def _again(self, problem: Problem, profiles: Profiles, workers: int | None) -> Prediction:
+        """Return the prediction for the tests, inferred again from the same peaks."""
         simulation = Simulation(self.likelihood.method, None, self.seed, workers)
         tables = tables_of(problem, profiles, simulation, self.peaks, self.likelihood.error)
         return Prediction(tables, grid_of_profiles(profiles, tables)[1])
@@ -413,7 +412,7 @@ class SpecimenPosterior(Posterior):
         own = self.grid.profiles
         more = {"families": own.families, "prior": own.prior}
         profiles = Profiles.without_field(self.problem, self.peaks, **more)
-        grid = self._inferred_again(self.problem, profiles, None).grid
+        grid = self._again(self.problem, profiles, None).grid
         return Prediction.of(grid, problem, Simulation(method, None, self.seed, None))
 
     def law(self, problem: Problem, method: Any) -> Prediction | None:

@@ -209,10 +209,8 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     names, location, scale = affine_parameters(field.marginal)
     if "mean" in names and {MARGINAL + "low", MARGINAL + "high"} & {*changed}:
         return none  # a bound of such a marginal changes its shape
-    places = {
-        changed.index(MARGINAL + name): name for name in names if MARGINAL + name in changed
-    }
-    slopes = np.array([SLOPES[name] for name in places.values()], dtype=float).reshape(-1, 2)
+    scaling = [name for name in names if MARGINAL + name in changed]
+    slopes = np.array([SLOPES[name] for name in scaling], dtype=float).reshape(-1, 2)
     # 6.
     varies = field.quantity is not None and np.ndim(pressure) > 0
     varies = varies or np.ptp(problem.load_profile) > 0.0
@@ -225,7 +223,7 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     slopes[:, 0] -= location * slopes[:, 1]
     # Onsets are stresses, or coefficients if the peaks are coefficients.
     mean = 1.0 if pressure is None else float(np.mean(pressure))
-    slopes[:, 0] *= mean ** (
-        (field.quantity is not None) - (variable == "friction_coefficient")
-    )
-    return Scaling(tuple(places), middle, slopes)
+    power = (field.quantity is not None) - (variable == "friction_coefficient")
+    slopes[:, 0] *= mean**power
+    places = tuple(changed.index(MARGINAL + name) for name in scaling)
+    return Scaling(places, middle, slopes)

@@ -333,9 +333,8 @@ def grid_of_profiles(
     for _ in range(MAX_MEAN_ZOOMS):
         means = box[0] + np.ptp(box) * (np.arange(MEAN_CELLS) + 0.5) / MEAN_CELLS
         # 3. and 4.
-        kernel = np.array(
-            [[masses(name, cv, means, x) for cv in cells] for name in profiles.families]
-        )
+        rows = [[masses(name, cv, means, x) for cv in cells] for name in profiles.families]
+        kernel: Array = np.array(rows)
         before = _products(kernel, of_levels)
         if profiles.prior.mean is not None:
             # The density of log m is m times the density of m.
@@ -362,9 +361,8 @@ def grid_of_profiles(
             break
         # One empty cell stays as a margin.
         box = box + np.ptp(box) / MEAN_CELLS * np.maximum(empty - 1, 0) * [1, -1]
-    return FactorGrid(profiles, means, np.exp(before)), FactorGrid(
-        profiles, means, mass, evidence
-    )
+    both = FactorGrid(profiles, means, mass, evidence)
+    return FactorGrid(profiles, means, np.exp(before)), both
 
 
 def _products(kernel: Array, tables: Array) -> Array:
@@ -512,10 +510,8 @@ class Prediction(NamedTuple):
         scatters = self.tables.profiles.prior.cells()
         cv = float(self.grid.mass.sum(axis=(0, 1, 3)) @ scatters)
         x = np.linspace(-LOWEST, LOG_MEAN_MARGIN, PREDICTED)
-        first_mass, second_mass = (
-            masses(one, cv, np.zeros(1), x)[0] for one in (first, second)
-        )
-        return float(scipy.stats.entropy(first_mass, np.maximum(second_mass, 1e-300)))
+        p, q = (masses(family, cv, np.zeros(1), x)[0] for family in (first, second))
+        return float(scipy.stats.entropy(p, np.maximum(q, 1e-300)))
 
     @property
     def families(self) -> list[str]:
@@ -538,10 +534,8 @@ def tables_of(
     """Return the likelihood of peaks, from onsets simulated for each specimen type (step 1)."""
     variable_of(problem, profiles.fields[0], measured.unit)  # checks it
     kinds = range(len(measured.values))
-    onsets = tuple(
-        _onsets(problem, profiles, simulation, measured, kind, error) for kind in kinds
-    )
-    return Tables(profiles, simulation.method, onsets, error, measured.values)
+    onsets = [_onsets(problem, profiles, simulation, measured, kind, error) for kind in kinds]
+    return Tables(profiles, simulation.method, tuple(onsets), error, measured.values)
 
 
 def _onsets(
