@@ -109,10 +109,8 @@ class Sample(Result, _Profiles):
 
     def part(self, some: slice) -> Sample:
         """Return some samples of the batch."""
-        rows_of_part = {
-            name: rows[some] for name, rows in self._asdict().items() if name in PROFILES
-        }
-        return self._replace(**rows_of_part)
+        profiles = {name: rows for name, rows in self._asdict().items() if name in PROFILES}
+        return self._replace(**{name: rows[some] for name, rows in profiles.items()})
 
     @property
     def uniform_weakening(self) -> bool:
@@ -242,21 +240,17 @@ def _offset(dim: str, x: Array, interface: Interface) -> float:
 def _check_repeats(
     values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
 ) -> None:
-    """Refuse two points at the same place, unless they have the same value a period apart."""
+    """Refuse two different values at a place. `twins` are the first points at each place."""
     rows = values.reshape(-1, twins.size)
-    for i in np.flatnonzero(twins != np.arange(twins.size)):
-        pair = [twins[i], i]
-        sides = zip(places.values(), interface.lengths, strict=True)
-        apart = max(np.ptp(x[pair]) / length for x, length in sides)
-        first, second = rows.T[pair]
-        if apart < 0.5 or not np.array_equal(first, second, equal_nan=True):
-            where = ", ".join(
-                f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
-            )
-            raise InputError(
-                f"{where} are the same position on an interface of period {interface.length}"
-                f" m. Keep either value{'' if interface.is_plane else OF_A_PLANE}"
-            )
+    same = (rows == rows[:, twins]) | np.isnan(rows) & np.isnan(rows[:, twins])
+    for i in np.flatnonzero(~same.all(axis=0))[:1]:
+        where = ", ".join(
+            f"{dim} = {x[twins[i]]:.9g} and {x[i]:.9g} m" for dim, x in places.items()
+        )
+        raise InputError(
+            f"{where} are the same position on an interface of period {interface.length}"
+            f" m. Keep either value{'' if interface.is_plane else OF_A_PLANE}"
+        )
 
 
 # -- 2. values -------------------------------------------------------------------------------------

@@ -88,13 +88,14 @@ def load(path: Path, options: Options) -> Table | xr.Dataset | Array:
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
         return read_table(path, options)
-    readers: dict[str, Any] = {".npy": _read_npy} | dict.fromkeys(NETCDF, _read_netcdf)
-    if ending not in readers:
-        endings = ", ".join((*TEXT, EXCEL, *readers))
-        raise InputError(
-            f"must end in {endings}, got {path.name!r}. Export text from the instrument"
-        )
-    return readers[ending](content_of(path))
+    if ending == ".npy":
+        return _read_npy(content_of(path))
+    if ending in NETCDF:
+        return _read_netcdf(content_of(path))
+    endings = ", ".join((*TEXT, EXCEL, ".npy", *NETCDF))
+    raise InputError(
+        f"must end in {endings}, got {path.name!r}. Export text from the instrument"
+    )
 
 
 def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008  # a tuple

@@ -88,10 +88,18 @@ class Options(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line of a table: its number (from 1) and its cells."""
+    """A line of a table: its number (from 1), its cells, and their kinds.
+
+    The kinds are 'number', 'missing' and 'word'.
+    """
 
     number: int
     cells: list[str]
+    kinds: Sequence[str] = ()
+
+    def of_kind(self, kind: str, columns: Iterable[int]) -> list[str]:
+        """Return the cells of a kind in some columns."""
+        return [self.cells[i] for i in columns if self.kinds[i : i + 1] == [kind]]
 
     @property
     def text(self) -> str:
@@ -141,11 +149,15 @@ def split_at_blanks(line: str, words: set[str]) -> list[str]:
 def table_of(grid: Grid, options: Options, source: str) -> Table:
     """Return the columns of a table with names, units and numbers (steps 1 to 5)."""
     words, separator = options.words, grid.separator
-    rows = [row for row in grid.rows if any(row.cells)]
+    rows = [
+        row._replace(kinds=[_kind(cell, words) for cell in row.cells])
+        for row in grid.rows
+        if any(row.cells)
+    ]
     # 1.
-    numeric = _numeric_columns(rows, words)
+    numeric = _numeric_columns(rows)
     # 2.
-    header, rows, left_out, begins = _rows_of_data(rows, numeric, words, separator)
+    header, rows, left_out, begins = _rows_of_data(rows, numeric, separator)
     width = max(len(row.cells) for row in rows)
     while not any(len(row.cells) >= width and row.cells[width - 1] for row in rows):
         width -= 1  # a column that is empty in all rows comes from a separator at the end
@@ -196,22 +208,15 @@ def _not_a_number(line: int, cell: str) -> str:
     return f"line {line}: {describe(cell)} is not a number. {advice}"
 
 
-def _is_value(cell: str, words: set[str]) -> bool:
-    """Return whether a cell holds a number."""
-    value = _number(cell, words, None)
-    return bool(NUMBER.match(cell)) or (value is not None and value == value)
+def _kind(cell: str, words: set[str]) -> str:
+    """Return whether a cell holds a number, a missing value or another word."""
+    value = 0.0 if NUMBER.match(cell) else _number(cell, words, None)
+    return "word" if value is None else "number" if value == value else "missing"
 
 
-def _is_word(cell: str, words: set[str]) -> bool:
-    """Return whether a cell holds neither a number nor a missing value."""
-    return not NUMBER.match(cell) and _number(cell, words, None) is None
-
-
-def _numeric_columns(rows: Sequence[Row], words: set[str]) -> list[int]:
+def _numeric_columns(rows: Sequence[Row]) -> list[int]:
     """Return the columns in which most rows with numbers have them (step 1)."""
-    places = [
-        tuple(i for i, cell in enumerate(row.cells) if _is_value(cell, words)) for row in rows
-    ]
+    places = [tuple(i for i, kind in enumerate(row.kinds) if kind == "number") for row in rows]
     counts = Counter(filter(None, places))
     if not counts:
         raise InputError("holds no numbers")
@@ -221,32 +226,25 @@ def _numeric_columns(rows: Sequence[Row], words: set[str]) -> list[int]:
     for row, place in zip(rows, places, strict=True):
         if usual & {*place}:
             values.update(place)
-            texts.update(i for i, cell in enumerate(row.cells) if _is_word(cell, words))
+            texts.update(i for i, kind in enumerate(row.kinds) if kind == "word")
     return sorted(i for i in values if values[i] > texts[i] and (i in usual or values[i] > 1))
 
 
 def _rows_of_data(
-    rows: Sequence[Row], numeric: Sequence[int], words: set[str], separator: str
+    rows: Sequence[Row], numeric: Sequence[int], separator: str
 ) -> tuple[list[Row], list[Row], list[str], tuple[int, ...]]:
     """Return the headings, the rows with data, the rows left out, and where tables begin."""
-
-    def wrong(row: Row) -> list[str]:
-        """Return the words in the columns with numbers."""
-        cells = [row.cells[i] for i in numeric if i < len(row.cells)]
-        return [cell for cell in cells if _is_word(cell, words)]
-
-    def has_number(row: Row) -> bool:
-        return any(_is_value(row.cells[i], words) for i in numeric if i < len(row.cells))
-
-    left_out, statistics = [], _statistics(rows, words)
+    wrong = [row.of_kind("word", numeric) for row in rows]
+    has_number = [bool(row.of_kind("number", numeric)) for row in rows]
+    left_out, statistics = [], _statistics(rows)
     start = next(
-        i
-        for i, row in enumerate(rows)
-        if i not in statistics and has_number(row) and not wrong(row)
+        i for i in range(len(rows)) if i not in statistics and has_number[i] and not wrong[i]
     )
-    header = [row for i, row in enumerate(rows[:start]) if i not in statistics]
-    if header and not _are_units(header[-1].cells) and has_number(row := header[-1]):
-        raise InputError(_not_a_number(row.number, wrong(row)[0]))  # one value is wrong
+    above = [i for i in range(start) if i not in statistics]
+    header = [rows[i] for i in above]
+    if header and not _are_units(header[-1].cells) and has_number[above[-1]]:
+        # A single value is wrong.
+        raise InputError(_not_a_number(header[-1].number, wrong[above[-1]][0]))
     data: list[Row] = []
     known = [row.cells for row in header]
     begins, interrupted = [rows[start].number], False
@@ -256,28 +254,28 @@ def _rows_of_data(
             interrupted = bool(data)
         elif place < start or row.cells in known:
             continue  # a heading may be repeated above each record
-        elif not wrong(row):
-            if interrupted and has_number(row):
+        elif not wrong[place]:
+            if interrupted and has_number[place]:
                 begins.append(row.number)
             interrupted = False
             data.append(row)
-        elif not has_number(row) and (
+        elif not has_number[place] and (
             len([*filter(None, row.cells)]) < max(2, len(numeric)) or separator == " "
         ):
             left_out.append(f"{row.text} (no numbers)")
             interrupted = True
         else:
-            raise InputError(_not_a_number(row.number, wrong(row)[0]))
+            raise InputError(_not_a_number(row.number, wrong[place][0]))
     return header, data, left_out, tuple(begins) if len(begins) > 1 else ()
 
 
-def _statistics(rows: Sequence[Row], words: set[str]) -> set[int]:
+def _statistics(rows: Sequence[Row]) -> set[int]:
     """Return the rows that begin with the name of a statistic and hold a number (step 2)."""
     labels = []
     for row in rows:
-        label = next(filter(None, row.cells)).casefold()
-        has_number = any(_is_value(cell, words) for cell in row.cells)
-        labels.append(label.rstrip(" .:=") if has_number and _is_word(label, words) else "")
+        label, kind = next(pair for pair in zip(row.cells, row.kinds, strict=True) if pair[0])
+        named = kind == "word" and "number" in row.kinds
+        labels.append(label.casefold().rstrip(" .:=") if named else "")
     long = {i for i, label in enumerate(labels) if re.split(r"[\s(]", label)[0] in STATISTICS}
     short = {i for i, label in enumerate(labels) if label in SHORT_STATISTICS}
     known = long | short  # a short name counts next to another
@@ -401,7 +399,7 @@ def _headings(header: list[Row], width: int) -> list[tuple[str, str, str]]:
     header = [row for row in header if not {*row.cells} <= {"", "-"}]
     if not header:
         return [(str(number), "", "") for number in range(width)]
-    number, names = header[-1]
+    number, names, _ = header[-1]
     if len(names) != width:
         raise InputError(
             f"line {number} names {len(names)} columns, the numbers below it have {width}. Begin"
