@@ -25,6 +25,18 @@ def test_a_refusal_is_short_pickles_and_is_a_value_error():
     assert pickle.loads(pickle.dumps(error)).problems == ("a", "b")
 
 
+def test_an_interface_in_a_specimen_cannot_be_periodic():
+    blocks, solid = st.Blocks(height=0.05), PROBLEM.solid
+    for ends in ("free", None):
+        interface = st.Interface(0.1, 256, ends=ends)
+        problem = st.Problem(solid, interface, PROBLEM.friction, specimen=blocks)
+        assert problem.interface.is_free
+    interface = st.Interface(0.1, 256, ends="periodic")
+    assert not st.Problem(solid, interface, PROBLEM.friction).interface.is_free
+    with pytest.raises(st.InputError, match="interface.ends: the ends of a specimen are free"):
+        st.Problem(solid, interface, PROBLEM.friction, specimen=blocks)
+
+
 def test_errors_of_equilibrium_are_warned_of():
     no, ones = np.zeros(2, dtype=bool), np.ones(2)
     values = {
