@@ -160,15 +160,6 @@ class EquallyLikely:
                     f" coefficients: [0] has {first}, and [{number}] {named}"
                 )
 
-    def __eq__(self, other: object) -> bool:
-        """Compare a single member by its value, and several members by identity."""
-        if not isinstance(other, EquallyLikely) or self.several or other.several:
-            return self is other
-        return self.members == other.members
-
-    def __hash__(self) -> int:
-        return id(self) if self.several else hash(self.members)
-
     @property
     def several(self) -> bool:
         """Whether there are several members."""
