@@ -9,7 +9,7 @@ import xarray as xr
 from setups import beta_strength
 
 import stiction as st
-from stiction.random.conditioning import conditionings
+from stiction.random.conditioning import conditioning_of
 from stiction.random.mapping import from_normal
 
 LINE = st.Interface(length=0.05, nodes=64)
@@ -31,7 +31,7 @@ def all_of(coordinates):
 
 
 def conditioning(given, interface):
-    ((_, known),) = conditionings(st.RandomInterface(strength=given), interface)
+    _, known = conditioning_of(st.RandomInterface(strength=given), interface)
     return known
 
 

@@ -48,9 +48,9 @@ import numpy as np
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
-from stiction.inference.estimate import NAMES, BestFit, estimate
+from stiction.inference.estimate import BestFit, estimate
 from stiction.inference.marginal_fit import LEAST_SHAPE, WIDEST, Family, beta_of
-from stiction.inference.whittle import RANGES, offset
+from stiction.inference.whittle import NAMES, RANGES, offset
 from stiction.random.dotted_keys import full_key, with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta

@@ -58,6 +58,7 @@ from stiction.base.errors import InputError, UnitWarning, collect_warnings, issu
 from stiction.inference.marginal_fit import Family, mean_log_likelihood
 from stiction.inference.records import Record
 from stiction.inference.whittle import (
+    NAMES,
     Model,
     Observed,
     SpectrumFamily,
@@ -73,8 +74,6 @@ NEGLIGIBLE_CHANGE = 1e-4
 """Change of the noise variance, as a fraction of the variance, that does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
 """Lags in correlation lengths. The correlation of every spectrum falls to 1/e within them."""
-NAMES = ("correlation_length", "exponent", "anisotropy")
-"""Estimated parameters of a spectrum, by their keys."""
 LEAST_LEFT = 0.2
 """Least fraction of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2

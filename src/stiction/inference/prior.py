@@ -15,7 +15,7 @@ from stiction.base.model import describe
 from stiction.ensemble.limit_state import scales_with_strength
 from stiction.methods.protocol import optional_member
 from stiction.problem.problem import Problem
-from stiction.random.dotted_keys import distributions_of, full_key, short_key, with_values
+from stiction.random.dotted_keys import distributions_of, full_key, with_values
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.random.marginals import affine_parameters
 
@@ -129,7 +129,6 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
         )
     random = as_random_interface(random)
     refuse_conditioned([random])
-    distributions = {short_key(key): law for key, law in distributions.items()}
     prior = Prior(problem, random, distributions)
     # Parameters that are valid at all corners are valid between them.
     for corner in itertools.product(*prior.ends.T):

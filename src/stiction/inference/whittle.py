@@ -74,7 +74,8 @@ FLOOR = 1e-3
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
 """Hermite orders of the map of a marginal, and steps of z that give them to 1e-4."""
-REPORTED_AT_END = ("correlation_length", "exponent", "anisotropy")
+NAMES = ("correlation_length", "exponent", "anisotropy")
+"""Parameters of a spectrum, by their keys."""
 AT_END = 1e-3
 """Largest distance of an estimate at an end of a range, as a fraction of the range."""
 LOG_STEP = 1e-4
@@ -232,7 +233,7 @@ class SpectrumFamily:
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
         pairs = zip(self.of(model).items(), near, strict=True)
-        return {name: value for (name, value), end in pairs if end and name in REPORTED_AT_END}
+        return {name: value for (name, value), end in pairs if end and name in NAMES}
 
 
 class Whittle(NamedTuple):

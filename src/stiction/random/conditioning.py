@@ -187,10 +187,9 @@ class Conditions:
         low, high = marginal.distribution.support()
         outside = np.maximum(low - self.values, self.values - high)
         if outside.max() > MAX_ERRORS_OUTSIDE * self.noise:
-            *place, value = self.profile[:, outside.argmax()]
-            at = ", ".join(f"{name} = {x:g} m" for name, x in zip(names, place, strict=True))
+            *place, value = self.profile[:, outside.argmax()].tolist()
             problems.append(
-                f"conditions.profile: {value:g} at {at} lies outside the marginal, from {low:g} to"
+                f"conditions.profile: {value:g} at {place} m lies outside the marginal, {low:g} to"
                 f" {high:g}, by more than {MAX_ERRORS_OUTSIDE:g} times its error of {self.noise:g}"
             )
         if problems:
@@ -405,43 +404,36 @@ def lower_factor(matrix: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def conditionings(
+def conditioning_of(
     random: Any, interface: Interface
-) -> list[tuple[NDArray[np.int64], Conditioning]]:
-    """Return the columns and the conditioning for each group of correlated properties.
+) -> tuple[NDArray[np.int64], Conditioning] | None:
+    """Return the columns of the conditioned draws and their conditioning, or None.
 
     `random` is a `stiction.random.fields.RandomInterface`.
     """
-    fields = list(random.properties.values())
-    if all(field.conditions is None for field in fields):
-        return []
+    if all(field.conditions is None for field in random.properties.values()):
+        return None
     streams = layout(random, interface)
-    columns = [np.r_[stream.columns] for stream in streams]
-    factor, groups = lower_factor(random.matrix), []
-    for group in np.unique(random.linked, axis=0):
-        members = np.flatnonzero(group)
-        of_group = np.concatenate([columns[j] for j in members])
-        marginals, noises, values, rows = [], [], [], []
-        for i in members:
-            name, conditions = random.names[i], fields[i].conditions
-            if conditions is None:
-                continue
-            conditions.check(fields[i].marginal, interface)
-            count, dimension = conditions.values.size, random.dimension(interface)
-            check_memory(
-                f"{name}.conditions.profile", 24.0 * count * dimension, "give fewer places"
-            )
-            # z combines the property's own draws with the draws of
-            # earlier properties.
-            basis = fields[i].modes(interface).basis(conditions.places)
-            phi = np.zeros((count, dimension))
-            for j in np.flatnonzero(factor[i]):
-                phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
-            marginals.append((fields[i].marginal, count))
-            noises.append(np.full(count, conditions.noise))
-            values.append(conditions.values)
-            rows.append(phi[:, of_group])
-        if marginals:
-            parts = map(np.concatenate, (values, noises, rows))
-            groups.append((of_group, conditioned(Measured(marginals, *parts))))
-    return groups
+    columns, factor = [np.r_[stream.columns] for stream in streams], lower_factor(random.matrix)
+    marginals, noises, values, rows = [], [], [], []
+    for i, (name, field) in enumerate(random.properties.items()):
+        if (conditions := field.conditions) is None:
+            continue
+        conditions.check(field.marginal, interface)
+        shape = conditions.values.size, random.dimension(interface)
+        check_memory(f"{name}.conditions.profile", 24.0 * np.prod(shape), "give fewer places")
+        # z combines the property's own draws with the draws of
+        # earlier properties.
+        basis, phi = field.modes(interface).basis(conditions.places), np.zeros(shape)
+        for j in np.flatnonzero(factor[i]):
+            phi[:, columns[j][streams[i].of_property]] = factor[i, j] * basis
+        marginals.append((field.marginal, shape[0]))
+        noises.append(np.full(shape[0], conditions.noise))
+        values.append(conditions.values)
+        rows.append(phi)
+    whole = np.concatenate(rows)
+    used = np.flatnonzero(whole.any(axis=0))
+    measured = Measured(
+        marginals, np.concatenate(values), np.concatenate(noises), whole[:, used]
+    )
+    return used, conditioned(measured)

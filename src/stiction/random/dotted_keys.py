@@ -95,16 +95,16 @@ def short_key(key: str) -> str:
 
 
 def distributions_of(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return frozen distributions by key, or raise an `InputError` that lists all mistakes."""
+    """Return frozen distributions by short key, or raise an `InputError` with all mistakes."""
     problems: list[str] = []
     distributions: dict[str, Any] = {}
     for key, value in given.items():
-        # A name and its full key are the same
-        # parameter. All mistakes are listed.
         try:
-            if full_key(str(key)) in map(full_key, distributions):
+            # A name and its full key are the same parameter.
+            name = short_key(str(key))
+            if name in distributions:
                 problems.append(f"{key} is given twice: it is the same parameter")
-            distributions[str(key)] = distribution_of(str(key), value)
+            distributions[name] = distribution_of(str(key), value)
         except InputError as error:
             problems += error.problems
     if problems:

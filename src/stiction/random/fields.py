@@ -7,8 +7,7 @@ field (M. Grigoriu, Applied Non-Gaussian Processes, 1995).
 
 Algorithm (`RandomInterface.from_draws`)
 ----------------------------------------
-1. Condition the draws on measured values, group by group of correlated properties
-   (`conditioning`).
+1. Condition the draws on measured values (`conditioning`).
 2. Combine a property's own draws with the draws of earlier properties
    by the Cholesky factor of the correlation matrix (`lower_factor`).
 3. Synthesise the Gaussian field z from its modes (`synthesis`), and map it
@@ -47,7 +46,7 @@ from stiction.base.model import (
 from stiction.base.units import is_in
 from stiction.problem.friction import SCALES
 from stiction.problem.interface import Interface
-from stiction.random.conditioning import MIN_PIVOT, Conditions, conditionings, lower_factor
+from stiction.random.conditioning import MIN_PIVOT, Conditions, conditioning_of, lower_factor
 from stiction.random.mapping import correlation_of_mapped, from_normal, hermite_coefficients
 from stiction.random.marginals import AnyMarginal, AnyMarginals
 from stiction.random.spectra import Share, Spectrum, lag_of_correlation
@@ -159,10 +158,10 @@ class RandomField(Listed):
     def quantile(self, interface: Interface, probability: Share) -> Array:
         """Return the quantile of the field at each node, given the measured values."""
         mean, deviation = np.zeros(interface.size), np.ones(interface.size)
-        for _, conditioning in conditionings(self._alone, interface):
+        if known := conditioning_of(self._alone, interface):
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
             phi = self.modes(interface).basis(np.array([row.ravel() for row in grid]))
-            mean, deviation = conditioning.regression.moments(phi)
+            mean, deviation = known[1].regression.moments(phi)
         # The marginal rises, so quantiles of z become quantiles of the field.
         z = mean + float(ndtri(probability)) * deviation
         return from_normal(self.marginal, z).reshape(interface.shape)
@@ -450,9 +449,9 @@ class RandomInterface(Listed):
         """
         check_draws(draws, self.dimension(interface))
         streams = layout(self, interface)
-        # 1. Groups have different columns, so their order does not matter.
-        for columns, conditioning in conditionings(self, interface):
-            draws = draws.copy()
+        # 1.
+        if known := conditioning_of(self, interface):
+            draws, (columns, conditioning) = draws.copy(), known
             draws[:, columns] = conditioning.draws(draws[:, columns])
         profiles: dict[str, Array] = {}
         independent = [draws[:, stream.columns] for stream in streams]
@@ -489,8 +488,8 @@ class RandomInterface(Listed):
         """Warn if the grid is too coarse or the interface too short for a field."""
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
-        for _, conditioning in conditionings(self, interface):
-            conditioning.warn()
+        if known := conditioning_of(self, interface):
+            known[1].warn()
 
 
 def check_draws(draws: Array, dimension: int) -> None:
