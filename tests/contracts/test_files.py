@@ -77,7 +77,7 @@ def test_a_run_folder_and_its_exports_hold_the_study(name, tmp_path):
             np.testing.assert_allclose(table[column], values, rtol=1e-12, err_msg=key)
             assert values.units in column or values.units == "1", column
     again = st.Study.from_dict(study.to_dict())
-    assert again == study
+    assert again == study == st.Study.from_result(whole)
 
 
 @pytest.mark.parametrize("name", ["line", "blocks"])

@@ -209,12 +209,19 @@ SLIPS = 500.0 * np.array([1.0, 0.93, 1.08, 1.02, 0.96])  # N
 OF_TESTS = {"method": LOCAL, "progress": False}
 
 
+@pytest.fixture
+def few_members(monkeypatch):
+    """Lists of two hundred members, where a thousand are drawn otherwise."""
+    monkeypatch.setattr("stiction.random.equally_likely.FIRST_MEMBERS", 200)
+
+
 @pytest.fixture(scope="module")
 def tests_alone():
     return st.infer(JOINT, FIELD, SLIPS, unit="N", samples=100, **OF_TESTS)
 
 
 @pytest.mark.parametrize("probability", [1e-2, 1e-5])
+@pytest.mark.usefixtures("few_members")
 def test_a_design_from_tests_names_all_at_any_probability(tests_alone, probability, tmp_path):
     """What tests calibrate has no effect twice; families, values and assumptions are told."""
     design = st.design_stress(

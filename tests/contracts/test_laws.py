@@ -60,7 +60,10 @@ CLASSES = {  # examples of all classes that a study file names, by the key of th
 @pytest.mark.parametrize(
     ("key", "name"), [(key, name) for key in CLASSES for name in CLASSES[key]]
 )
-def test_an_unregistered_subclass_is_not_written_as_its_parent(key, name, tmp_path):
+def test_a_class_comes_back_from_a_file_and_a_subclass_is_not_written_as_its_parent(
+    key, name, tmp_path
+):
+    """Until it is registered."""
     example = CLASSES[key][name]
     own = extensions.model(type("Own", (type(example),), {}))
     fields = [field.name for field in dataclasses.fields(example) if field.init]
@@ -73,6 +76,10 @@ def test_an_unregistered_subclass_is_not_written_as_its_parent(key, name, tmp_pa
         problem=problem, random=field, method=CLASSES["method"]["rupture"], samples=2
     )
     given = {part: getattr(study, part) for part in ("problem", "random", "method")}
+    known = dataclasses.replace(study, **with_values(given, {key: example}))
+    known.to_toml(tmp_path / "known.toml")
+    assert st.Study.from_toml(tmp_path / "known.toml") == known
+    (tmp_path / "known.toml").unlink()
     study = dataclasses.replace(study, **with_values(given, {key: instance}))
     for call in (
         lambda: study.to_toml(tmp_path / "study.toml"), lambda: study.to_dict(),

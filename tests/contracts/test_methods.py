@@ -183,6 +183,8 @@ def test_alone_equals_in_a_batch_in_any_order(kind, name):
     batch = plain(kind, name)
     turned = onset(name, method, SAMPLES[name][order])
     assert same(batch.isel(sample=order).drop_vars("sample"), turned.drop_vars("sample"))
+    ready = BODIES[name].sample(profiles_of(BODIES[name], SAMPLES[name]))
+    assert same(st.onset(BODIES[name], ready, method=method, progress=False), batch)
     for number, strength in enumerate(SAMPLES[name]):
         alone = onset(name, method, strength[None])
         assert same(batch.isel(sample=[number]).drop_vars("sample"), alone.drop_vars("sample"))

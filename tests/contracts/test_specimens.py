@@ -59,7 +59,7 @@ BODIES = {  # a number of each field of Load, Blocks, Slider, Base and of each d
     "dead load": body(blocks(st.Platen())),
     "machine": body(blocks(st.Platen(stiffness=3e7, mass=0.1), quality_factor=9.0)),
     "rigid machine": body(blocks(st.Platen(stiffness=INF))),
-    "glued": body(blocks(st.Platen(), pressing="glued")),
+    "glued": body(blocks(st.Platen(), pressing="glued"), st.Load(pressing_force=1.1e3)),
     "pusher up to the top": body(blocks(pusher(0.9, 0.2))),
     "pusher down to the interface": body(blocks(pusher(0.04, 0.08, side="right", stiffness=2e7))),
     "pusher of a whole side": body(blocks(pusher(0.5, 1.0, mass=0.05, stiffness=2e7))),
@@ -164,6 +164,22 @@ def test_twice_the_pressure_and_slip_are_twice_the_stress(name, kind):
     assert_alike(
         before[names], after[names], 1e-9 if kind == "equilibrium" else 1e-5, factors.get
     )
+
+
+@pytest.mark.parametrize("name", [n for n in BODIES if BODIES[n].load.pressing_force])
+def test_a_pressing_force_is_its_mean_pressure_times_the_area(name):
+    """Alone, and in a sweep of it from a file."""
+    w, force = world(name, "equilibrium"), BODIES[name].load.pressing_force
+    assert w.study.problem == BODIES[name]
+    load = st.Load(normal_pressure=force / BODIES[name].area)
+    pressed = dataclasses.replace(w.problem, load=load)
+    after = st.onset(pressed, w.profiles(), method=w.method, progress=False)
+    assert_alike(plain(name, "equilibrium"), after.drop_vars(JUMPING, errors="ignore"), 1e-9)
+    sweep = [{"problem.load.pressing_force": [0.8 * force, force]}]
+    swept = st.Study.from_dict(w.plain | {"sweep": sweep}).run(progress=False, pilot=False)
+    drawn = w.study.run(progress=False, pilot=False)
+    np.testing.assert_array_equal(swept.critical_force[1], drawn.critical_force)
+    assert swept.pressing_force.units == "N"
 
 
 @every

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.stats
 from scipy.integrate import quad
-from setups import beta_strength, exact_onset, make_problem
+from setups import beta_strength
 
 import stiction as st
 from stiction.random.fields import lower_factor
@@ -87,22 +87,6 @@ def test_a_cut_of_a_plane_has_the_correlation_of_the_line(spectrum):
         # Each is a mean of cosines with its share missing, and 1 at zero lag.
         assert np.abs(plane[:, 0] - line).max() <= 2.0 * left_out + 1e-6
         np.testing.assert_allclose(plane, plane.T, atol=1e-12)
-
-
-def test_efolding_lengths():
-    whole = st.SquaredExponentialSpectrum(correlation_length=0.7, power_kept=1.0 - 1e-15)
-    assert whole.efolding_length == pytest.approx(0.7, rel=1e-12)
-    # The power left out by truncation at 1 - 1e-6 lengthens it by about as much.
-    rough = st.ExponentialSpectrum(correlation_length=0.7, power_kept=1.0 - 1e-6)
-    assert rough.efolding_length == pytest.approx(0.7, rel=3e-6)
-    power = st.PowerLawSpectrum(correlation_length=0.7, exponent=2.0)
-    again = power.with_efolding_length(0.2)
-    assert again.correlation([0.2]).item() == pytest.approx(np.exp(-1.0), rel=1e-12)
-    assert again.exponent == 2.0
-    one = st.PowerLawSpectrum(correlation_length=1.0).efolding_length
-    for scale in (1e-9, 1e6):  # units of length
-        other = st.PowerLawSpectrum(correlation_length=scale).efolding_length
-        assert other == pytest.approx(one * scale, rel=1e-12)
 
 
 @pytest.mark.filterwarnings("ignore:Error in function:RuntimeWarning")  # scipy, of invgauss
@@ -453,13 +437,6 @@ def test_a_property_keeps_its_draws_whatever_else_is_random(make_strength, resid
     assert np.array_equal(two["residual_strength"], three["residual_strength"])
 
 
-def test_residual_ratio_is_the_same_thing(problem, make_strength):
-    tau_p = make_strength(1.0).sample(LINE, samples=3, seed=2)
-    own = exact_onset(make_problem(residual_ratio=0.5), tau_p)
-    other = exact_onset(problem, {"strength": tau_p, "residual_strength": 0.5 * tau_p})
-    assert np.array_equal(own.critical_stress, other.critical_stress)
-
-
 @pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])
 def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
     """A and B are correlated, B and C: the response to each draw, as a matrix, times itself."""
@@ -498,17 +475,6 @@ def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
         found = (here.T @ there)[0].reshape(interface.shape)  # of the first node with all
         # The map is tabulated to 1e-9.
         np.testing.assert_allclose(found, expected, atol=1e-7)
-
-
-def test_fracture_energy_and_critical_slip_as_random_properties(make_strength):
-    """W follows from tau_p - tau_r and Gamma or d_c, node by node."""
-    problem = make_problem(512, weakening_rate=None)
-    tau_p = make_strength(1.0).sample(problem.interface, samples=2, seed=1)
-    energy, slip = 0.8, 1.9e-6
-    by_energy = problem.sample({"strength": tau_p, "fracture_energy": energy})
-    assert np.allclose(by_energy.weakening_rate, tau_p**2 / (2.0 * energy), rtol=1e-15)
-    by_slip = problem.sample({"strength": tau_p, "critical_slip": slip})
-    assert np.allclose(by_slip.weakening_rate, tau_p / slip, rtol=1e-15)
 
 
 def test_factor_of_a_singular_matrix():

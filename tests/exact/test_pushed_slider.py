@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from refusals import refuses
 from setups import EXACT
-from sliders import SLIDER, coefficients, rig_problem
+from sliders import coefficients, rig_problem
 
 import stiction as st
 from stiction.methods.equilibrium import slider as stages
@@ -53,35 +53,6 @@ def test_forces_balance_along_the_path(name):
         np.testing.assert_allclose(along, along[0], rtol=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_a_push_from_the_right_is_the_mirror_image():
-    left = rig_problem(drive=PUSH, tilt=0.3)
-    right = rig_problem(drive=dataclasses.replace(PUSH, side="right"), tilt=0.3)
-    base = dataclasses.replace(SLIDER.base, behind=SLIDER.base.behind)
-    assert base == right.specimen.base  # behind and ahead count along the push
-    mu = coefficients(left)
-    mirrored = mu.copy(data=mu.values[::-1])
-    first, second = solved(left, mu, slip=True), solved(right, mirrored, slip=True)
-    for name in ("critical_load", "first_instability", "arrested_events", "open_fraction"):
-        np.testing.assert_allclose(first[name], second[name], rtol=1e-10)
-    np.testing.assert_allclose(first.slip[0], second.slip[0, ::-1], atol=1e-15)
-    together = float(first.critical_position[0] + second.critical_position[0])
-    assert together == pytest.approx(0.14)
-
-
-@pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-def test_the_sensitivity_is_the_derivative():
-    problem = rig_problem(drive=PUSH)
-    mu = coefficients(problem)
-    found, step = solved(problem, mu, sensitivity=True), 1e-6
-    raised = solved(problem, mu + step)
-    pressure = 4e3 / (0.14 * 0.006)
-    expected = float(raised.first_instability[0] - found.first_instability[0]) / (
-        step * pressure
-    )
-    assert float(found.sensitivity.sum()) == pytest.approx(expected, rel=1e-4)
-
-
 def test_only_linear_weakening_is_followed():
     law = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.3, 0.0], critical_slip=1e-4)
     problem = rig_problem(problem={"friction": law})
@@ -93,14 +64,6 @@ def test_only_linear_weakening_is_followed():
         lambda: st.plot.specimen(problem, mu),
     ):
         refuses("friction ... LinearWeakening", call)
-
-
-def test_a_path_with_inertia_is_refused():
-    problem = rig_problem()
-    refuses(
-        "method ... equal blocks",
-        lambda: st.equilibrium_path(problem, coefficients(problem), [1e6], method=st.Rupture()),
-    )
 
 
 @pytest.mark.parametrize("rate", [5e9, 2e10])

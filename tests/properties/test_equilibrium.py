@@ -65,21 +65,6 @@ def test_never_above_the_discrete_local_criterion(problem, tau_p):
     assert onset.first_instability.item() <= bound * (1.0 + 1e-13)
 
 
-@settings(max_examples=20, deadline=None)
-@given(problem=uniform_problems, tau_p=profiles, constant=hs.floats(1e4, 1e6))
-def test_a_constant_shifts_the_load(problem, tau_p, constant):
-    length = problem.interface.length
-    shifted = make_problem(NODES, length, residual_strength=constant)
-    stressed = make_problem(NODES, length, load=st.Load(initial_stress=-constant))
-    one, two = solve(problem, tau_p), solve(shifted, tau_p + constant)
-    three = solve(stressed, tau_p)
-    for other in (two, three):
-        np.testing.assert_allclose(
-            other.critical_load, one.critical_load + constant, rtol=1e-10
-        )
-    np.testing.assert_allclose(three.critical_stress, one.critical_stress, rtol=1e-10)
-
-
 @settings(max_examples=15, deadline=None)
 @given(problem=problems, tau_p=profiles)
 def test_slip_grows_with_the_load_and_strength_is_kept(problem, tau_p):

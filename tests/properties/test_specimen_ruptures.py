@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from setups import beta_strength
 from specimens import crooked, rough
 
 import stiction as st
@@ -43,27 +42,6 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
             load = before.load * sample.profile - problem.blocks.stiffness @ after.slip
             over = load - (pieces.strength - pieces.weakening_rate * after.slip)
             assert over.max() < 1e-9 * sample.excess.max()
-
-
-def test_an_ensemble_a_path_and_a_probability_rest_on_it():
-    method = st.Rupture(events=2)
-    field = beta_strength(4e-3, 0.68e6, 1.61e6)
-    found = st.monte_carlo(SPECIMEN, field, method=method, samples=3, progress=False)
-    onset = st.onset(SPECIMEN, rough(SPECIMEN, 0, samples=3), method=method)
-    assert np.array_equal(found["critical_force"], onset["critical_force"])
-    assert found["event_stress_drop"].sizes["event"] == 2
-    run = st.simulate_rupture(SPECIMEN, rough(SPECIMEN, 0), method=method, progress=False)
-    for name in ("rupture_speed", "median_rupture_speed"):
-        assert run[name].values == pytest.approx(onset[name].values[0], nan_ok=True)
-    assert '"quality_factor": 25.0' in found.attrs["study"]
-    path = st.equilibrium_path(SPECIMEN, STRENGTH, [0.2e6, 3e6], method=method)
-    assert list(path["sliding"].values) == [False, True]
-    assert path.sizes["event"] > 0
-    failure = st.failure_probability(
-        crooked(nodes=64), field, method=st.Rupture(), stress=0.6e6, algorithm="plain",
-        max_evaluations=100, progress=False,
-    )  # fmt: skip
-    assert 0.0 <= failure.probability <= 1.0
 
 
 def test_one_event_in_space_and_time(run):

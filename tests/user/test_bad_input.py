@@ -109,18 +109,6 @@ def test_what_people_study_raises_no_doubt():
             doubt_strengths(system, strength)
 
 
-def test_a_ready_made_sample_gives_what_its_profiles_give():
-    load = st.Load(initial_stress=3e4)
-    problem = make_problem(weakening_rate=None, load=load)
-    strength = [1.0 + 0.2 * np.sin(np.arange(256)), 1.1 + 0.1 * np.cos(np.arange(256))]
-    given = {"residual_strength": 2e5, "critical_slip": np.array([[5e-6], [6e-6]])}
-    given |= {"strength": 1e6 * np.stack(strength)}
-    given |= {"normal_pressure": np.array([[6e6], [4e6]])}
-    for other in (problem, dataclasses.replace(problem, load=st.Load())):
-        found = st.onset(other, other.sample(given), method=st.Equilibrium(slip=True))
-        assert found.equals(st.onset(other, given, method=st.Equilibrium(slip=True)))
-
-
 def test_a_mistake_in_a_list_names_its_place_whatever_holds_the_list():
     """Positions; a misplaced argument is told every name that a class takes."""
     with pytest.raises(st.InputError, match=r"(?m)missing\.1: must be a valid number"):

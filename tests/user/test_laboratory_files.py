@@ -1,7 +1,6 @@
 """Files as instruments and spreadsheets write them: the same numbers, or a refusal that helps."""
 
 import numpy as np
-import openpyxl
 import pandas as pd
 import pytest
 import xarray as xr
@@ -108,21 +107,6 @@ def test_words_and_numbers_for_missing_values(tmp_path):
     assert [list(values) for values in found.values] == [[71.5, 72.0], [69.0, 75.0]]
 
 
-def test_a_table_on_another_sheet(tmp_path):
-    book, path = openpyxl.Workbook(), tmp_path / "book.xlsx"
-    book.active.append(["Certificate of the instrument"])
-    data = book.create_sheet("DATA")
-    for row in [["x (mm)", "strength (MPa)"], *zip(X, STRENGTH, strict=True)]:
-        data.append(list(row))
-    book.save(path)
-    refuses("holds no numbers ... sheet= ... 'DATA'", lambda: st.read_profile(path))
-    refuses("sheet: 'data' ... 'DATA'", lambda: st.read_profile(path, sheet="data"))
-    for sheet in (1, "DATA"):
-        assert is_read(st.read_profile(path, sheet=sheet))
-    (tmp_path / "folder.csv").mkdir()
-    refuses("is not a regular file", lambda: st.read_profile(tmp_path / "folder.csv"))
-
-
 def test_maps_without_headings(tmp_path):
     interface = st.Interface(length=(8e-3, 10e-3), nodes=(8, 10))
     heights = 1e6 + np.arange(80.0).reshape(8, 10)
@@ -192,15 +176,3 @@ def test_the_first_word_of_a_heading_names_its_column(separator, tmp_path):
     assert (peaks.lengths, peaks.unit) == ((0.031, 0.062), "N")
     expected = [[210.0, 250.0, 200.0], [450.0, 400.0, 410.0]]
     np.testing.assert_allclose(peaks.values, expected, rtol=1e-14)
-
-
-def test_a_curve_is_not_a_list_of_peaks(tmp_path):
-    path = tmp_path / "curve.csv"
-    path.write_text(
-        "Weg;Kraft\nmm;N\n"
-        + "\n".join(f"{k / 100};{10 * k if k < 90 else 700}" for k in range(120))
-    )
-    refuses("'Weg' only rises over 120 lines ... st.read_curve", lambda: st.read_peaks(path))
-    assert "curve  890    N" in str(st.read_curve(path))
-    path.write_text("time (s);peak (N)\n" + "\n".join(f"{60 * k};{70 + k}" for k in range(12)))
-    assert st.read_peaks(path).values[0].size == 12

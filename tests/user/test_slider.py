@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 from refusals import refuses, warning_texts
 from setups import EXACT, LOCAL, beta_strength
-from sliders import SLIDER, SOLID, coefficients, rig_problem
+from sliders import SOLID, coefficients, rig_problem
 
 import stiction as st
 
@@ -155,21 +155,6 @@ def test_a_critical_slip_belongs_to_the_local_pressure():
     ]
     assert rates[0][:16].mean() > rates[1][:16].mean() > rates[2][:16].mean()
     assert rates[1].mean() == pytest.approx(0.28 * 4e3 / (0.14 * 0.006) / 5e-5, rel=0.05)
-
-
-def test_a_study_of_a_slider():
-    base = st.Base(height=0.02, solid=STIFF, bottom="rollers", ahead=0.02)
-    field = st.RandomField(
-        st.Lognormal(mean=0.7, cv=0.1), st.ExponentialSpectrum(correlation_length=0.02),
-        quantity="friction_coefficient",
-    )  # fmt: skip
-    for slider in (SLIDER, dataclasses.replace(SLIDER, base=base, drive=st.TopShear())):
-        problem = rig_problem(problem={"specimen": slider})
-        given = {"problem": problem, "random": field, "method": EXACT, "samples": 2}
-        study = st.Study(**given)
-        assert st.Study.from_dict(study.to_dict()).problem == problem
-        assert study.to_dict()["problem"]["specimen"]["type"] == "slider"
-    assert "Slider(height=0.075" in repr(PROBLEM)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

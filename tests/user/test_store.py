@@ -105,15 +105,6 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
     assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
 
 
-def test_parts_in_one_folder_are_one_run(tmp_path, often, reference):
-    refuses("out=", lambda: make_study().run(part="1/2"))
-    for number in (1, 3):
-        result = make_study().run(out=tmp_path / "run", part=f"{number}/3")
-    assert result["critical_stress"].isnull().sum() > 0
-    assert make_study().run(out=tmp_path / "run", part="2/3").identical(reference)
-    assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
-
-
 def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
     options = {"out": tmp_path / "run", "workers": 1, "pilot": False}
     thread = threading.Thread(target=lambda: make_study().run(**options), daemon=True)

@@ -1,16 +1,13 @@
 """A study, swept or not, is the same in Python, in TOML and in the attributes of its result."""
 
 import dataclasses
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.stats
 import tomli_w
-import xarray as xr
 from refusals import refuses
-from setups import LOCAL, beta_strength, make_problem
 from small_study import altered, small_study
 
 import stiction as st
@@ -35,32 +32,6 @@ def in_python(**parts):
 
 
 # -- one study in all its forms ------------------------------------------------------------------
-
-
-def test_python_and_toml_and_result_are_the_same_study(tmp_path):
-    study = st.Study(
-        title="a study",
-        problem=make_problem(128, weakening_rate=0.25e12),
-        random=beta_strength(4e-3),
-        method=LOCAL,
-        samples=30,
-        seed=3,
-    )
-    assert study == loaded(title="a study")
-    study.to_toml(tmp_path / "study.toml")
-    assert st.Study.from_toml(tmp_path / "study.toml") == study
-    result = study.run()
-    again = st.Study.from_result(result)
-    assert again == study
-    np.testing.assert_array_equal(again.run()["critical_load"], result["critical_load"])
-    result.to_netcdf(tmp_path / "result.nc")
-    with xr.open_dataset(tmp_path / "result.nc") as read:
-        assert read.attrs["stiction_version"] == st.__version__
-        assert read.attrs["seed"] == 3
-        assert read.attrs["title"] == "a study"
-        assert json.loads(read.attrs["study"])["samples"] == 30
-        for variable in read.variables.values():
-            assert {"units", "long_name"} <= set(variable.attrs)
 
 
 def test_a_sweep_in_toml_python_and_the_result(tmp_path):
@@ -105,67 +76,6 @@ def test_a_function_cannot_be_written_down(tmp_path):
 
 
 # -- points of a sweep ---------------------------------------------------------------------------
-
-
-def test_every_point_is_the_study_with_its_values():
-    study = swept(
-        {LENGTH: [4e-3, 6e-3]}, {"problem.solid.poisson_ratio": [0.2, 0.4]}, samples=8
-    )
-    result = study.run()
-    assert result["critical_stress"].dims == ("correlation_length", "poisson_ratio", "sample")
-    assert result["critical_stress"].shape == (2, 2, 8)
-    assert result["correlation_length"].attrs == {"units": "m", "long_name": LENGTH}
-    for point in study.points:
-        values = {name.replace(".", "__"): value for name, value in point.values.items()}
-        alone = loaded(**values, samples=8).run()
-        part = result.isel(correlation_length=point.number // 2, poisson_ratio=point.number % 2)
-        for name in alone.data_vars:
-            np.testing.assert_array_equal(part[name], alone[name])
-
-
-def test_laws_in_a_study_file(tmp_path):
-    path = tmp_path / "study.toml"
-    for law in (
-        st.ExponentialWeakening(weakening_rate=0.25e12),
-        st.PiecewiseWeakening(slip=[0.05, 1.0], strength=[0.8, 0.0], weakening_rate=0.25e12),
-    ):
-        problem = dataclasses.replace(BASE.problem, friction=law)
-        study = in_python(problem=problem, method=st.Rupture(loading_rate=2e8))
-        study.to_toml(path)
-        assert f'type = "{law.type}"' in path.read_text()
-        assert st.Study.from_toml(path) == study
-    path.write_text(path.read_text().replace(f'"{law.type}"', '"exponentail"'))
-    words = "friction ... exponentail ... exponential ... piecewise"
-    refuses(words, lambda: st.Study.from_toml(path))
-
-
-def test_a_pressing_force_is_a_pressure_over_the_area():
-    """Of a sweep of the force and of the width, and between glued plates."""
-    marginal = st.Lognormal(mean=0.5, cv=0.15)
-    field = st.RandomField(
-        marginal, BASE.random.strength.spectrum, quantity="friction_coefficient"
-    )
-    problem = dataclasses.replace(
-        BASE.problem,
-        interface=st.Interface(length=0.1, nodes=128, width=0.03),
-        load=st.Load(pressing_force=6e3),
-    )
-    forces = {"problem.load.pressing_force": [3e3, 6e3]}
-    sweep = [forces, {"problem.interface.width": [0.02, 0.03]}]
-    study = in_python(problem=problem, random=field, sweep=sweep)
-    result = st.Study.from_dict(study.to_dict()).run()
-    assert result.pressing_force.attrs["units"] == "N"
-    pressures = result.critical_stress / result.friction_coefficient
-    wanted = np.array([[3e3 / 2e-3, 3e3 / 3e-3], [6e3 / 2e-3, 6e3 / 3e-3]])
-    np.testing.assert_allclose(pressures, wanted[..., None] * np.ones(30), rtol=1e-12)
-    areas = np.array([2e-3, 3e-3])[:, None]
-    np.testing.assert_allclose(
-        result.critical_force, areas * result.critical_stress, rtol=1e-12
-    )
-    glued = st.Blocks(height=0.05, thickness=0.006, pressing="glued")
-    block = dataclasses.replace(problem, interface=st.Interface(0.1, 128), specimen=glued)
-    np.testing.assert_allclose(np.mean(block.normal_pressure), 1e7, rtol=1e-12)
-    assert np.ptp(block.normal_pressure) > 1e5
 
 
 def test_a_key_of_toml_without_quotes_and_what_is_none(tmp_path):
@@ -247,27 +157,6 @@ def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, un
     sweep = [{"random.strength.conditions.noise": [5e3, 20e3]}]
     found = loaded(tmp_path, **options, samples=3, sweep=sweep).run()
     assert found.critical_stress.sizes == {"noise": 2, "sample": 3}
-
-
-@pytest.mark.parametrize("place", [0, 1])
-@pytest.mark.parametrize(
-    ("key", "question", "bad", "words"),
-    [
-        (
-            "method",
-            {"probability": 0.1},
-            {"type": "rupture", "loading_rate": 1e7},
-            "method: 20,000 evaluations",
-        ),
-        ("problem.load", {"friction_coefficient": 0.4}, {}, "needs a normal pressure"),
-    ],
-)
-def test_a_question_is_refused_wherever_its_bad_point_is(key, question, bad, words, place):
-    """Before any point is answered, because points may take hours."""
-    good = {"type": "local_criterion"} if key == "method" else {"normal_pressure": 1e6}
-    values = [good, good]
-    values[place] = bad
-    refuses(words, lambda: swept({key: values}, reliability=question))
 
 
 def test_a_measured_profile_in_a_file_is_run_and_reported(tmp_path, monkeypatch, runs):
