@@ -2,11 +2,11 @@
 
 Problem
 -------
-Two blocks of length L and height H are mirror images at the interface. They have
-free ends and are driven in opposite directions, so that slip d does not change the
-normal stress. Let F be the force of the drive on a block per unit depth (N/m), U
-the travel of the drive (m), and dx the distance between nodes. F/L is the mean
-stress. Then
+Two blocks of length L and height H are mirror images at the interface.
+They have free ends and are driven in opposite directions, so that slip
+d does not change the normal stress. Let F be the force of the drive on
+a block per unit depth (N/m), U the travel of the drive (m), and dx the
+distance between nodes. F/L is the mean stress. Then
 
     tau = (F/L) q - K d,    U = F/C + (dx/(2 L)) sum q d    (Betti's theorem).
 

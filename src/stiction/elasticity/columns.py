@@ -2,9 +2,10 @@
 
 Problem
 -------
-A body has n cells of width h along its surface. The displacement u along x is defined on the
-lines through the middles of the cells, and the displacement v into the body on the lines at
-their edges. y is the depth below the surface. With Lame's lambda and G of the plane state,
+A body has n cells of width h along its surface. The displacement u
+along x is defined on the lines through the middles of the cells, and
+the displacement v into the body on the lines at their edges. y is the
+depth below the surface. With Lame's lambda and G of the plane state,
 and P = lambda + 2 G, the elastic energy is
 
     cell a:  (h G/2) int (u_a' + (v_{a+1} - v_a)/h)^2 dy
@@ -16,8 +17,9 @@ with the forces of a push on the left side.
 
 Algorithm: our own
 ------------------
-Staggered differences along x, elements of degree 6 across. Each derivative along x has the
-symbol 2i sin(k h/2)/h, so that a half-plane has the symbol E* sin(k h/2)/h of the lattice.
+Staggered differences along x, elements of degree 6 across. Each
+derivative along x has the symbol 2i sin(k h/2)/h, so that a half-plane
+has the symbol E* sin(k h/2)/h of the lattice.
 
 1. Elements across (`graded`, `Elements`): their sizes are 2 h, 6 h, 18
    h and so on, away from the surface and from both edges of a push. All

@@ -2,9 +2,10 @@
 
 Problem
 -------
-The top is on rollers (v = 0, s_xy given). On the interface u is given, and s_yy = 0. Both edges are
-mirrors, so that the stresses follow from Airy's function (S. Timoshenko and J. Goodier, Theory of
-Elasticity, article 24) as a sum of independent harmonics,
+The top is on rollers (v = 0, s_xy given). On the interface u is given,
+and s_yy = 0. Both edges are mirrors, so that the stresses follow from
+Airy's function (S. Timoshenko and J. Goodier, Theory of Elasticity,
+article 24) as a sum of independent harmonics,
 
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)

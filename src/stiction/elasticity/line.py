@@ -2,8 +2,9 @@
 
 Problem
 -------
-K is the circulant matrix of the symbol (G*/2)|k|, with modulus G* (Pa) and period L (m). Summing
-its Fourier series gives, for an even number n of nodes, the first column
+K is the circulant matrix of the symbol (G*/2)|k|, with modulus G* (Pa)
+and period L (m). Summing its Fourier series gives, for an even number n
+of nodes, the first column
 
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
 

@@ -2,9 +2,10 @@
 
 Problem
 -------
-Let T = |k| c_s t. A Fourier mode with slip D and slip rate V transfers this stress
-along the interface between two identical half-spaces (velocity form, M. S.
-Breitenfeld and P. H. Geubelle, International Journal of Fracture 93, 1998):
+Let T = |k| c_s t. A Fourier mode with slip D and slip rate V transfers
+this stress along the interface between two identical half-spaces
+(velocity form, M. S. Breitenfeld and P. H. Geubelle, International
+Journal of Fracture 93, 1998):
 
     F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
 

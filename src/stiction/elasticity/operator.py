@@ -2,9 +2,10 @@
 
 Problem
 -------
-K is given by its symbol (`protocol`), W >= 0 is the weakening rate at each node
-(Pa/m), and A = K - diag(W). `inside` marks a set S of nodes, and x is zero outside
-S. Two problems are solved without a matrix in memory:
+K is given by its symbol (`protocol`), W >= 0 is the weakening rate at
+each node (Pa/m), and A = K - diag(W). `inside` marks a set S of nodes,
+and x is zero outside S. Two problems are solved without a matrix in
+memory:
 
     (A + spring phi phi')_SS x_S = right_S,                                                   (1)
     A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
@@ -18,8 +19,9 @@ serves lines and planes.
 
 Algorithm for (1), `solve_inside`
 ---------------------------------
-Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical Optimization, 2006,
-algorithm 5.3) with the textbook's r, alpha and beta. z is the preconditioned residual.
+Preconditioned conjugate gradients (J. Nocedal and S. Wright, Numerical
+Optimization, 2006, algorithm 5.3) with the textbook's r, alpha and
+beta. z is the preconditioned residual.
 
 1. Precondition the residual: z = M r, restricted to S. M is 1/(K(k) +
    W/2) on Fourier modes, with the mean W. If a soft mode y is given,
@@ -37,7 +39,8 @@ Departure: the residual is measured by its largest entry, which is a stress.
 
 Algorithm for (2), `lowest_eigenvector`
 ---------------------------------------
-LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific Computing 23, 2001).
+LOBPCG with a single vector (A. Knyazev, SIAM Journal on Scientific
+Computing 23, 2001).
 
 1. The vector x has the Rayleigh quotient lambda = x'Ax. Stop if |A x -
    lambda x| is small.

@@ -2,9 +2,10 @@
 
 Problem
 -------
-A slider S lies on a base B. Slip is d = u_S - u_B at the middles of n cells, and opening is
-w = v_S - v_B at their n + 1 edges. Let j = (d, w), F be the push and N the normal force per unit
-depth (N/m). Forces on cells and edges, also per unit depth, are
+A slider S lies on a base B. Slip is d = u_S - u_B at the middles of n
+cells, and opening is w = v_S - v_B at their n + 1 edges. Let j = (d,
+w), F be the push and N the normal force per unit depth (N/m). Forces on
+cells and edges, also per unit depth, are
 
     f = T F + T_p N - K j,    K = S_B A^-1 S_S,    T = S_B A^-1 g,    A = S_S + S_B        (1)
     U = F/C + T'j,            1/C = g' A^-1 g - S_gg                                       (2)

@@ -2,17 +2,18 @@
 
 Problem
 -------
-For lines and for blocks, kernels need single entries K_ij (Pa/m), and K d for a slip d that
-is zero except at some nodes. numba compiles a kernel for each type of entries
-(`CircularEntries` on a line, `DenseEntries` in blocks). `entry`, `mean_relief`,
-`apply` and `apply_outside` are placeholders whose Python bodies are never run:
-numba replaces them by the overload for the type of entries. If a type has no
-overload, the compilation of a kernel raises an error.
+For lines and for blocks, kernels need single entries K_ij (Pa/m), and K
+d for a slip d that is zero except at some nodes. numba compiles a
+kernel for each type of entries (`CircularEntries` on a line,
+`DenseEntries` in blocks). `entry`, `mean_relief`, `apply` and
+`apply_outside` are placeholders whose Python bodies are never run:
+numba replaces them by the overload for the type of entries. If a type
+has no overload, the compilation of a kernel raises an error.
 
 Algorithm: our own
 ------------------
-`apply_circular` sums columns of K. On a line K_j = 0 for even j > 0 (`line`), so
-even nodes act only on odd nodes, and vice versa.
+`apply_circular` sums columns of K. On a line K_j = 0 for even j > 0
+(`line`), so even nodes act only on odd nodes, and vice versa.
 
 1. For each parity, take the slipping nodes with this parity. They act
    on n/2 targets, which are the nodes with the other parity.

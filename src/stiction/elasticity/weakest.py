@@ -2,10 +2,11 @@
 
 Problem
 -------
-A window (`protocol.Windows`) is a run of nodes with weights y > 0 for which K y <= W y if all its
-nodes weaken at the rate W or faster. Then <s, y>/<p, y> bounds the load of the first
-instability from above. Here s is the strength minus initial stress (Pa), and p is the load
-profile. Find the lowest bound over all windows and all places.
+A window (`protocol.Windows`) is a run of nodes with weights y > 0 for
+which K y <= W y if all its nodes weaken at the rate W or faster. Then
+<s, y>/<p, y> bounds the load of the first instability from above. Here
+s is the strength minus initial stress (Pa), and p is the load profile.
+Find the lowest bound over all windows and all places.
 
 Algorithm: our own
 ------------------

@@ -2,12 +2,12 @@
 
 Problem
 -------
-s is the strength minus initial stress (Pa), p is the load profile, and y are the
-weights of a window (`windows`). The window centred at x becomes unstable in
-isolation at the load <s, y>_x/<p, y>_x. Find the least load over all x and all
-windows. On a line, x may lie between the nodes. On a plane the load is computed at
-the nodes, which is exact for the discrete problem, and only the position is
-interpolated.
+s is the strength minus initial stress (Pa), p is the load profile, and
+y are the weights of a window (`windows`). The window centred at x
+becomes unstable in isolation at the load <s, y>_x/<p, y>_x. Find the
+least load over all x and all windows. On a line, x may lie between the
+nodes. On a plane the load is computed at the nodes, which is exact for
+the discrete problem, and only the position is interpolated.
 
 Algorithm
 ---------

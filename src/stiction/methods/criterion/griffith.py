@@ -2,11 +2,12 @@
 
 Problem
 -------
-A crack of half-length a lies on a periodic line (period L, modulus G*) between
-two identical half-spaces, with the stress drop D(x) (Pa). With U = tan(pi a/L) and
-tan(pi (x - centre)/L) = U cos t, the stress intensity factors at both tips (H.
-Bueckner, Zeitschrift fuer Angewandte Mathematik und Mechanik 50, 1970; W. Koiter,
-Ingenieur-Archiv 28, 1959) are
+A crack of half-length a lies on a periodic line (period L, modulus G*)
+between two identical half-spaces, with the stress drop D(x) (Pa). With
+U = tan(pi a/L) and tan(pi (x - centre)/L) = U cos t, the stress
+intensity factors at both tips (H. Bueckner, Zeitschrift fuer Angewandte
+Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959)
+are
 
     K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
 
@@ -77,12 +78,14 @@ def griffith_length(
 
     Notes
     -----
-    Between identical half-spaces G = K|K|/(2 G*), where K is the integral of the stress drop times
-    the weight of Bueckner (1970). The interface is periodic: u = tan(pi x/L) maps the row of
-    collinear cracks to a single crack, so that a uniform drop gives K = drop (L tan(pi a/L))^(1/2)
-    for the half-length a (Koiter, 1959). Kammer et al. (2015) and Ke et al. (2018) predict
-    the length of confined ruptures in this way. The drop is linear between the nodes.
-    G is negative at a tip at which the stress drop acts against the crack.
+    Between identical half-spaces G = K|K|/(2 G*), where K is the
+    integral of the stress drop times the weight of Bueckner (1970). The
+    interface is periodic: u = tan(pi x/L) maps the row of collinear
+    cracks to a single crack, so that a uniform drop gives K = drop (L
+    tan(pi a/L))^(1/2) for the half-length a (Koiter, 1959). Kammer et
+    al. (2015) and Ke et al. (2018) predict the length of confined
+    ruptures in this way. The drop is linear between the nodes. G is
+    negative at a tip at which the stress drop acts against the crack.
 
     Examples
     --------

@@ -2,10 +2,11 @@
 
 Problem
 -------
-s is the strength minus initial stress (Pa), p is the load profile, and y >= 0 are the
-weights of a critical window, centred at x. A patch of this size becomes unstable in
-isolation at the nucleation stress (K. Uenishi and J. R. Rice, J. Geophys. Res. 108,
-2003, equation 14; G. Albertini et al., 2020, equation 9)
+s is the strength minus initial stress (Pa), p is the load profile, and
+y >= 0 are the weights of a critical window, centred at x. A patch of
+this size becomes unstable in isolation at the nucleation stress (K.
+Uenishi and J. R. Rice, J. Geophys. Res. 108, 2003, equation 14; G.
+Albertini et al., 2020, equation 9)
 
     tau_n(x) = <s, y>_x / <p, y>_x.                                                           (1)
 
@@ -86,11 +87,13 @@ class LocalCriterion(Listed):
 
     Notes
     -----
-    The weights of the average are never negative, so the result lies between the least and the
-    greatest strength even if the strength jumps. On a line the minimum may lie between the nodes.
-    For a nonlinear friction law, the criterion uses the weakening rate at zero slip and
-    issues an `AccuracyWarning`: if strength falls less and less steeply, the exact onset is
-    higher. A law that steepens raises an error.
+    The weights of the average are never negative, so the result lies
+    between the least and the greatest strength even if the strength
+    jumps. On a line the minimum may lie between the nodes. For a
+    nonlinear friction law, the criterion uses the weakening rate at
+    zero slip and issues an `AccuracyWarning`: if strength falls less
+    and less steeply, the exact onset is higher. A law that steepens
+    raises an error.
 
     If the interface ends, patches lie within its extent. Between
     half-spaces, slip before the onset transfers stress to the nodes

@@ -2,7 +2,8 @@
 
 Problem
 -------
-Does a line have an equilibrium at the load tau_0? An equilibrium is a slip d >= 0
+Does a line have an equilibrium at the load tau_0? An equilibrium is a
+slip d >= 0
 (m) with
 
     K d + max(tau_p - W d, tau_r) >= tau_i + tau_0 p ?
@@ -13,10 +14,10 @@ wider brackets show how large the error is.
 
 Algorithm
 ---------
-The off-diagonal entries in K are not positive, and strength falls with slip.
-Therefore the slip of the least equilibrium can be increased step by step from zero,
-and never has to be reduced (R. Chandrasekaran, Opsearch 7, 1970, for linear
-problems). `slides` starts from d = 0:
+The off-diagonal entries in K are not positive, and strength falls with
+slip. Therefore the slip of the least equilibrium can be increased step
+by step from zero, and never has to be reduced (R. Chandrasekaran,
+Opsearch 7, 1970, for linear problems). `slides` starts from d = 0:
 
 1. Compute the overstress f = tau_i + tau_0 p - K d - strength, Pa.
 2. The interface slides if the load exceeds the mean strength. It also

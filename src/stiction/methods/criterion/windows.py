@@ -2,19 +2,21 @@
 
 Problem
 -------
-K is the stiffness and W the uniform weakening rate (Pa/m). A window is a set of
-nodes on which the lowest eigenvalue of K is at most W. Its eigenvector y > 0 has
-unit sum. If all other nodes are held, slip on the window becomes unstable at the
-load <s, y>/<p, y>. Here s is the strength minus initial stress (Pa), and p is the
-load profile. If K has no positive off-diagonal entry, y is a multiplier for the
-whole interface. This load then bounds the onset from above, as long as no node
-reaches its residual strength.
+K is the stiffness and W the uniform weakening rate (Pa/m). A window is
+a set of nodes on which the lowest eigenvalue of K is at most W. Its
+eigenvector y > 0 has unit sum. If all other nodes are held, slip on the
+window becomes unstable at the load <s, y>/<p, y>. Here s is the
+strength minus initial stress (Pa), and p is the load profile. If K has
+no positive off-diagonal entry, y is a multiplier for the whole
+interface. This load then bounds the onset from above, as long as no
+node reaches its residual strength.
 
 Algorithm
 ---------
-On a line, the window has the nucleation length h_n, and y is the eigenfunction of
-K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003) as weights for the nodes
-(`grid_weights`). On a plane, the window is an ellipse. For each of five aspects:
+On a line, the window has the nucleation length h_n, and y is the
+eigenfunction of K. Uenishi and J. R. Rice (J. Geophys. Res. 108, 2003)
+as weights for the nodes (`grid_weights`). On a plane, the window is an
+ellipse. For each of five aspects:
 
 1. Start with a small box of nodes, made periodic with the stiffness
    between its own nodes. A block of a Toeplitz matrix is a block of a
@@ -31,9 +33,10 @@ For nu = 0 the critical disc has radius 2.0061 G/(2W).
 
 Weights on a line
 -----------------
-A patch of half-length a is just unstable if the slip rate v solves an eigenproblem
-on [-1, 1], with W a/G* = lambda_0 (K. Uenishi and J. R. Rice, J. Geophys. Res. 108,
-2003, equation 14). The weight g of the local criterion is v with unit integral,
+A patch of half-length a is just unstable if the slip rate v solves an
+eigenproblem on [-1, 1], with W a/G* = lambda_0 (K. Uenishi and J. R.
+Rice, J. Geophys. Res. 108, 2003, equation 14). The weight g of the
+local criterion is v with unit integral,
 
     g(cos t) = sum over odd m of b_m sin(m t),  b_m = 2 a_m/pi,  a_1 = 1.
 

@@ -15,9 +15,9 @@ the node (`SlipProblem.falling`), and g - b is `SlipProblem.driving`.
 
 Algorithm (`solve_increment`)
 -----------------------------
-The algorithm is a semismooth Newton iteration in the form of a primal-dual active
-set (M. Hintermueller, K. Ito and K. Kunisch, SIAM Journal on Optimization 13,
-2002):
+The algorithm is a semismooth Newton iteration in the form of a
+primal-dual active set (M. Hintermueller, K. Ito and K. Kunisch, SIAM
+Journal on Optimization 13, 2002):
 
 1. Begin with the set S of nodes that already slip or whose trial stress
    exceeds their strength. Use the straight lines of the first guess.

@@ -2,10 +2,11 @@
 
 Problem
 -------
-Advance equations (1) and (2) of `state` by a step h: slip d, slip rate V and
-stress tau at the nodes, and the memory variables y of `memory` at the modes. Let
-f_hat(d_hat, V_hat) be the stress transferred at the end of the step if a slip
-rate V_hat acts for the whole step and leads to the slip d_hat:
+Advance equations (1) and (2) of `state` by a step h: slip d, slip rate
+V and stress tau at the nodes, and the memory variables y of `memory` at
+the modes. Let f_hat(d_hat, V_hat) be the stress transferred at the end
+of the step if a slip rate V_hat acts for the whole step and leads to
+the slip d_hat:
 
     f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
 

@@ -2,10 +2,11 @@
 
 Problem
 -------
-Advance equations (1) and (2) of `state` by a step h. The unknowns are the slip
-increments u >= 0. Let u/h be the mean slip rate in this step, V' the mean rate in
-the previous step, h' the size of the previous step, and r = h/(h + h'). To second
-order the slip rate at the end of the step is
+Advance equations (1) and (2) of `state` by a step h. The unknowns are
+the slip increments u >= 0. Let u/h be the mean slip rate in this step,
+V' the mean rate in the previous step, h' the size of the previous step,
+and r = h/(h + h'). To second order the slip rate at the end of the step
+is
 
     V = u/h + r (u/h - V'),                                                                   (1)
 

@@ -2,11 +2,12 @@
 
 Problem of the time step (`largest_step`)
 -----------------------------------------
-An interface that slides freely carries undamped Rayleigh waves. The shortest waves
-limit the explicit step h. Let the state of a mode be |k| slip, V/c_s and the memory
-variables. A step in `explicit` is then a matrix that depends only on kappa = |k|
-c_s h (`amplification`). Find the largest kappa up to which no eigenvalue of the
-matrix is larger than 1.
+An interface that slides freely carries undamped Rayleigh waves. The
+shortest waves limit the explicit step h. Let the state of a mode be |k|
+slip, V/c_s and the memory variables. A step in `explicit` is then a
+matrix that depends only on kappa = |k| c_s h (`amplification`). Find
+the largest kappa up to which no eigenvalue of the matrix is larger than
+1.
 
 Algorithm: our own
 ------------------

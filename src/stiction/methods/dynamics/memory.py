@@ -2,7 +2,8 @@
 
 Problem
 -------
-Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the convolution
+Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the
+convolution
 
     S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
 
@@ -18,10 +19,10 @@ weight (kx/k)² w_p. The pairs of mode III follow, with the weight (1 -
 
 Algorithm
 ---------
-The method is exponential time differencing (S. M. Cox and P. C. Matthews, Journal
-of Computational Physics 176, 2002): psi' = z/h psi + V is integrated exactly if the
-slip rate is a polynomial in a step h. With z = s_p |k| c_s h, E = exp(z), and
-phi(z) = (exp(z) - 1)/z:
+The method is exponential time differencing (S. M. Cox and P. C.
+Matthews, Journal of Computational Physics 176, 2002): psi' = z/h psi +
+V is integrated exactly if the slip rate is a polynomial in a step h.
+With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
 
 1. Explicit step, constant slip rate V: psi <- E psi + B V, with B = h
    phi(z). The variables are stored as y = psi/B, which saves a
@@ -46,15 +47,17 @@ phi(z) = (exp(z) - 1)/z:
 
 Layout
 ------
-Variables lie in blocks of 64 modes, so that the sums of a pass stay in registers.
-Tables have an entry for each wave vector with different waves: on a line k > 0,
-on a plane kx >= 0 and ky >= 0, because (kx, ky) and (-kx, ky) have the same |k|
-and fraction of mode II. On a plane an entry therefore has multiplicity 2. Entries
-are padded to whole blocks. Tables are packed as [block][pair][row][64], Fourier
-arrays as [block][copy][real, imaginary][64] and memory variables as
-[block][copy][pair][4][64]. The four rows hold the memory of the real signal (real
-and imaginary part), and then the memory of the imaginary signal. Because the row
-length is constant, the compiler can vectorise without run-time checks for overlap.
+Variables lie in blocks of 64 modes, so that the sums of a pass stay in
+registers. Tables have an entry for each wave vector with different
+waves: on a line k > 0, on a plane kx >= 0 and ky >= 0, because (kx, ky)
+and (-kx, ky) have the same |k| and fraction of mode II. On a plane an
+entry therefore has multiplicity 2. Entries are padded to whole blocks.
+Tables are packed as [block][pair][row][64], Fourier arrays as
+[block][copy][real, imaginary][64] and memory variables as
+[block][copy][pair][4][64]. The four rows hold the memory of the real
+signal (real and imaginary part), and then the memory of the imaginary
+signal. Because the row length is constant, the compiler can vectorise
+without run-time checks for overlap.
 
 Example by hand
 ---------------

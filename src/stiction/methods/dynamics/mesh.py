@@ -15,12 +15,13 @@ interface and up to five times as much above.
 
 Elements (`_elements`)
 ----------------------
-Elements are bilinear. An element with the sides a and b has mean strains and two
-hourglass modes (D. P. Flanagan and T. Belytschko, International Journal for Numerical Methods in
-Engineering 17, 1981). Exact integration gives the energy of the means as a b (s . e)/2,
-and the energy of an hourglass mode as (c_11 b/a + G a/b)/24 times the square of
-u_00 - u_10 - u_01 + u_11, and likewise for v. In mode III there is only u. Then
-c_11 is G, and the other coefficients are zero.
+Elements are bilinear. An element with the sides a and b has mean
+strains and two hourglass modes (D. P. Flanagan and T. Belytschko,
+International Journal for Numerical Methods in Engineering 17, 1981).
+Exact integration gives the energy of the means as a b (s . e)/2, and
+the energy of an hourglass mode as (c_11 b/a + G a/b)/24 times the
+square of u_00 - u_10 - u_01 + u_11, and likewise for v. In mode III
+there is only u. Then c_11 is G, and the other coefficients are zero.
 
 Algorithm (`make_mesh`)
 -----------------------

@@ -2,16 +2,17 @@
 
 Problem
 -------
-While the load tau_0 rises slowly at the rate R, slip follows the equilibria
-d(tau_0). Find the state of the run (slip, slip rate and memory variables) at a load
-tau_c - D, a distance D below the onset tau_c, without taking the steps to this
-state. A run from this state must have the same onset.
+While the load tau_0 rises slowly at the rate R, slip follows the
+equilibria d(tau_0). Find the state of the run (slip, slip rate and
+memory variables) at a load tau_c - D, a distance D below the onset
+tau_c, without taking the steps to this state. A run from this state
+must have the same onset.
 
 Algorithm: our own
 ------------------
-Asymptotics of a fold: near the onset, the distance of slip from its limit falls
-as (tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0 grows as exp(a t) with
-a = R/(2 D).
+Asymptotics of a fold: near the onset, the distance of slip from its
+limit falls as (tau_c - tau_0)^(1/2), so the slip rate V = R dd/dtau_0
+grows as exp(a t) with a = R/(2 D).
 
 1. Find the onset tau_c by equilibrium. Begin with a distance D in which
    shear waves cross the nucleation length `_CROSSINGS` times.

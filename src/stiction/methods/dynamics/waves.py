@@ -2,17 +2,19 @@
 
 Problem
 -------
-Solve M u'' + M alpha u' + K (u + theta u') = forces for the block of `mesh`, starting from a static
-state. M are the masses, alpha the attenuation (`Mesh.attenuation`) and theta the viscous time of
-the grid (`Mesh.viscous_time`). Displacements are counted from the static state. In the upper block
-u is half the slip at y = 0. The lower block is its mirror image, so the normal stress does not
-change.
+Solve M u'' + M alpha u' + K (u + theta u') = forces for the block of
+`mesh`, starting from a static state. M are the masses, alpha the
+attenuation (`Mesh.attenuation`) and theta the viscous time of the grid
+(`Mesh.viscous_time`). Displacements are counted from the static state.
+In the upper block u is half the slip at y = 0. The lower block is its
+mirror image, so the normal stress does not change.
 
 Algorithm (`wave_steps`)
 ------------------------
-Leapfrog, with friction at split nodes (D. J. Andrews, Bulletin of the Seismological Society of
-America 89, 1999). Velocities are known in the middle of a step of size h, displacements at its
-end, and attenuation is semi-implicit. With a = alpha h/2 and w = u + theta u', each step
+Leapfrog, with friction at split nodes (D. J. Andrews, Bulletin of the
+Seismological Society of America 89, 1999). Velocities are known in the
+middle of a step of size h, displacements at its end, and attenuation is
+semi-implicit. With a = alpha h/2 and w = u + theta u', each step
 processes the rows:
 
 1. Compute the forces F on the row from its elements (`_force`). They

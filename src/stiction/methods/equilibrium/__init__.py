@@ -5,5 +5,7 @@ onsets. Its function `follow_to_sliding` loops from
 instability to instability. `events` computes the variables of
 events that came to rest. Two algorithms find instabilities.
 `dense` factors K, for lines and blocks. `transforms` is for
-planes, and for lines with thousands of slipping nodes.
+planes, and for lines with thousands of slipping nodes. `slider` and
+`contact_path` are for a slider on a base, whose pressure depends on
+load and slip.
 """

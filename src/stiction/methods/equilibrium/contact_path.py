@@ -2,11 +2,13 @@
 
 Problem
 -------
-The interface has n cells, which slip by d >= 0 (m), and n + 1 edges, which open by w >= 0 (m).
-With x = (d, w), stiffness K (Pa), a load that has risen by D (N/m) and its forces T at rest, the
-shear force of a cell is (D T - K x)_a, and the force that presses an edge is P_b = -(D T - K x)_b.
-N_a is the normal force on a cell: half P at both its edges, but the whole P at
-the two ends of the slider. Written N = Q P, the law of a cell is
+The interface has n cells, which slip by d >= 0 (m), and n + 1 edges,
+which open by w >= 0 (m). With x = (d, w), stiffness K (Pa), a load that
+has risen by D (N/m) and its forces T at rest, the shear force of a cell
+is (D T - K x)_a, and the force that presses an edge is P_b = -(D T - K
+x)_b. N_a is the normal force on a cell: half P at both its edges, but
+the whole P at the two ends of the slider. Written N = Q P, the law of a
+cell is
 
     strength_a = mu_a N_a - W_a d_a,                                                          (1)
 
@@ -30,8 +32,8 @@ not positive, slip jumps at this load.
 
 Algorithm
 ---------
-The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E of cells and edges that
-could not start.
+The algorithm is our own. It keeps S, the inverse of M_SS, and a stack E
+of cells and edges that could not start.
 
 1. If E is empty, the load rises and v = M_SS^-1 p_S. Otherwise the load
    is held. e, the top of E, moves at the rate 1, and v = -M_SS^-1 M_Se.

@@ -2,9 +2,9 @@
 
 Problem
 -------
-An event takes an interface at rest from the slip d_0 to the slip d_1. With delta =
-d_1 - d_0, the event releases the stress K delta, at the load at which it begins.
-The table holds these measures:
+An event takes an interface at rest from the slip d_0 to the slip d_1.
+With delta = d_1 - d_0, the event releases the stress K delta, at the
+load at which it begins. The table holds these measures:
 
 1. The patch of an event is the region around the largest delta in which
    delta exceeds the fraction `MIN_ADDED_SLIP` of its largest value. The

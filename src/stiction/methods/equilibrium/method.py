@@ -84,12 +84,13 @@ class Equilibrium(Listed):
 
     Notes
     -----
-    In addition to the variables of every method, the result contains `certificate_gap`, the
-    distance between rigorous bounds of the first instability (Pa), `slip_patches` at the
-    first instability, `critical_patch_length` (m), `arrested_events`, `residual_reached`
-    (whether a node reached its residual strength before the interface slid), and
-    `sliding_position` (m), which differs from `critical_position` only after an arrested
-    event.
+    In addition to the variables of every method, the result contains
+    `certificate_gap`, the distance between rigorous bounds of the first
+    instability (Pa), `slip_patches` at the first instability,
+    `critical_patch_length` (m), `arrested_events`, `residual_reached`
+    (whether a node reached its residual strength before the interface
+    slid), and `sliding_position` (m), which differs from
+    `critical_position` only after an arrested event.
 
     Arrest is computed in equilibrium. Inertia may carry a rupture
     further. There is no upper bound, and `certificate_gap` is NaN, if a

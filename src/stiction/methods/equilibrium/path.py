@@ -2,8 +2,8 @@
 
 Problem
 -------
-Return the slip d of the least equilibrium, equation (1) in `solver`, at each of some
-rising loads, and the stress tau_i + load p - K d.
+Return the slip d of the least equilibrium, equation (1) in `solver`, at
+each of some rising loads, and the stress tau_i + load p - K d.
 
 Algorithm
 ---------
@@ -177,9 +177,10 @@ def equilibrium_path(
 
     Notes
     -----
-    A patch jumps to the least equilibrium at the same load, where an overdamped
-    interface would stop. An instability that comes to rest is an arrested event.
-    Inertia may carry it further: on equal blocks, pass a `Rupture` as `method`.
+    A patch jumps to the least equilibrium at the same load, where an
+    overdamped interface would stop. An instability that comes to rest
+    is an arrested event. Inertia may carry it further: on equal blocks,
+    pass a `Rupture` as `method`.
 
     Examples
     --------

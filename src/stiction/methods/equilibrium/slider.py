@@ -2,9 +2,9 @@
 
 Problem
 -------
-A `Rig` gives the stiffness K, and the forces T F and T_p N of the push F and the normal force N
-(N/m). Pressing and push are paths of `contact_path`. The load is N in the first, and the push in
-the second.
+A `Rig` gives the stiffness K, and the forces T F and T_p N of the push
+F and the normal force N (N/m). Pressing and push are paths of
+`contact_path`. The load is N in the first, and the push in the second.
 
 Algorithm
 ---------
@@ -25,10 +25,11 @@ The algorithm is our own (`press`, `begin_push`).
 
 Results
 -------
-Loads and forces are divided by the length of the interface: the mean shear stress, Pa. The load
-D is the push that the machine would exert without slip. Slip and travel count from the beginning
-of the push, and opening is the present opening. The travel of the push is U = F/C + T'x (`Rig`),
-without the constant part from the pressing.
+Loads and forces are divided by the length of the interface: the mean
+shear stress, Pa. The load D is the push that the machine would exert
+without slip. Slip and travel count from the beginning of the push, and
+opening is the present opening. The travel of the push is U = F/C + T'x
+(`Rig`), without the constant part from the pressing.
 """
 
 from typing import Any, NamedTuple

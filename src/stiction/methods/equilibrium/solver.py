@@ -2,9 +2,9 @@
 
 Problem
 -------
-The load (Pa) rises slowly from zero. K is the stiffness (Pa/m), d >= 0 the slip (m),
-s(d) the strength minus initial stress (Pa), which falls with slip, and p the load
-profile. Slip d is an equilibrium at a load if
+The load (Pa) rises slowly from zero. K is the stiffness (Pa/m), d >= 0
+the slip (m), s(d) the strength minus initial stress (Pa), which falls
+with slip, and p the load profile. Slip d is an equilibrium at a load if
 
     load p - K d <= s(d),  with '=' where d > 0.                                              (1)
 
@@ -15,7 +15,8 @@ load at which the path of equilibria turns first, and a patch jumps.
 
 Algorithm for a sample
 ----------------------
-The algorithm is our own (`follow_to_sliding`). A `EquilibriumSearch` supplies the two searches:
+The algorithm is our own (`follow_to_sliding`). A `EquilibriumSearch`
+supplies the two searches:
 
 1. Start from rest and raise the load to the next instability
    (`EquilibriumSearch.next`).

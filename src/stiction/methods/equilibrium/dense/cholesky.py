@@ -2,9 +2,9 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), W >= 0 the weakening rate of each node (Pa/m), A = K -
-diag(W), and S the list of slipping nodes, ordered like the rows of L. This
-folder solves systems
+K is the stiffness (Pa/m), W >= 0 the weakening rate of each node
+(Pa/m), A = K - diag(W), and S the list of slipping nodes, ordered like
+the rows of L. This folder solves systems
 
     A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
 

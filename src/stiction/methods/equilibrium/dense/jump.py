@@ -2,10 +2,11 @@
 
 Problem
 -------
-An equilibrium became unstable at a load (Pa). Find the least equilibrium at this
-load with no less slip, or show that there is no such equilibrium. K is the
-stiffness (Pa/m), d >= 0 is the slip (m), s(d) is the strength minus initial stress
-(Pa), which falls along straight pieces, and p is the load profile:
+An equilibrium became unstable at a load (Pa). Find the least
+equilibrium at this load with no less slip, or show that there is no
+such equilibrium. K is the stiffness (Pa/m), d >= 0 is the slip (m),
+s(d) is the strength minus initial stress (Pa), which falls along
+straight pieces, and p is the load profile:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
@@ -16,7 +17,8 @@ lies below the least equilibrium. So does the slip after steps 1 and 2.
 
 Algorithm
 ---------
-The algorithm is our own. Its two types of step do not pass the least equilibrium.
+The algorithm is our own. Its two types of step do not pass the least
+equilibrium.
 
 1. Elastic step. Hold all strengths at their present values,
    and solve K_SS d_S = (load p - s)_S. Slip increases to

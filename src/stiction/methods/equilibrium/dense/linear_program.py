@@ -18,9 +18,10 @@ slipping nodes.
 
 Algorithm
 ---------
-The algorithm is our own. It solves (1) with an active set that grows, and (2) with
-cuts that lower the load. It starts from an upper bound of (2), for example from the
-weakest window, and from a load below this bound.
+The algorithm is our own. It solves (1) with an active set that grows,
+and (2) with cuts that lower the load. It starts from an upper bound of
+(2), for example from the weakest window, and from a load below this
+bound.
 
 1. At the load, find resting nodes that are overstressed. If there are
    any, add them to S, the most overstressed first. Each node adds a row

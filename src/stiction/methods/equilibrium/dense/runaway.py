@@ -2,18 +2,21 @@
 
 Problem
 -------
-At a load (Pa) a patch on a line became unstable. K is the stiffness (Pa/m), d is
-the slip (m), s(d) is the strength minus initial stress (Pa) and p is the load
-profile. Does slip come to rest again? `jump` answers this for any sample. Most
-samples slide, and this test shows sliding faster. Without the test, onsets take
-three to five times as long. The test follows only the patch, as a run of nodes,
-while all other nodes are held. The result is a lower bound of the slip, because
-slip at other nodes only adds stress (K has no positive off-diagonal entry).
+At a load (Pa) a patch on a line became unstable. K is the stiffness
+(Pa/m), d is the slip (m), s(d) is the strength minus initial stress
+(Pa) and p is the load profile. Does slip come to rest again? `jump`
+answers this for any sample. Most samples slide, and this test shows
+sliding faster. Without the test, onsets take three to five times as
+long. The test follows only the patch, as a run of nodes, while all
+other nodes are held. The result is a lower bound of the slip, because
+slip at other nodes only adds stress (K has no positive off-diagonal
+entry).
 
 Algorithm
 ---------
-The algorithm is our own. It uses two known results: the factor of a Toeplitz matrix
-(`block_factor`) and Griffith's length (`unstoppable_length`).
+The algorithm is our own. It uses two known results: the factor of a
+Toeplitz matrix (`block_factor`) and Griffith's length
+(`unstoppable_length`).
 
 1. Move along the direction of the instability until a node reaches a
    corner in its law. If no node reaches a corner, the interface slides.

@@ -2,10 +2,11 @@
 
 Problem
 -------
-p is the load profile, K is the stiffness (Pa/m), and d >= 0 is the slip (m). The
-strength at node i, minus its initial stress, falls with slip along straight pieces:
-s_i = q_i - W_i d_i. Slip is an equilibrium at a load (Pa) if no stress exceeds the
-strength, and if both are equal at slipping nodes:
+p is the load profile, K is the stiffness (Pa/m), and d >= 0 is the slip
+(m). The strength at node i, minus its initial stress, falls with slip
+along straight pieces: s_i = q_i - W_i d_i. Slip is an equilibrium at a
+load (Pa) if no stress exceeds the strength, and if both are equal at
+slipping nodes:
 
     load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
 
@@ -29,11 +30,11 @@ reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
 Algorithm
 ---------
-The method is parametric quadratic programming. The solution is piecewise linear in
-the load, and its kinks are found one after the other, as on the critical line of H.
-Markowitz (Naval Research Logistics Quarterly 3, 1956). Step 2 is an active-set
-method for (3) (J. Nocedal and S. Wright, Numerical Optimization, 2006, section
-16.5).
+The method is parametric quadratic programming. The solution is
+piecewise linear in the load, and its kinks are found one after the
+other, as on the critical line of H. Markowitz (Naval Research Logistics
+Quarterly 3, 1956). Step 2 is an active-set method for (3) (J. Nocedal
+and S. Wright, Numerical Optimization, 2006, section 16.5).
 
 1. Find S and factor A_SS = L L'. If a pivot fails, go to step 5.
 2. Solve (2) for the rates v of slip, and multiply them

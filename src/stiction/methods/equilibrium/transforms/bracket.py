@@ -2,8 +2,8 @@
 
 Problem
 -------
-With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength minus initial stress s (Pa)
-and load profile p > 0, the onset without corners is
+With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength minus initial
+stress s (Pa) and load profile p > 0, the onset without corners is
 
     max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
 
@@ -14,9 +14,10 @@ for any signs of the entries in K.
 
 Algorithm
 ---------
-`bisect` halves the interval between a stable and an unstable load. Each digit costs
-the same number of steps. Therefore `bisect` only prepares for `turning_point`,
-which closes the bracket, and takes over if `turning_point` fails.
+`bisect` halves the interval between a stable and an unstable load. Each
+digit costs the same number of steps. Therefore `bisect` only prepares
+for `turning_point`, which closes the bracket, and takes over if
+`turning_point` fails.
 
 1. Solve for the equilibrium at the middle of the interval, starting
    from the slip of the last stable load (`held_equilibrium`).

@@ -2,12 +2,13 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), W are the present weakening rates (Pa/m), A = K -
-diag(W), S are the slipping nodes, and p is the load profile. Between events, slip d
-grows with the load at the rate v, with A_SS v = p_S, and A_SS is positive definite.
-At an event, a node begins to slip or reaches a corner in its law. The path turns at
-the first event after which A_SS is no longer positive definite. Find its load, and
-the direction y in which slip jumps.
+K is the stiffness (Pa/m), W are the present weakening rates (Pa/m), A =
+K - diag(W), S are the slipping nodes, and p is the load profile.
+Between events, slip d grows with the load at the rate v, with A_SS v =
+p_S, and A_SS is positive definite. At an event, a node begins to slip
+or reaches a corner in its law. The path turns at the first event after
+which A_SS is no longer positive definite. Find its load, and the
+direction y in which slip jumps.
 
 Algorithm
 ---------

@@ -17,9 +17,10 @@ equilibrium of the interface without the spring.
 
 Algorithm
 ---------
-The algorithm combines an active set with conjugate gradients, as in a projected
-method (J. Nocedal and S. Wright, Numerical Optimization, 2006, section 16.7), but
-it changes whole sets rather than using a line search.
+The algorithm combines an active set with conjugate gradients, as in a
+projected method (J. Nocedal and S. Wright, Numerical Optimization,
+2006, section 16.7), but it changes whole sets rather than using a line
+search.
 
 1. Revise the set of the slipping nodes: overloaded nodes (r > 0) join,
    and nodes with d < 0 leave.

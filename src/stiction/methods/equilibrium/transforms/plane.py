@@ -2,14 +2,15 @@
 
 Problem
 -------
-Follow the equilibria of a plane, equation (1) in `solver`, from instability to
-instability. K is known only by its symbol in Fourier space. The onset without corners
-is the largest load with an equilibrium if no node reaches a corner in its law (problem
-(1) in `bracket`).
+Follow the equilibria of a plane, equation (1) in `solver`, from
+instability to instability. K is known only by its symbol in Fourier
+space. The onset without corners is the largest load with an equilibrium
+if no node reaches a corner in its law (problem (1) in `bracket`).
 
 Algorithm
 ---------
-The algorithm is our own. `plane_onset` finds the onset without corners, also for long lines:
+The algorithm is our own. `plane_onset` finds the onset without corners,
+also for long lines:
 
 1. Make coarser grids, each with half the nodes, as long as they resolve
    the nucleation length.

@@ -2,10 +2,10 @@
 
 Problem
 -------
-K is the stiffness (Pa/m), d >= 0 is the slip (m), and p is the load profile. On its
-present piece, the strength at node i, minus its initial stress, is q_i - W_i d_i. A
-node is overloaded if load p - K d exceeds its strength. An equilibrium at a load
-(Pa) satisfies
+K is the stiffness (Pa/m), d >= 0 is the slip (m), and p is the load
+profile. On its present piece, the strength at node i, minus its initial
+stress, is q_i - W_i d_i. A node is overloaded if load p - K d exceeds
+its strength. An equilibrium at a load (Pa) satisfies
 
     load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
 

@@ -2,10 +2,10 @@
 
 Problem
 -------
-Close the bracket (1) in `bracket`. A = K - diag(W), d is the slip, s is the
-strength minus initial stress, and p is the load profile. A spring holds a patch phi
-(|phi| = 1) at the amplitude a = <phi, d>, with a force mu (`held_equilibrium`). On
-the slipping nodes
+Close the bracket (1) in `bracket`. A = K - diag(W), d is the slip, s is
+the strength minus initial stress, and p is the load profile. A spring
+holds a patch phi (|phi| = 1) at the amplitude a = <phi, d>, with a
+force mu (`held_equilibrium`). On the slipping nodes
 
     A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
 
