@@ -5,7 +5,7 @@ Problem
 On rollers the top has v = 0. With glue, u is also given. This requires a shear
 traction t(s) on the top with
 
-    int G(x, s) t(s) ds = u(x),   0 < x < L,                                                   (1)
+    int G(x, s) t(s) ds = u(x),   0 < x < L,                         (1)
 
 where G is the compliance of a block on rollers, known in closed form
 (`harmonics`). At the corners t has singularities x^(lambda - 1) with

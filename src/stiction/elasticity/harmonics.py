@@ -8,14 +8,14 @@ Airy's function (S. Timoshenko and J. Goodier, Theory of Elasticity,
 article 24) as a sum of independent harmonics,
 
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
-    s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...                               (1)
+    s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...     (1)
 
 If the block is `pressed`, its interface has v = 0 and s_xy = 0 instead.
 Then sin and cos are exchanged, and k = pi/H, 2 pi/H, ... At free sides
 Phi_k is clamped: Phi_k and its slope vanish. All fields follow from a
 function g_k(x, s), the deflection of a clamped beam,
 
-    (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.              (2)
+    (d²/dx² - k²)² g_k = delta(x - s),   g_k = dg_k/dx = 0 at x = 0 and at x = L.  (2)
 
 For example, slip d on the interface causes the shear stress -(E*/H) sum
 k² int (d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).

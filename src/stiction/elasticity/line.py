@@ -6,7 +6,7 @@ K is the circulant matrix of the symbol (G*/2)|k|, with modulus G* (Pa)
 and period L (m). Summing its Fourier series gives, for an even number n
 of nodes, the first column
 
-    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,            (1)
+    K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,  (1)
 
 and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice
 versa, which halves the cost of products. In a window, a run of nodes, the

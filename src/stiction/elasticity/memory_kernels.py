@@ -7,7 +7,7 @@ this stress along the interface between two identical half-spaces
 (velocity form, M. S. Breitenfeld and P. H. Geubelle, International
 Journal of Fracture 93, 1998):
 
-    F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.           (1)
+    F(k, t) = -(G*|k|/2) D(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.  (1)
 
 The kernel C follows from the Laplace symbol D(s) of the traction per
 slip, in units of G|k|/2, with s in units of |k| c_s (P. H. Geubelle and

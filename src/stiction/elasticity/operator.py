@@ -7,8 +7,8 @@ each node (Pa/m), and A = K - diag(W). `inside` marks a set S of nodes,
 and x is zero outside S. Two problems are solved without a matrix in
 memory:
 
-    (A + spring phi phi')_SS x_S = right_S,                                                   (1)
-    A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.                                  (2)
+    (A + spring phi phi')_SS x_S = right_S,                          (1)
+    A_SS y_S = lambda y_S  for the smallest lambda, |y| = 1.         (2)
 
 In (1) a spring (stiffness in Pa/m) may hold a patch phi (|phi| = 1).
 With a stiff spring the matrix is positive definite even if A has a

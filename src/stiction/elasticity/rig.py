@@ -7,9 +7,9 @@ cells, and opening is w = v_S - v_B at their n + 1 edges. Let j = (d,
 w), F be the push and N the normal force per unit depth (N/m). Forces on
 cells and edges, also per unit depth, are
 
-    f = T F + T_p N - K j,    K = S_B A^-1 S_S,    T = S_B A^-1 g,    A = S_S + S_B        (1)
-    U = F/C + T'j,            1/C = g' A^-1 g - S_gg                                       (2)
-    elastic energy = F^2/(2 C) + j' K j/2                                                  (3)
+    f = T F + T_p N - K j,    K = S_B A^-1 S_S,    T = S_B A^-1 g,    A = S_S + S_B  (1)
+    U = F/C + T'j,            1/C = g' A^-1 g - S_gg                 (2)
+    elastic energy = F^2/(2 C) + j' K j/2                            (3)
 
 with shear forces f[:n], pressing forces -f[n:], and the travel U of the
 push without a constant part from N (Betti's theorem). S_S and S_B are

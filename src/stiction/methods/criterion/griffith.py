@@ -9,7 +9,7 @@ intensity factors at both tips (H. Bueckner, Zeitschrift fuer Angewandte
 Mathematik und Mechanik 50, 1970; W. Koiter, Ingenieur-Archiv 28, 1959)
 are
 
-    K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,            (1)
+    K = ((L/pi^2) (1 + U^2) U)^(1/2) int_0^pi D (1 +- cos t)/(1 + U^2 cos^2 t) dt,  (1)
 
 and the energy release rate is G = K |K|/(2 G*). A crack runs if G
 exceeds the fracture energy (A. Griffith, Phil. Trans. A 221, 1921).

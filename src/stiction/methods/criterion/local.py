@@ -8,7 +8,7 @@ this size becomes unstable in isolation at the nucleation stress (K.
 Uenishi and J. R. Rice, J. Geophys. Res. 108, 2003, equation 14; G.
 Albertini et al., 2020, equation 9)
 
-    tau_n(x) = <s, y>_x / <p, y>_x.                                                           (1)
+    tau_n(x) = <s, y>_x / <p, y>_x.                                  (1)
 
 The predicted onset is the least tau_n over all positions and windows.
 

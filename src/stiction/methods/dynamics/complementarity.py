@@ -4,7 +4,7 @@ Problem
 -------
 Find the slip increments u >= 0 (m) in a step, such that at every node
 
-    stress g - M u <= strength after the slip,   and equality where u > 0.                    (1)
+    stress g - M u <= strength after the slip,   and equality where u > 0.  (1)
 
 g is the stress at the end of a step without slip
 (`SlipProblem.trial`). M is a circulant matrix with positive

@@ -4,7 +4,7 @@ Problem
 -------
 Waves carry away the unbalanced stress, so the mean stress on the interface is
 
-    <tau> = tau_0 <p> + <tau_i> - Z <V>.                                                      (1)
+    <tau> = tau_0 <p> + <tau_i> - Z <V>.                             (1)
 
 <p> and <tau_i> are means over the nodes that can break. Nodes beyond an extent
 have no effect. If the interface has an extent, the nodes beyond take over
@@ -19,7 +19,7 @@ An instability is slip that the load does not drive: after a maximum of
 load also lowers <tau>, but without an instability. Therefore the
 relevant fall is
 
-    fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).                              (2)
+    fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).     (2)
 
 It counts only if the mean strength of all nodes has fallen as much as
 <tau> ever did since the maximum. Slipping nodes carry their strength,

@@ -8,12 +8,12 @@ the modes. Let f_hat(d_hat, V_hat) be the stress transferred at the end
 of the step if a slip rate V_hat acts for the whole step and leads to
 the slip d_hat:
 
-    f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.       (1)
+    f_hat = (G|k|/2) (S + V_hat Re sum_p w_p B) - K(k) d_hat,   S = Re sum_p w_p E B y.  (1)
 
 The state of a node follows from the stress that it would carry at rest
 and its strength s(d):
 
-    V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.            (2)
+    V = max(f + tau_0 p + tau_i - s(d), 0) / Z,   tau = f + tau_0 p + tau_i - Z V.  (2)
 
 Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
 ----------------------------------------------------------------------------------

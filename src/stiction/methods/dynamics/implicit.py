@@ -8,7 +8,7 @@ V' the mean rate in the previous step, h' the size of the previous step,
 and r = h/(h + h'). To second order the slip rate at the end of the step
 is
 
-    V = u/h + r (u/h - V'),                                                                   (1)
+    V = u/h + r (u/h - V'),                                          (1)
 
 as in the two-step backward differences of C. F. Curtiss and J. O.
 Hirschfelder (Proceedings of the National Academy of Sciences 38, 1952).
@@ -17,7 +17,7 @@ V')/h. If there is no previous step, r = 0, and the step is of first
 order. The stress at the end is, mode by mode,
 
     tau_0 p + tau_i - Z V - K (slip + u)
-        + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),                               (2)
+        + (G|k|/2) (S + u/h Re sum_p w_p B + a Re sum_p w_p R),      (2)
 
 with S, B and R of `memory`. This is linear in u, so u solves the
 complementarity problem of `complementarity` with a circulant matrix.

@@ -5,12 +5,12 @@ Problem
 Past slip rates V of a mode k transfer the stress (G|k|/2) S, with the
 convolution
 
-    S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).             (1)
+    S(t) = int_0^t C(|k| c_s t') V(t - t') dt',   C(T) = Re sum_p w_p exp(s_p T).  (1)
 
 It is therefore enough to store a memory variable for each pair (s_p,
 w_p) and mode,
 
-    psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.           (2)
+    psi_p(t) = int_0^t exp(s_p |k| c_s t') V(t - t') dt',   S = Re sum_p w_p psi_p.  (2)
 
 The real and the imaginary part of V are two real signals. Each signal
 has a complex psi_p. On a plane the pairs before `Grid.split` have the
@@ -28,7 +28,7 @@ With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
    phi(z). The variables are stored as y = psi/B, which saves a
    multiplication in each pass:
 
-       y <- E y + V,   and for the next step at once   Re sum_p w_p E B y                     (3)
+       y <- E y + V,   and for the next step at once   Re sum_p w_p E B y  (3)
 
    (`advance_memory`). The sum is the part of S at the end of the next
    step that is already known. The slip rate of that step adds V Re
@@ -36,7 +36,7 @@ With z = s_p |k| c_s h, E = exp(z), and phi(z) = (exp(z) - 1)/z:
 2. Implicit step, slip rate V + a (t - h/2) for 0 < t < h. The variables
    are stored as psi:
 
-       psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt          (4)
+       psi <- E psi + B V + R a,   R = int_0^h exp(s_p |k| c_s (h - t)) (t - h/2) dt  (4)
 
    (`advance_with_ramp`, with the tables of `tabulate`). Before that
    `fading_memory` sums Re sum_p w_p E psi, the part of S at the end of

@@ -5,14 +5,14 @@ a creeping interface (`implicit`), and explicit steps with fixed size
 follow its waves (`explicit`). The diagnostic `phase` states which type
 comes next. Both solve, at every node,
 
-    tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.              (1)
+    tau = tau_0 p + tau_i + f - Z V,   V = 0 or tau = strength(slip),   V >= 0.  (1)
 
 tau_0 p is the load, tau_i the initial stress, Z = G/(2 c_s) the
 impedance and f the stress that slip at other nodes transfers. It is
 computed mode by mode with the memory kernel C from
 `elasticity.memory_kernels`:
 
-    f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.            (2)
+    f(k, t) = -K(k) slip(k, t) + (G|k|/2) int_0^t C(|k| c_s t') V(k, t - t') dt'.  (2)
 
 Fields of the interface and their transforms are flat, also on planes.
 `Grid.transform` knows the shape. Modes q = 0, 1, ... are in the order

@@ -10,7 +10,7 @@ x)_b. N_a is the normal force on a cell: half P at both its edges, but
 the whole P at the two ends of the slider. Written N = Q P, the law of a
 cell is
 
-    strength_a = mu_a N_a - W_a d_a,                                                          (1)
+    strength_a = mu_a N_a - W_a d_a,                                 (1)
 
 with mu_a = mu_p at first. When the strength meets mu_r N_a, it is mu_r
 N_a from then on: mu_a is mu_r, and W_a is 0. Slip is irreversible,
@@ -18,7 +18,7 @@ opening is reversible. The overstress o (N/m) of a cell is its shear
 force minus its strength, and the overstress of an edge is -P.
 Equilibrium is
 
-    o <= 0,   o = 0 where a cell slips or an edge is open.                                    (2)
+    o <= 0,   o = 0 where a cell slips or an edge is open.           (2)
 
 o changes at the rate do = p dD - M dx. Row a of M is K_a + mu_a (Q
 K_w)_a with -W_a on the diagonal, and p_a = T_a + mu_a (Q T_w)_a. Row b

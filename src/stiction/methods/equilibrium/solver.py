@@ -6,7 +6,7 @@ The load (Pa) rises slowly from zero. K is the stiffness (Pa/m), d >= 0
 the slip (m), s(d) the strength minus initial stress (Pa), which falls
 with slip, and p the load profile. Slip d is an equilibrium at a load if
 
-    load p - K d <= s(d),  with '=' where d > 0.                                              (1)
+    load p - K d <= s(d),  with '=' where d > 0.                     (1)
 
 Follow the least equilibrium, which an interface without inertia takes,
 from rest to the load at which (1) has no solution: there the whole

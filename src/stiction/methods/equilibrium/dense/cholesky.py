@@ -6,7 +6,7 @@ K is the stiffness (Pa/m), W >= 0 the weakening rate of each node
 (Pa/m), A = K - diag(W), and S the list of slipping nodes, ordered like
 the rows of L. This folder solves systems
 
-    A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),           (1)
+    A_SS x = b,  with A_SS = L L':  first L y = b (forward), then L' x = y (backward),  (1)
 
 for sets S and rates W that change a little from one system to the next.
 A pivot that is not positive shows that A_SS is not positive definite.

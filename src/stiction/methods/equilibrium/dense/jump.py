@@ -8,7 +8,7 @@ such equilibrium. K is the stiffness (Pa/m), d >= 0 is the slip (m),
 s(d) is the strength minus initial stress (Pa), which falls along
 straight pieces, and p is the load profile:
 
-    load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
+    load p - K d <= s(d),  with '=' at the slipping nodes S.         (1)
 
 A node is driven if load p - K d - s(d), its overload, is not negative.
 Suppose that K has no positive off-diagonal entry, and that strength

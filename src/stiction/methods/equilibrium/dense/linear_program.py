@@ -6,8 +6,8 @@ As long as strength falls linearly with slip, s_i = excess_i - W_i d_i, the
 largest load (Pa) with an equilibrium is, with A = K - diag(W), slip d >= 0 (m)
 and load profile p > 0,
 
-    max {load : d >= 0, A d + excess - load p >= 0}                                           (1)
-      = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                                          (2)
+    max {load : d >= 0, A d + excess - load p >= 0}                  (1)
+      = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                 (2)
 
 Every feasible d bounds the load from below, and every feasible y, a
 multiplier, bounds the load from above. If K has no positive

@@ -8,12 +8,12 @@ along straight pieces: s_i = q_i - W_i d_i. Slip is an equilibrium at a
 load (Pa) if no stress exceeds the strength, and if both are equal at
 slipping nodes:
 
-    load p - K d <= s(d),  with '=' at the slipping nodes S.                                  (1)
+    load p - K d <= s(d),  with '=' at the slipping nodes S.         (1)
 
 With A = K - diag(W), the slip and its growth rate v with the load
 (m/Pa) follow from
 
-    A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,                                (2)
+    A_SS d_S = load p_S - q_S - (K d_rest)_S,    A_SS v = p_S,       (2)
 
 where d_rest is the slip of nodes that slipped before
 and now rest. (2) holds until a node enters or leaves S,
@@ -26,7 +26,7 @@ never stops. On a specimen, K may have positive off-diagonal entries
 never goes back: an unloaded node rests. The rates at the nodes that
 reach their strength then minimise v'Av/2 - p'v over v >= 0:
 
-    v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                                                  (3)
+    v >= 0,  A v - p >= 0,  v'(A v - p) = 0.                         (3)
 
 Algorithm
 ---------

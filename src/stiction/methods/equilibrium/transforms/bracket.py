@@ -5,7 +5,7 @@ Problem
 With A = K - diag(W) (Pa/m), slip d >= 0 (m), strength minus initial
 stress s (Pa) and load profile p > 0, the onset without corners is
 
-    max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.      (1)
+    max {load : d >= 0, A d + s - load p >= 0} = min {<s, y>/<p, y> : y >= 0, A y <= 0}.  (1)
 
 Any d >= 0 gives the lower bound min (A d + s)/p. Any y >= 0 gives an
 upper bound, after a multiple of a field z > 0 with A z < 0 has been

@@ -6,7 +6,7 @@ Let A = K - diag(W) (`elasticity.operator`). d >= 0 is the slip (m), s is the
 strength minus initial stress at zero slip (Pa), p is the load profile, and phi
 (|phi| = 1) is the shape of a patch. Find
 
-    d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,                     (1)
+    d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,  (1)
     mu = spring (alpha - <phi, d>),
 
 The stress mu of the spring is zero if there is no spring. Without a

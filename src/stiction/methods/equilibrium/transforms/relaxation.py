@@ -7,7 +7,7 @@ profile. On its present piece, the strength at node i, minus its initial
 stress, is q_i - W_i d_i. A node is overloaded if load p - K d exceeds
 its strength. An equilibrium at a load (Pa) satisfies
 
-    load p - K d <= q - W d,  with '=' where d > 0.                                           (1)
+    load p - K d <= q - W d,  with '=' where d > 0.                  (1)
 
 For given pieces this problem is linear, and `held_equilibrium` solves
 it by conjugate gradients with A = K - diag(W). If A is not positive

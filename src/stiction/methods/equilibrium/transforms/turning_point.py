@@ -7,7 +7,7 @@ the strength minus initial stress, and p is the load profile. A spring
 holds a patch phi (|phi| = 1) at the amplitude a = <phi, d>, with a
 force mu (`held_equilibrium`). On the slipping nodes
 
-    A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,                              (1)
+    A d = load p - s + mu phi,   A d' = mu' phi,  <phi, d'> = 1,     (1)
 
 where a dash is the derivative with respect to a at a fixed load. The
 interface without the spring is in equilibrium if mu = 0. Its load turns
