@@ -21,7 +21,7 @@ def rupture(nodes, steps):
 
 def test_slip_and_radiated_energy_converge_with_second_order_in_time():
     reference, energy = rupture(256, 8000)
-    assert reference.now.step.weakened_nodes == 256
+    assert reference.now["step"]["weakened_nodes"] == 256
     slips, energies = [], []
     for steps in (500, 1000, 2000):
         state, radiated = rupture(256, steps)

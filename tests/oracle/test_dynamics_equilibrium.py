@@ -113,7 +113,7 @@ def direct_convolution(run, start, steps):
     slip, slip_rate = np.zeros(n), start.slip_rate.copy()
     past = np.zeros((steps, pace.size), dtype=complex)
     for i in range(steps):
-        load = run.setting.load.values[1] * (start.now.step.time + (i + 1) * h)
+        load = run.setting.load.values[1] * (start.now["step"]["time"] + (i + 1) * h)
         lag = np.einsum("mk,mk->k", weights[1 : i + 1], past[:i][::-1])
 
         def moved(mean, lag=lag, load=load, slip=slip):
@@ -143,7 +143,7 @@ def test_slip_through_a_rupture_equals_that_of_the_full_history():
     state = run.start(run.first_slip())
     slip, slip_rate = direct_convolution(run, state, 900)
     run.take_steps(state, 900)
-    assert state.now.step.weakened_nodes > 100  # through the rupture
+    assert state.now["step"]["weakened_nodes"] > 100  # through the rupture
     # 1e-6 is asked for; errors of the kernel, up to 1e-6, have both signs and cancel.
     assert np.abs(state.slip - slip).max() < 2e-7 * slip.max()
     # Behind a steep front the slip rate shows ten times that.
@@ -163,7 +163,7 @@ def test_the_moment_of_an_event_between_ends_is_that_of_the_full_history():
     run.take_steps(state, 5000)
     (event,) = run.events
     # The load rises at 3e8 Pa/s, so its value tells the step at which the event ended.
-    steps = round((event["load"][1] / 3e8 - start.now.step.time) / run.medium.step)
+    steps = round((event["load"][1] / 3e8 - start.now["step"]["time"]) / run.medium.step)
     slip, _ = direct_convolution(run, start, steps)
     before, after = event["slip"]
     assert (after - before).sum() > 0.9 * slip.sum()

@@ -96,10 +96,10 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
             monkeypatch.setattr(module, "_CROSSINGS", crossings)
             run = run_of(PROBLEM, strength, method)
             state = slow_start(setting, run, PROBLEM.sample(strength), 0)
-            estimates.append(state.now.run.start_error)
+            estimates.append(state.now["run"]["start_error"])
             run.take_steps(state, 10_000)
-            error = abs(state.now.results.onset_stress - exact)
-            assert error < max(estimates[-1], 3e-5 * state.now.run.scale)
+            error = abs(state.now["results"]["onset_stress"] - exact)
+            assert error < max(estimates[-1], 3e-5 * state.now["run"]["scale"])
         assert np.all(np.diff(estimates) > 0.0)
 
 
@@ -135,7 +135,7 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     search, rows = static_search(CROOKED), CROOKED.sample(CROOKED_STRENGTH)
     state = slow_start(search, run, rows, 0)
     static, impedance = sample_of(rows, search.pieces, 0), run.medium.impedance
-    load = state.now.step.load - impedance * state.slip_rate.mean() / 1.2  # <p>
+    load = state.now["step"]["load"] - impedance * state.slip_rate.mean() / 1.2  # <p>
     step = 0.01 * (search.solve(static).load - load)
     slips = [search.solve(static, load + side * step).slip for side in (-1.0, 1.0)]
     slip_rate = 1e7 * (slips[1] - slips[0]) / (2.0 * step)
@@ -143,4 +143,4 @@ def test_the_state_at_the_start_is_that_of_the_slow_path():
     assert np.all(
         (state.slip_rate >= 0.999 * slip_rate) & (state.slip_rate <= 1.07 * slip_rate)
     )
-    assert abs(radiated_energy(run, state)) < 1e-12 * state.now.step.work
+    assert abs(radiated_energy(run, state)) < 1e-12 * state.now["step"]["work"]

@@ -64,14 +64,14 @@ def test_restart_at_any_step_is_the_uninterrupted_run(tmp_path, arrested):
     run, straight = fresh_run(profile)
     if arrested:
         total = 0
-        while straight.now.results.arrested_events == 0 or straight.explicit:
+        while straight.now["results"]["arrested_events"] == 0 or straight.explicit:
             total += run.take_steps(straight, 5)[0]
             assert total < 20_000
         cuts = total // 3, total - 25, total
         total += run.take_steps(straight, 3)[0]
     else:
         total, reason = run.take_steps(straight, 100_000)
-        implicit = int(straight.now.stepping.implicit_steps)
+        implicit = int(straight.now["stepping"]["implicit_steps"])
         assert reason == Reason.ALL_SLID
         assert implicit > 10
         # In the implicit phase, just before, at and after the switch, in the rupture.

@@ -47,7 +47,7 @@ def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
 
 def warn_of_slip(run: Run, state: RuptureState) -> None:
     """Warn about nodes that weaken too steeply for the grid, or whose stress would reverse slip."""
-    interface, now = run.medium.interface, state.now
+    interface, now = run.medium.interface, state.now["run"]
     W = run.setting.nodes.weakening_rate * run.medium.problem.friction.steepening
     shortest = MIN_NODES_IN_NUCLEATION * interface.spacing
     steepest = run.medium.problem.nucleation_lengths(1.0)[-1] / shortest
@@ -58,10 +58,10 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
             f"where the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
             " for this grid. Take more nodes, or end the interface there (interface.extent)"
         )
-    if now.run.reverse_margin < -_MIN_REVERSE * now.run.scale:
+    if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(
-            f"the stress fell below minus the strength, by {-now.run.reverse_margin:.3g} Pa at "
-            f"{interface.describe_node(int(now.run.reverse_node))}: slip in reverse is not"
+            f"the stress fell below minus the strength, by {-now['reverse_margin']:.3g} Pa at "
+            f"{interface.describe_node(int(now['reverse_node']))}: slip in reverse is not"
             " modelled, so these nodes were kept at rest. Change the sign of the load, or unload"
             " less"
         )
@@ -164,7 +164,7 @@ def warn_of_fast_loading(rises: Iterable[tuple[float, float]]) -> None:
 def check_finite(run: Run, state: RuptureState, reason: int) -> None:
     """Raise a `FloatingPointError` with the time and place at which a run became non-finite."""
     if reason == Reason.NOT_FINITE:
-        now = state.now
+        step = state.now["step"]
         # In an implicit step only the attempt was non-finite, and all
         # nodes have values.
         places = [
@@ -172,6 +172,6 @@ def check_finite(run: Run, state: RuptureState, reason: int) -> None:
             for node in np.flatnonzero(~np.isfinite(state.slip_rate))[:1]
         ]
         raise FloatingPointError(
-            f"the slip rate became non-finite at t = {now.step.time:.9g} s,{''.join(places)} tau_0"
-            f" = {now.step.load:.6g} Pa, after {state.steps} steps. The last finite state is kept"
+            f"the slip rate became non-finite at t = {step['time']:.9g} s,{''.join(places)} tau_0"
+            f" = {step['load']:.6g} Pa, after {state.steps} steps. The last finite state is kept"
         )

@@ -144,38 +144,39 @@ class Run:
         slip_rate[slip_rate * impedance < _REACHED_SHARE * nodes.peak] = 0.0
         stress = stress - impedance * slip_rate
         diagnostics = np.zeros(1, DIAGNOSTICS)
-        now = diagnostics.view(np.recarray)[0]
-        now.step.time = now.maximum.time = time
-        now.step.load = now.maximum.load = now.run.start_load = load
+        step, maximum, of_run = (diagnostics[0][name] for name in ("step", "maximum", "run"))
+        step["time"] = maximum["time"] = time
+        step["load"] = maximum["load"] = of_run["start_load"] = load
         # The mean stress before the first slip, when no waves are radiated.
-        now.maximum.stress = setting.mean_initial + load * setting.mean_profile
+        maximum["stress"] = setting.mean_initial + load * setting.mean_profile
         radiated = impedance * slip_rate.sum() / thresholds.period_nodes
-        now.step.whole_stress = now.maximum.stress - radiated
+        step["whole_stress"] = maximum["stress"] - radiated
         weakens = np.isfinite(limit)
         change = (limit[weakens] - nodes.peak[weakens]).sum()
-        now.step.strength_change = change / thresholds.period_nodes
+        step["strength_change"] = change / thresholds.period_nodes
         # Stress above the strength counts as strength.
-        now.maximum.strength = now.step.strength_change + radiated
-        now.maximum.breakable = now.maximum.stress
+        maximum["strength"] = step["strength_change"] + radiated
+        maximum["breakable"] = maximum["stress"]
         if thresholds.held:
-            now.maximum.breakable = self.mean(load * nodes.profile + nodes.initial)
-        now.step.mean_stress = self.mean(stress)
-        now.maximum.node = now.step.top_node = int(np.argmax(excess))
+            maximum["breakable"] = self.mean(load * nodes.profile + nodes.initial)
+        step["mean_stress"] = self.mean(stress)
+        maximum["node"] = step["top_node"] = int(np.argmax(excess))
         times, values = setting.load
         lowest = min(load, values[times <= time].min()) if slip is None else load
         margin = stress + limit - (load - lowest) * nodes.profile  # at rest, at the lowest load
-        now.run.reverse_margin, now.run.reverse_node = margin.min(), int(np.argmin(margin))
-        now.step.top_slip_rate, now.step.mean_slip = slip_rate.max(), self.mean(delta)
-        now.step.weakened_nodes = np.count_nonzero(delta >= nodes.residual_slip)
+        of_run["reverse_margin"], of_run["reverse_node"] = margin.min(), int(np.argmin(margin))
+        step["top_slip_rate"], step["mean_slip"] = slip_rate.max(), self.mean(delta)
+        step["weakened_nodes"] = np.count_nonzero(delta >= nodes.residual_slip)
         scale = max(0.0, self.scale_at(load))
-        now.run.scale = scale
+        of_run["scale"] = scale
         front = thresholds.front_share * nodes.residual_slip
         arrival = np.where((delta > 0.0) & (delta >= front), time, np.nan)
         size, slope = thresholds.smallest_step, self.slope(time)
         first = 0.1 * thresholds.load_step * scale / slope if slope > 0.0 else size
         explicit = thresholds.explicit_only or impedance * slip_rate.max() > _OVERSTRESS * scale
-        now.stepping.phase = Phase.EXPLICIT if explicit else Phase.IMPLICIT
-        now.stepping.next_size = min(max(size, first), LARGEST_STEP)
+        stepping = diagnostics[0]["stepping"]
+        stepping["phase"] = Phase.EXPLICIT if explicit else Phase.IMPLICIT
+        stepping["next_size"] = min(max(size, first), LARGEST_STEP)
         return RuptureState(
             delta, slip_rate, stress, slip_hat, slip_rate.copy(), memory, memory_sum, arrival,
             maximum_slip=delta.copy(), event_slip=delta.copy(), diagnostics=diagnostics,
@@ -183,7 +184,7 @@ class Run:
 
     def ended(self, state: RuptureState) -> bool:
         """Return whether the end time is reached, apart from round-off after many steps."""
-        remaining = self.setting.thresholds.end_time - state.now.step.time
+        remaining = self.setting.thresholds.end_time - state.now["step"]["time"]
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
@@ -196,9 +197,9 @@ class Run:
             return "time"
         times, values = self.setting.load
         # The last piece of the load does not rise, and no node slips.
-        level = state.now.step.time >= times[-1] and values[-1] <= values[-2]
+        level = state.now["step"]["time"] >= times[-1] and values[-1] <= values[-2]
         fastest = self.medium.impedance * state.slip_rate.max()
-        rests = not state.explicit and fastest <= _RESTING_STRESS * state.now.run.scale
+        rests = not state.explicit and fastest <= _RESTING_STRESS * state.now["run"]["scale"]
         return "rest" if self.stop != "time" and level and rests else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
@@ -232,8 +233,8 @@ class Run:
             steps_taken, reason = steps(state, count - taken, rest_of_record)
             taken += steps_taken
             now, held = state.now, self.setting.thresholds.held
-            rests = bool(now.event.calm or (reason == Reason.ALL_SLID and held))
-            if rests or now.event.begun:
+            rests = bool(now["event"]["calm"] or (reason == Reason.ALL_SLID and held))
+            if rests or now["event"]["begun"]:
                 self._follow_event(state, rests)
             # 2. to 4. The other type of steps takes over, or the run ends.
             if reason == Reason.TO_EXPLICIT:
@@ -251,19 +252,19 @@ class Run:
         next event begins before, the open event ends at the maximum of
         the mean stress at which the next event begins.
         """
-        now = state.now
+        now, event = state.now, state.now["event"]
         if rests:
-            self._keep_event(state, state.slip, now.step)
+            self._keep_event(state, state.slip, now["step"])
         else:
-            self._keep_event(state, state.maximum_slip, now.maximum)
-        now.event.fast, now.event.peak_rate, now.event.open = 0, 0.0, now.event.begun
+            self._keep_event(state, state.maximum_slip, now["maximum"])
+        event["fast"], event["peak_rate"], event["open"] = 0, 0.0, event["begun"]
         # The next event may begin from the present state of rest.
-        if rests and now.maximum.time == now.step.time:
-            now.maximum.work, state.maximum_slip[:] = now.step.work, state.slip
+        if rests and now["maximum"]["time"] == now["step"]["time"]:
+            now["maximum"]["work"], state.maximum_slip[:] = now["step"]["work"], state.slip
         for name in ("time", "load", "work", "node"):
-            now.event[name] = now.maximum[name]
+            event[name] = now["maximum"][name]
         state.event_slip[:] = state.maximum_slip
-        now.event.begun = now.event.calm = 0
+        event["begun"] = event["calm"] = 0
 
     def _keep_event(
         self, state: RuptureState, slip: Floats, end: Any, settled: bool = True
@@ -271,21 +272,22 @@ class Run:
         """Keep the open event with its slip, load and work at the end, if its slip was fast."""
         now, thresholds = state.now, self.setting.thresholds
         # A sliding interface never comes to rest.
-        slides = now.results.all_broken and not thresholds.held and slip is state.slip
-        slides &= now.step.top_slip_rate > _STOPPED_SHARE * thresholds.unstable_slip_rate
-        if now.event.open and now.event.fast and not slides:
+        slides = now["results"]["all_broken"] and not thresholds.held and slip is state.slip
+        slides &= now["step"]["top_slip_rate"] > _STOPPED_SHARE * thresholds.unstable_slip_rate
+        begun = now["event"]
+        if begun["open"] and begun["fast"] and not slides:
             event = np.zeros((), event_type(slip.size))
-            event["time"], event["node"] = now.event.time, now.event.node
+            event["time"], event["node"] = begun["time"], begun["node"]
             event["settled"] = settled
-            event["duration"] = now.event.fast_until - now.event.fast_since
-            event["load"] = now.event.load, end.load
-            event["work"] = now.event.work, end.work
+            event["duration"] = begun["fast_until"] - begun["fast_since"]
+            event["load"] = begun["load"], end["load"]
+            event["work"] = begun["work"], end["work"]
             event["slip"] = state.event_slip, slip
             self.events.append(event)
 
     def cut_event(self, state: RuptureState) -> None:
         """Keep the event that the end of the run cuts short."""
-        self._keep_event(state, state.slip, state.now.step, settled=False)
+        self._keep_event(state, state.slip, state.now["step"], settled=False)
 
     @property
     def cut_short(self) -> bool:
@@ -294,7 +296,7 @@ class Run:
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
         medium, tables = self.medium, self._explicit_tables()
-        remaining = self.setting.thresholds.end_time - state.now.step.time
+        remaining = self.setting.thresholds.end_time - state.now["step"]["time"]
         if remaining < count * medium.step:
             count = min(count, max(1, int(np.ceil(remaining / medium.step - 1e-6))))
         return explicit_steps(count, state, self.setting, tables, record)
@@ -316,15 +318,15 @@ class Run:
         """Phase 2: let explicit steps take over."""
         tables = self._explicit_tables()
         to_explicit(self.medium.grid, state, tables.step, tables.table, state.memory_sum)
-        stepping = state.now.stepping
-        stepping.calm_steps, stepping.calm_slip_rate = 0, state.slip_rate.max()
+        stepping = state.now["stepping"]
+        stepping["calm_steps"], stepping["calm_slip_rate"] = 0, state.slip_rate.max()
 
     def _to_implicit(self, state: RuptureState) -> None:
         """Phase 3: let implicit steps take over."""
         to_implicit(self.medium.grid, state, self.medium.step)
-        stepping, thresholds = state.now.stepping, self.setting.thresholds
+        stepping, thresholds = state.now["stepping"], self.setting.thresholds
         state.past[:] = state.slip_rate
-        stepping.next_size = 2.0 * thresholds.smallest_step
-        stepping.two_step = 0  # the first implicit step is of first order
+        stepping["next_size"] = 2.0 * thresholds.smallest_step
+        stepping["two_step"] = 0  # the first implicit step is of first order
         mean_rate = state.slip_rate.sum() / thresholds.period_nodes
-        stepping.previous_radiated = self.medium.impedance * mean_rate
+        stepping["previous_radiated"] = self.medium.impedance * mean_rate

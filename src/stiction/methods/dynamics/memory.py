@@ -267,13 +267,13 @@ def to_explicit(
     for block, total in enumerate(memory_sum.reshape(count, grid.multiplicity, 2, ENTRIES)):
         real, imaginary = rows[block, :, 2, None], rows[block, :, 3, None]
         total[:] = (real * y[block, ..., 0, :] - imaginary * y[block, ..., 1, :]).sum(axis=1)
-    state.now.stepping.phase = Phase.EXPLICIT
+    state.now["stepping"]["phase"] = Phase.EXPLICIT
 
 
 def to_implicit(grid: Grid, state: RuptureState, step: float) -> None:
     """Step 3: multiply psi/B by B for explicit steps h."""
     _scale_memory(grid, state.memory, step, divide=False)
-    state.now.stepping.phase = Phase.IMPLICIT
+    state.now["stepping"]["phase"] = Phase.IMPLICIT
 
 
 def _scale_memory(grid: Grid, memory: Floats, step: float, *, divide: bool) -> None:

@@ -266,10 +266,10 @@ class Rupture(Listed):
             ended, reason = run.run_to_end(state, self.max_steps)
             checks.check_finite(run, state, reason)
             if ended is None:
-                step = state.now.step
+                step = state.now["step"]
                 raise InputError(
                     f"max_steps: {self.max_steps} steps did not reach stop={self.stop!r}, only"
-                    f" tau_0 = {step.load:.6g} Pa with {step.weakened_nodes} nodes at their"
+                    f" tau_0 = {step['load']:.6g} Pa with {step['weakened_nodes']} nodes at their"
                     " residual strength. Raise max_steps or the loading rate"
                 )
             run.cut_event(state)

@@ -230,13 +230,12 @@ class Recorder:
 
     def add(self, state: RuptureState) -> None:
         """Keep a frame of the present state."""
-        run, now, medium = self.run, state.now, self.run.medium
-        frame: dict[str, Any] = {name: float(now.step[name]) for name in _OF_STEP}
+        run, step, medium = self.run, state.now["step"], self.run.medium
+        frame: dict[str, Any] = {name: float(step[name]) for name in _OF_STEP}
         frame |= {
             "mean_slip": float(run.mean(state.slip)),
             "top_slip_rate": float(state.slip_rate.max()),
-            "weakened_fraction": float(now.step.weakened_nodes)
-            / run.setting.thresholds.breakable,
+            "weakened_fraction": step["weakened_nodes"] / run.setting.thresholds.breakable,
             "seismic_moment": moment_of(medium.problem, state.slip),
         }
         # Energies are quadratic and overflow first.

@@ -172,10 +172,10 @@ def _record_to_end(
             warn_accuracy(str(error))
             return f"not finite: {error}"
         recorder.add(state)
-        now = state.now
+        step = state.now["step"]
         meter.note = (
-            f"t = {now.step.time:.6g} s, mean stress {now.step.mean_stress * 1e-6:.4f} MPa, "
-            f"{now.step.weakened_nodes / run.setting.thresholds.breakable:.0%} weakened"
+            f"t = {step['time']:.6g} s, mean stress {step['mean_stress'] * 1e-6:.4f} MPa, "
+            f"{step['weakened_nodes'] / run.setting.thresholds.breakable:.0%} weakened"
         )
         meter.advance(taken)
         if stopped := run.ending(state, reason):
@@ -187,10 +187,10 @@ def _record_to_end(
 def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
     """Return the spectrum of the highest instability, up to the next one or the run's end."""
     moment_rate = dataset["moment_rate"].values
-    time, onset = dataset["step_time"].values, float(state.now.results.onset_time)
+    time, onset = dataset["step_time"].values, float(state.now["results"]["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]
     inside = (time >= onset) & (time <= min(later, default=np.inf))
-    inside &= state.now.results.instabilities > 0
+    inside &= state.now["results"]["instabilities"] > 0
     return rate_spectrum(run.medium.problem, time[inside], moment_rate[inside])
 
 

@@ -97,10 +97,10 @@ def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> Rupt
         # 5. Close enough, or a greater distance.
         if state is None:
             distance *= 4.0
-        elif state.now.run.start_error <= allowed:
+        elif state.now["run"]["start_error"] <= allowed:
             return state
         else:
-            distance *= 1.2 * (state.now.run.start_error / allowed) ** 0.4
+            distance *= 1.2 * (state.now["run"]["start_error"] / allowed) ** 0.4
     return None  # 6.
 
 
@@ -140,14 +140,14 @@ def _state_at(
     missed = np.abs(stress - run.strength_after(present.slip))[present.slip > 0.0]
     state.slip_rate[:], state.past[:], state.stress[:] = slip_rate, mean_slip_rate, stress
     now = state.now
-    now.stepping.phase, now.stepping.two_step = Phase.IMPLICIT, 1
-    now.stepping.previous_size, now.step.top_slip_rate = interval, slip_rate.max()
-    now.step.mean_stress = now.step.whole_stress = stress.mean()
-    now.maximum.stress = now.maximum.breakable = stress.mean()
-    now.maximum.radiated = now.stepping.previous_radiated = radiated
+    now["stepping"]["phase"], now["stepping"]["two_step"] = Phase.IMPLICIT, 1
+    now["stepping"]["previous_size"], now["step"]["top_slip_rate"] = interval, slip_rate.max()
+    now["step"]["mean_stress"] = now["step"]["whole_stress"] = stress.mean()
+    now["maximum"]["stress"] = now["maximum"]["breakable"] = stress.mean()
+    now["maximum"]["radiated"] = now["stepping"]["previous_radiated"] = radiated
     # The slow path radiates no energy. Set
     # its work so that the balance gives zero.
-    now.step.work -= energy_balance(run, state)["radiated_energy"]
-    now.maximum.work = now.step.work
-    now.run.start_error = missed.max(initial=0.0)
+    now["step"]["work"] -= energy_balance(run, state)["radiated_energy"]
+    now["maximum"]["work"] = now["step"]["work"]
+    now["run"]["start_error"] = missed.max(initial=0.0)
     return state

@@ -301,17 +301,18 @@ class RuptureState(NamedTuple):
     @property
     def now(self) -> Any:
         """Diagnostics, by group and name."""
-        return self.diagnostics.view(np.recarray)[0]
+        return self.diagnostics[0]
 
     @property
     def explicit(self) -> bool:
         """Whether explicit steps come next."""
-        return bool(self.now.stepping.phase == Phase.EXPLICIT)
+        return bool(self.now["stepping"]["phase"] == Phase.EXPLICIT)
 
     @property
     def steps(self) -> int:
         """Number of steps so far, explicit and implicit."""
-        return int(self.now.stepping.explicit_steps + self.now.stepping.implicit_steps)
+        stepping = self.now["stepping"]
+        return int(stepping["explicit_steps"] + stepping["implicit_steps"])
 
 
 class ExplicitTables(NamedTuple):

@@ -110,7 +110,7 @@ def rate_spectrum(
 
 def energy_balance(run: Run, state: RuptureState) -> dict[str, float]:
     """Return the strain, fracture and radiated energy so far, J/m, or J on a plane."""
-    return _energies(run, state.slip, state.slip_hat, float(state.now.step.work))
+    return _energies(run, state.slip, state.slip_hat, float(state.now["step"]["work"]))
 
 
 def _energies(run: Run, slip: Floats, slip_hat: Spectrum, work: float) -> dict[str, float]:
@@ -164,7 +164,7 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
     interface = run.medium.interface
     nucleation = run.medium.problem.nucleation_lengths(run.steepest_weakening_rate)
     arrival = state.arrival.reshape(interface.shape)
-    began = np.unravel_index(int(state.now.results.onset_node), interface.shape)
+    began = np.unravel_index(int(state.now["results"]["onset_node"]), interface.shape)
     speeds: dict[str, list[float]] = {name: [] for name in SPEEDS}
     for axis, length in enumerate(nucleation):
         through: Any = (*began[:axis], slice(None), *began[axis + 1 :])
@@ -175,41 +175,42 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
 
 def _critical_load(run: Run, now: Any) -> float:
     """Return the load, Pa, that carries the critical stress. NaN if the start was overstressed."""
-    nodes, margin = run.setting.nodes, 1e-6 * now.run.scale
-    stress = float(now.results.onset_stress)
+    nodes, margin = run.setting.nodes, 1e-6 * now["run"]["scale"]
+    stress = float(now["results"]["onset_stress"])
     # Without slip the mean stress is tau_0 <p> + <tau_i>.
     load = (stress - run.setting.mean_initial) / run.setting.mean_profile
     # An overstressed start breaks at once. No static load carries its stress.
-    began = now.run.start_load * nodes.profile + nodes.initial
+    began = now["run"]["start_load"] * nodes.profile + nodes.initial
     overstressed = bool(np.any(began - nodes.peak > margin))
-    return load if not overstressed or load > now.run.start_load + margin else np.nan
+    return load if not overstressed or load > now["run"]["start_load"] + margin else np.nan
 
 
 def summary(run: Run, state: RuptureState) -> dict[str, Any]:
     """Return the scalars of a finished run, with NaN for events that did not happen."""
     interface, now = run.medium.interface, state.now
-    unstable, broken = now.results.instabilities > 0, bool(now.results.all_broken)
+    results = now["results"]
+    unstable, broken = results["instabilities"] > 0, bool(results["all_broken"])
     # In a run to sliding, or to an end time, the interface may have survived.
     failed = unstable and (broken or run.stop not in ("sliding", "time"))
-    critical = float(now.results.critical_stress) if failed else np.nan
-    kinetic = float(now.results.kinetic_stress) if broken else np.nan
-    node = np.unravel_index(int(now.results.onset_node), interface.shape)
+    critical = float(results["critical_stress"]) if failed else np.nan
+    kinetic = float(results["kinetic_stress"]) if broken else np.nan
+    node = np.unravel_index(int(results["onset_node"]), interface.shape)
     energies = energy_balance(run, state)
     values: dict[str, Any] = {
         "critical_load": _critical_load(run, now) if failed else np.nan,
         "critical_stress": critical,
-        "first_instability": float(now.results.first_stress) if unstable else np.nan,
+        "first_instability": float(results["first_stress"]) if unstable else np.nan,
         "critical_position": [i * h for i, h in zip(node, interface.spacings, strict=True)],
-        "applied_load": float(now.results.onset_load) if unstable else np.nan,
-        "onset_time": float(now.results.onset_time) if unstable else np.nan,
+        "applied_load": float(results["onset_load"]) if unstable else np.nan,
+        "onset_time": float(results["onset_time"]) if unstable else np.nan,
         "kinetic_stress": kinetic,
         "stress_drop": critical - kinetic,
         "seismic_moment": moment_of(run.medium.problem, state.slip),
-        "arrested_events": int(now.results.arrested_events),
+        "arrested_events": int(results["arrested_events"]),
         **_speeds(run, state),
         **{name: energies[name] for name in ("radiated_energy", "fracture_energy")},
-        **{name: float(now.run[name]) for name in ("start_load", "start_error")},
-        **{name: int(now.stepping[name]) for name in ("implicit_steps", "explicit_steps")},
+        **{name: float(now["run"][name]) for name in ("start_load", "start_error")},
+        **{name: int(now["stepping"][name]) for name in ("implicit_steps", "explicit_steps")},
     }
     for name in ("critical_position", *SPEEDS):
         # A number on a line, and on a plane a number along x and a
