@@ -360,10 +360,10 @@ class SliderSolver:
         """Return the values that `equilibrium_path` needs at rising loads, Pa."""
         # The path to sliding gives all events, and a second path the states at the loads.
         push, path = self.path(rows, 0).follow(), self.path(rows, 0)
-        end = push.last.load
+        end = push.last.load / self.length
         if not push.known:
-            warn_accuracy(f"the path was not followed beyond {end / self.length:g} Pa")
-        sliding, state, states = loads * self.length > end, path.state(), []
+            warn_accuracy(f"the path was not followed beyond {end:g} Pa")
+        sliding, state, states = loads > end, path.state(), []
         for load in loads[~sliding]:
             while (status := path.move(load * self.length)) <= Status.ARRESTED:
                 state = path.state()
