@@ -47,7 +47,7 @@ def test_errors_of_equilibrium_are_warned_of():
     }
     rows = PROBLEM.sample(np.full((2, PROBLEM.interface.size), 1e6))
     with pytest.warns(st.AccuracyWarning, match="did not close to 1e-09 of the load in 1 of 2"):
-        EXACT.prepare(PROBLEM)._warn(rows, values, known=no, certified=~no, stopped=no)
+        EXACT.prepare(PROBLEM)._warn(rows, values, np.stack([no, ~no, no], axis=-1))
 
 
 def test_a_path_whose_end_is_not_known_is_said(monkeypatch):

@@ -8,7 +8,7 @@ basis (`Summary`).
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -115,16 +115,6 @@ def shown(value: Any) -> str:
     return repr(float(value) if isinstance(value, np.floating) else value)
 
 
-def rows_of(value: Any, prefix: str = "") -> Iterator[Row]:
-    """Yield a row for each given field of a dataclass, and of nested dataclasses by dotted keys."""
-    for name, entry in given_fields(value).items():
-        if dataclasses.is_dataclass(entry):
-            yield Row(prefix + name, type(entry).__name__)
-            yield from rows_of(entry, f"{prefix}{name}.")
-        else:
-            yield Row(prefix + name, entry, (), UNITS.get(name, ""))
-
-
 def equal(self: Any, other: object) -> bool:
     """Use as `__eq__`: objects of a class are equal if all public fields are equal."""
     return _key(self) == _key(other) if type(self) is type(other) else NotImplemented
@@ -156,7 +146,9 @@ class Result:
     """Base class of results: they show a summary, compare by value, and can be written as JSON."""
 
     def _summary(self) -> Summary:
-        return Summary(type(self).__name__, list(rows_of(self)))
+        given = given_fields(self)
+        rows = [Row(name, entry, (), UNITS.get(name, "")) for name, entry in given.items()]
+        return Summary(type(self).__name__, rows)
 
     def __repr__(self) -> str:
         return str(self)

@@ -69,23 +69,16 @@ def contradictions_of(
             f" sample {number}, such as {interface.describe_node(node)}: {least:g} and {most:g} Pa"
             f"{f', and in {further} more samples' * (further > 0)}. st.Rupture() accepts this"
         )
-    if (
-        np.max(strength, where=np.isfinite(strength), initial=0.0)
-        > MAX_STRENGTH_RATIO * strength.min()
-    ):
+    finite = np.isfinite(strength)
+    if np.max(strength, where=finite, initial=0.0) > MAX_STRENGTH_RATIO * strength.min():
         middle = np.median(strength, axis=along, keepdims=True)
-        huge = np.isfinite(strength) & (strength > MAX_STRENGTH_RATIO * middle)
-        if middle.min() <= 0.0:
-            problems.append(
-                f"strength: must be positive. Its median in sample {int(np.argmin(middle))} is"
-                f" {middle.min():g} Pa: check its sign"
-            )
-        elif huge.any():
+        if (huge := finite & (strength > MAX_STRENGTH_RATIO * middle)).any():
             number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
             problems.append(
                 f"strength: {strength[number].flat[node]:g} Pa at {interface.describe_node(node)}"
                 f" of sample {number} is more than {MAX_STRENGTH_RATIO:g} times the median,"
-                f" {middle[number].item():g} Pa. Where nothing breaks, give a smaller strength"
+                f" {middle[number].item():g} Pa. Check its sign, and where nothing breaks give a"
+                " smaller strength"
             )
     nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
     if nowhere.any():

@@ -43,7 +43,7 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
         raise ValueError(
             "must be a number for a line, or two numbers (along x, along y) for a plane"
         )
-    return tuple(read(in_si(item, "length")) for item in value)
+    return tuple(map(read, value))
 
 
 def _length(value: Any) -> float:
@@ -62,7 +62,7 @@ def _two_places(value: Any) -> tuple[float, float]:
     value = in_si(value, "length")
     if isinstance(value, str) or np.shape(np.asarray(value, dtype=object)) != (2,):
         raise ValueError("must be two lengths")
-    first, second = (as_number(in_si(place, "length")) for place in value)
+    first, second = map(as_number, value)
     if not math.isfinite(first + second):
         raise ValueError("must be finite")
     return first, second
