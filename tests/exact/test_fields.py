@@ -20,7 +20,6 @@ from stiction.random.mapping import (
     quantile_of_normal,
     quantile_table,
 )
-from stiction.random.marginals import affine_parameters
 
 LINE = st.Interface(length=0.1, nodes=256)
 COARSE = st.Interface(length=0.1, nodes=64)
@@ -393,48 +392,7 @@ def test_fields_have_the_moments_and_bounds_that_were_given_and_files_hold_them(
     assert st.RandomField(table, SPECTRUM) == field
 
 
-@pytest.mark.parametrize(
-    "marginal",
-    [
-        *FAMILIES,
-        st.Lognormal(mean=1e6, cv=0.2),
-        st.Beta(alpha=2.0, beta=3.0, low=1.0, high=4.0),
-    ],
-)
-def test_parameters_that_shift_or_scale_are_declared(marginal):
-    names, a, b = affine_parameters(marginal)
-    shape = (marginal.distribution.ppf([0.2, 0.9]) - a) / b
-    for name in names:
-        moved = dataclasses.replace(marginal, **{name: 1.1 * getattr(marginal, name)})
-        _, c, d = affine_parameters(moved)
-        np.testing.assert_allclose(
-            (moved.distribution.ppf([0.2, 0.9]) - c) / d, shape, rtol=1e-9
-        )
-    bounded, high = isinstance(marginal, st.Beta), getattr(marginal, "high", None)
-    assert bool(names) == (bounded or (marginal.low == 0.0 and high is None))
-
-
 LINE = st.Interface(length=0.1, nodes=256)
-
-
-@pytest.fixture
-def residual(make_strength):
-    return dataclasses.replace(
-        make_strength(1.0), marginal=st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.5e6)
-    )
-
-
-def test_a_property_keeps_its_draws_whatever_else_is_random(make_strength, residual):
-    fields = {"strength": make_strength(1.0), "residual_strength": residual}
-    correlation = {("residual_strength", "initial_stress"): 0.5}
-    both = st.RandomInterface(**fields)
-    third = st.RandomInterface(**fields, initial_stress=residual, correlation=correlation)
-    alone = st.RandomInterface(strength=fields["strength"])
-    one, two, three = (r.profiles(LINE, samples=5, seed=3) for r in (alone, both, third))
-    first = fields["strength"].sample(LINE, samples=5, seed=3)
-    for profiles in (one, two, three):
-        assert np.array_equal(first, profiles["strength"])
-    assert np.array_equal(two["residual_strength"], three["residual_strength"])
 
 
 @pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])

@@ -26,30 +26,6 @@ def is_read(profile, values=STRENGTH * 1e6, x=X * 1e-3):
     return True
 
 
-HEADS = {
-    "a blank row below the heading": "x (mm);strength (MPa)\n;",
-    "words as units": "x (millimetres);strength (Megapascal)",
-    "a title, an empty line, and units below": "Scan 3;21,5;x;y;z\n\nx;strength\nmm;MPa",
-}
-
-
-def test_heads_of_instruments(tmp_path):
-    for head in HEADS.values():
-        assert is_read(read(tmp_path, "\n".join([head, *ROWS])))
-    text = "\n".join(["1;2", "speed;0.5", "x (mm);strength (MPa)", *ROWS])
-    refuses("line 2 ... is not a number", lambda: read(tmp_path, text))
-    assert is_read(read(tmp_path, text, skip=2))
-    trailing = "\n".join(["a,1,2,3,4,5", "Lateral mm,Raw um,", *(f"{r},,," for r in ROWS)])
-    heights = read(tmp_path, trailing.replace(";", ","), quantity="height")
-    assert is_read(heights, STRENGTH * 1e-6)
-    microns = read(tmp_path, "\n".join(["X_(microns);y1", *ROWS]), quantity="height", unit="um")
-    assert is_read(microns, STRENGTH * 1e-6, X * 1e-6)
-    for unit in ("-", "1"):
-        head = f"x;mu\nmm;{unit}"
-        mu = read(tmp_path, "\n".join([head, *ROWS]), quantity="friction_coefficient")
-        assert is_read(mu, STRENGTH)
-
-
 def test_tables_of_pandas_with_their_index(tmp_path):
     frame = pd.DataFrame({"x (mm)": X, "strength (MPa)": STRENGTH})
     frame.to_csv(tmp_path / "t.csv")
@@ -61,32 +37,6 @@ def test_tables_of_pandas_with_their_index(tmp_path):
         )
     pd.DataFrame({"peak (MPa)": STRENGTH}).to_csv(tmp_path / "p.csv")
     np.testing.assert_allclose(st.read_peaks(tmp_path / "p.csv").values[0], STRENGTH * 1e6)
-
-
-def test_a_number_chooses_the_column_where_headings_are_equal(tmp_path):
-    rows = [f"{row};{2 * v}" for row, v in zip(ROWS, STRENGTH, strict=True)]
-    text = "\n".join(["x (mm);strength (MPa);strength (MPa)", *rows])
-    assert is_read(read(tmp_path, text, value=1))
-    assert is_read(read(tmp_path, text, value=2), 2e6 * STRENGTH)
-    for value in ("strength", "strength (MPa)"):
-        refuses("columns 1 and 2 ... 'strength", lambda v=value: read(tmp_path, text, value=v))
-    refuses("pass value=1 or value=2", lambda: read(tmp_path, text))
-
-
-def test_marks_of_thousands_are_never_guessed(tmp_path):
-    head, values = "x (mm);strength (kPa)\n", [980.5e3, 1020e3, 975.2e3]
-    mixed = head + "0,5;980,5\n1,5;1.020\n2,5;975,2\n"
-    refuses("line 2 ... '0,5' ... line 3 ... '1.020'", lambda: read(tmp_path, mixed))
-    np.testing.assert_allclose(read(tmp_path, mixed, decimal=","), values)
-    refuses("'0,5' ... pass decimal=','", lambda: read(tmp_path, mixed, decimal="."))
-    for mark, factor in ((",", 1.0), (".", 1000.0)):
-        alone = head + "0;1,020\n1;1,034\n"
-        refuses("line 2 ... '1,020'", lambda text=alone: read(tmp_path, text))
-        given = read(tmp_path, alone, decimal=mark)
-        np.testing.assert_allclose(given, np.array([1.020e3, 1.034e3]) * factor)
-    swiss = head + "0,5;1'020,5\n1,5;1\N{NARROW NO-BREAK SPACE}034,25\n"
-    np.testing.assert_allclose(read(tmp_path, swiss), [1020.5e3, 1034.25e3])
-    refuses("line 2 ... two decimal marks", lambda: read(tmp_path, head + "0;1.020,5\n"))
 
 
 def test_words_and_numbers_for_missing_values(tmp_path):
@@ -165,14 +115,3 @@ def test_marks_of_an_overload_are_no_strengths(tmp_path, mark):
     rows = "\n".join(["x (mm);strength (MPa)", *ROWS, f"4;{mark}"])
     refuses("in line 6 ... overload ... missing=", lambda: read(tmp_path, rows))
     assert is_read(read(tmp_path, rows, missing=float(mark))[:4])
-
-
-@pytest.mark.parametrize("separator", " _:.")
-def test_the_first_word_of_a_heading_names_its_column(separator, tmp_path):
-    path = tmp_path / "peaks.csv"
-    lines = "0.21,31", "0.25,31", "0.2,31", "0.45,62", "0.4,62", "0.41,62"
-    path.write_text("\n".join((f"peak{separator}1 [kN],length{separator}l [mm]", *lines)))
-    peaks = st.read_peaks(path)
-    assert (peaks.lengths, peaks.unit) == ((0.031, 0.062), "N")
-    expected = [[210.0, 250.0, 200.0], [450.0, 400.0, 410.0]]
-    np.testing.assert_allclose(peaks.values, expected, rtol=1e-14)

@@ -1,11 +1,9 @@
 """Profiles and maps of one's own: units, coordinates and gaps decide, wherever one enters."""
 
-import sys
 from pathlib import Path
 
 import astropy.units as u
 import numpy as np
-import openpyxl
 import pytest
 import xarray as xr
 from recording import read
@@ -105,7 +103,6 @@ def test_everything_beside_the_strength_is_read_alike():
     assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
 
 
-MM = 1e3
 HEADINGS = Path(__file__).parents[1] / "records" / "headings.json"
 """Of a table, with the scales of x and of the strength in SI."""
 
@@ -128,23 +125,6 @@ def test_headings_of_laboratories(tmp_path, comma):
         assert (profile.attrs["units"], profile.x.attrs["units"]) == ("Pa", "m"), head
 
 
-def test_a_spreadsheet_as_it_comes(tmp_path, monkeypatch):
-    """A padded title, an empty column and empty rows at the end; a workbook with another sheet."""
-    rows = [f"{x};{v};" for x, v in zip(X * MM, STRENGTH * 1e-6, strict=True)]
-    lines = ["sep=;", "Messung 3;;", "x (mm);tau (MPa);", *rows, ";;", "", ";;"]
-    (tmp_path / "p.csv").write_text("\n".join(lines).replace(".", ","))
-    book = openpyxl.Workbook()
-    for line in [*lines[1:3], *zip(X * MM, STRENGTH * 1e-6, strict=True), ""]:
-        book.active.append(line.split(";") if isinstance(line, str) else line)
-    book.create_sheet("remarks").append(["ground with 400"])
-    book.save(tmp_path / "p.xlsx")
-    for name in ("p.csv", "p.xlsx"):
-        found = st.read_profile(tmp_path / name, interface=LINE)
-        np.testing.assert_allclose(found, STRENGTH, rtol=1e-9)
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
-    refuses("needs openpyxl ... save it as .csv", lambda: st.read_profile(tmp_path / "p.xlsx"))
-
-
 def test_profiles_in_a_study_file(tmp_path):
     for name, head, columns in (
         ("tau_r.csv", "x (mm);tau_r (kPa)", [X[::-1] * 1e3, 1e-3 * (1e5 + 1e6 * X[::-1])]),
@@ -164,13 +144,6 @@ def test_profiles_in_a_study_file(tmp_path):
     np.testing.assert_allclose(problem.load.normal_pressure, (5.0 + X) * 1e6, rtol=1e-11)
     np.testing.assert_allclose(problem.load.profile, 1.0 + X, rtol=1e-11)
     assert st.Study.from_dict(loaded.to_dict()) == loaded
-
-
-def test_rows_of_a_table_are_nodes_for_every_property():
-    for name in ("strength", "residual_strength"):
-        given = {"strength": STRENGTH, "residual_strength": 0.1 * STRENGTH}
-        rows = given | {name: xr.DataArray(given[name], dims="row")}
-        assert onset(rows).critical_stress.item() == onset(given).critical_stress.item()
 
 
 @pytest.mark.parametrize("kind", np.typecodes["AllInteger"] + "fd")
