@@ -51,8 +51,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
-from scipy.stats import binomtest
+from scipy.special import betaincinv, ndtri
 
 from stiction.base.arrays import Array
 from stiction.ensemble.limit_state import LimitState, scales_with_strength
@@ -80,7 +79,9 @@ over a long list, over the cost of an evaluation in counting."""
 
 def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
     """Return the interval for a probability from independent samples (Clopper and Pearson)."""
-    low, high = binomtest(failures, samples).proportion_ci(CONFIDENCE, "exact")
+    tail, held = 0.5 * (1.0 - CONFIDENCE), samples - failures
+    low = betaincinv(failures, held + 1, tail) if failures else 0.0
+    high = betaincinv(failures + 1, held, 1.0 - tail) if held else 1.0
     return float(low), float(high)
 
 
