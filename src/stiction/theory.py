@@ -9,7 +9,7 @@ import numpy as np
 
 from stiction.base.errors import InputError
 from stiction.base.model import checked
-from stiction.base.representation import Result
+from stiction.base.representation import Result, Row, Summary
 from stiction.methods.criterion.griffith import griffith_length
 from stiction.methods.criterion.local import check_law, nucleation_stress
 from stiction.methods.criterion.windows import windows_of
@@ -39,6 +39,16 @@ class NucleationStatistics(Result):
     variance: float
     strength_mean: float
     strength_variance: float
+
+    def _summary(self) -> Summary:
+        values = {
+            "mean": self.mean,
+            "standard deviation": self.variance**0.5,
+            "mean of the strength": self.strength_mean,
+            "its standard deviation": self.strength_variance**0.5,
+        }
+        rows = [Row(name, value, (), "Pa") for name, value in values.items()]
+        return Summary("Nucleation stress at a point, exact moments", rows)
 
     @property
     def variance_ratio(self) -> float:
