@@ -9,7 +9,7 @@ from setups import EXACT
 from sliders import coefficients, rig_problem
 
 import stiction as st
-from stiction.methods.equilibrium import slider as stages
+from stiction.methods.equilibrium import slider as module
 
 PUSH = st.Pusher(height=0.006, width=0.004)
 RIGS = {
@@ -76,8 +76,8 @@ def test_a_pressing_that_slips_at_both_ends_comes_to_rest(rate, mean):
         for _ in range(10):
             peak = mean * np.exp(0.15 * rng.normal(size=n))
             weakening = np.full(n, rate * 0.14 / n)
-            friction = stages.Friction(peak, ratio * peak, weakening)
-            pressed = stages.press(rig.K, rig.T_p, friction, force)
+            friction = module.Friction(peak, ratio * peak, weakening)
+            pressed = module.press(rig.K, rig.T_p, friction, force)
             shear, slip = pressed.forces[:n], pressed.moved[:n]
             # A cell slips along the shear that the pressing alone would cause. Slip nearby may
             # turn its shear. It then slips along the shear that it has.
@@ -85,7 +85,7 @@ def test_a_pressing_that_slips_at_both_ends_comes_to_rest(rate, mean):
             falls = np.where(
                 pressed.friction.peak > ratio * peak, weakening * np.abs(slip), 0.0
             )
-            strength = pressed.friction.peak * stages.on_cells(-pressed.forces[n:]) - falls
+            strength = pressed.friction.peak * module.on_cells(-pressed.forces[n:]) - falls
             assert np.all(np.abs(shear) <= strength + 1e-9 * force / n)
             at_strength = np.abs(shear) >= strength - 1e-9 * force / n
             assert np.all((slip * shear >= 0.0)[at_strength])
@@ -106,7 +106,7 @@ def test_the_pressing_may_begin_at_any_small_share(monkeypatch):
     mu = coefficients(problem, 0.28, amplitude=0.02)
     loads = {}
     for share in (1e-2, 1e-3, 1e-4):
-        monkeypatch.setattr(stages, "FIRST_PRESSING", share)
+        monkeypatch.setattr(module, "FIRST_PRESSING", share)
         found = solved(problem, mu)
         loads[share] = float(found.first_instability[0]), float(found.critical_load[0])
     np.testing.assert_allclose(loads[1e-2], loads[1e-3], rtol=5e-8)

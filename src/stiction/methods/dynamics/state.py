@@ -93,83 +93,105 @@ STEP = record(
     " top_slip_rate",
     "top_node weakened_nodes",
 )
-"""The last step: its end, s, and its size, s; then, at its end,
+"""The last step. Values belong to its end.
 
-- `load`: tau_0, Pa; `work` of the load on the slip so far, J/m
-- `mean_slip` (m) and `mean_slip_rate` (m/s)
+- `time`, s
+- `size` of the step, s
+- `load`: tau_0, Pa
+- `work` of the load on the slip so far, J/m
+- `mean_slip`, m
+- `mean_slip_rate`, m/s
 - `mean_stress` of the nodes that can break, Pa, as all stresses here
-- `whole_stress`: the same with the stress that nodes beyond an extent took over
-- `strength_change` of their mean strength by slip
-- `top_slip_rate`: the largest, m/s, at `top_node`
+- `whole_stress`: the mean stress with the stress that nodes beyond an
+  extent took over
+- `strength_change`: change of the mean strength by slip
+- `top_slip_rate`: the largest slip rate, m/s
+- `top_node`: the node with this rate
 - `weakened_nodes`: number of nodes at the residual strength
 """
 
 MAXIMUM = record("stress breakable radiated strength largest_fall time load work", "node")
-"""The last maximum of `whole_stress`:
+"""The last maximum of `whole_stress`.
 
-- `stress`; `breakable`: mean stress of the nodes that can break at that time
-- `radiated`: Z <V>; `strength`: `strength_change`
+- `stress`
+- `breakable`: mean stress of the nodes that can break at that time
+- `radiated`: Z <V>
+- `strength`: `strength_change`
 - `largest_fall` of the mean stress since then, by waves
-- `time` (s), `load`, `work`, and the fastest `node`
+- `time`, s
+- `load`
+- `work`
+- `node`: the fastest node
 """
 
 EVENT = record(
     "slip_rate time load work peak_rate fast_since fast_until",
     "unstable last_arrested open begun calm node fast",
 )
-"""The present instability, and the event that `Run` follows until its fast slip has settled, or
-until the next one begins:
+"""The present instability and the open event.
 
-- `unstable`: whether an instability is under way; `slip_rate`: the
-  largest in it, m/s
-- `last_arrested`: whether the last instability is among the arrested events
-- `open`: whether there is an event; `begun`, `calm`: whether it has
-  just begun or ended
-- `time` (s), `load` and `work` when it began, and the fastest `node` then
-- `peak_rate`: largest mean slip rate in the event while slip was fast, m/s
-- `fast`: whether slip was fast in the event, first at `fast_since` and
-  last at `fast_until` (s), see step 6 of `diagnostics`
+`Run` follows the open event until its fast slip has settled, or until
+the next event begins.
+
+- `unstable`: whether an instability is under way
+- `slip_rate`: largest slip rate in it, m/s
+- `last_arrested`: whether the last instability counts as arrested
+- `open`: whether there is an open event
+- `begun`: whether an event has just begun
+- `calm`: whether the open event has just ended
+- `time`, s, `load` and `work` when the open event began
+- `node`: the fastest node as it began
+- `peak_rate`: largest mean slip rate in it while slip was fast, m/s
+- `fast`: whether slip was fast in it
+- `fast_since`, `fast_until`: when slip was fast first and last, s; see
+  step 6 of `diagnostics`
 """
 
 RESULTS = record(
     "first_stress onset_stress critical_stress onset_time onset_load kinetic_stress",
     "instabilities arrested_events onset_node all_broken",
 )
-"""Results so far. Stresses, times and loads have a meaning after the first instability:
+"""Results so far.
 
-- `instabilities`, `arrested_events`: their numbers
+Stresses, times and loads have a meaning after the first instability.
+
+- `instabilities`: number of instabilities
+- `arrested_events`: number of instabilities that came to rest
 - `first_stress`: mean stress at the first instability
-- `onset_stress`, `onset_time`, `onset_load`, `onset_node`:
-  `whole_stress` at the highest instability, and its time, load and node
-- `critical_stress`: largest mean stress of breakable nodes at an instability
-- `all_broken`: whether all breakable nodes have reached residual
-  strength; `kinetic_stress`: if so, the mean stress when that happened
+- `onset_stress`: `whole_stress` at the highest instability
+- `onset_time`, `onset_load`, `onset_node` of the highest instability
+- `critical_stress`: largest mean stress of breakable nodes at an
+  instability
+- `all_broken`: whether all breakable nodes have reached their residual
+  strength
+- `kinetic_stress`: if so, the mean stress when that happened
 """
 
 STEPPING = record(
     "next_size previous_size previous_radiated calm_slip_rate",
     "phase two_step explicit_steps implicit_steps calm_steps",
 )
-"""Choice of steps:
+"""Choice of steps.
 
-- `phase`: a `Phase`; `explicit_steps`, `implicit_steps`: numbers of
-  steps so far
+- `phase`: a `Phase`
+- `explicit_steps`, `implicit_steps`: numbers of steps so far
 - `next_size`: size that the next implicit step tries, s
-- `two_step`: whether the next implicit step follows an implicit step,
-  of the size `previous_size` (s), with Z <V> = `previous_radiated`
-  after it
-- `calm_steps`: calm steps in a row; `calm_slip_rate`: largest slip rate
-  when the row began, m/s
+- `two_step`: whether the next implicit step follows an implicit step
+- `previous_size`: size of the last implicit step, s
+- `previous_radiated`: Z <V> after the last implicit step
+- `calm_steps`: calm steps in a row
+- `calm_slip_rate`: largest slip rate when the row began, m/s
 """
 
 RUN = record("scale start_load start_error reverse_margin", "reverse_node")
-"""The whole run so far:
+"""The whole run so far.
 
 - `scale`: stress scale of the largest load
-- `start_load`: load at the start; `start_error`: error of the onset due
-  to the start
-- `reverse_margin`: smallest sum of stress and strength, at
-  `reverse_node`. Below 0 slip would reverse.
+- `start_load`: load at the start
+- `start_error`: error of the onset due to the start
+- `reverse_margin`: smallest sum of stress and strength. If it is below
+  zero, slip would reverse
+- `reverse_node`: the node with this sum
 """
 
 DIAGNOSTICS = record(

@@ -80,15 +80,18 @@ class Waves(NamedTuple):
 TOTALS = record(
     "time travel speed force friction fast_slip_rate peak_rate fast_since fast_until", "fast"
 )
-"""Numbers of an event so far:
+"""Numbers of an event so far.
 
-- `time`, s; `travel` (m) and `speed` (m/s) of the drive of a block
+- `time`, s
+- `travel` of the drive of a block, m
+- `speed` of this drive, m/s
 - `force`: change of the force of this drive, N/m
 - `friction`: energy that friction took from a block, J/m
 - `fast_slip_rate`: slip rate that counts as fast, m/s
-- `peak_rate`: largest sum of the rates of all nodes while slip was fast, m/s
-- `fast`: whether slip was fast, as in `diagnostics`, first at
-  `fast_since` and last at `fast_until` (s)
+- `peak_rate`: largest sum of the rates of all nodes while slip was fast,
+  m/s
+- `fast`: whether slip was fast, as in `diagnostics`
+- `fast_since`, `fast_until`: when slip was fast first and last, s
 """
 
 
