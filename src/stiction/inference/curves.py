@@ -238,11 +238,10 @@ def read_curve(
     Parameters
     ----------
     source : path, DataFrame or (travel, force)
-        A text file or workbook, a folder of such files, a pandas table,
-        or two arrays. A table needs a column of friction force, shear
-        stress or friction coefficient and a column of travel or time. A
-        file may hold several tests, either numbered in a column
-        ``test`` or separated by empty lines.
+        A text file or workbook, a folder of such files, a pandas table, or two
+        arrays. A table needs a column of friction force, shear stress or friction
+        coefficient and a column of travel or time. A file may hold several tests,
+        either numbered in a column ``test`` or separated by empty lines.
     force, travel : str or int, optional
         Column, given by its heading, name, or number from 0. By default
         the force is the column whose heading says friction, tangential,
@@ -254,9 +253,8 @@ def read_curve(
     speed : float, optional
         Speed of the crosshead, m/s. It turns time into travel.
     noise : float, optional
-        Standard deviation of a load-cell reading, in SI. By
-        default it is estimated from neighbouring readings, which needs
-        a load cell without a filter.
+        Standard deviation of a load-cell reading, in SI. By default it is estimated
+        from neighbouring readings, which needs a load cell without a filter.
     split : {"cycles", "strokes", "tables"}, optional
         How a record with several tests is cut: where each full slide in a
         stick-slip record ends, where the force changes its sign in a
@@ -267,8 +265,7 @@ def read_curve(
     Returns
     -------
     Curves
-        A sequence with a `Curve` for each test. Printing shows what was
-        read.
+        A sequence with a `Curve` for each test. Printing shows what was read.
 
     Raises
     ------

@@ -86,14 +86,15 @@ def make_axes(
             f"prior: {len(simulated)} parameters would have to be simulated on a grid,"
             f" {names}. At most {max(along)} are possible. Fix the best-known parameters"
         )
-    axes = []
-    for i, (first, last) in enumerate(prior.theta(box).T):
+    axes, ends = [], prior.theta(box)
+    for i in simulated:
+        first, last = ends[:, i]
         # A range over several factors needs nodes at equal ratios.
         log = last >= LOG * first > 0.0
         space: Any = np.geomspace if log else np.linspace
         nodes = space(first, last, along[len(simulated)])
         axes.append(Axis(i, nodes, np.log if log else np.positive))
-    return tuple(axes[i] for i in simulated)
+    return tuple(axes)
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
@@ -199,16 +200,15 @@ def simulate(
 
 def area_of(prior: Prior, method: Any, length: float | None) -> float:
     """Return the area, m², of specimens with a given length, m, or as in the problem if None."""
-    # One parameter after the other moves to its lower end. The area must not follow.
-    moved = np.where(np.eye(prior.dimension, dtype=np.bool_), prior.ends[0], prior.middle)
-    experiments = experiments_at(prior, np.vstack([prior.middle, moved]), method, length)
-    areas = [experiment.problem.area for experiment in experiments]
-    if len({*areas}) > 1:
+    least, most = (
+        one.problem.area for one in experiments_at(prior, prior.ends, method, length)
+    )
+    if least != most:
         raise InputError(
-            f"peaks: are forces, but the prior changes the area, {areas[0]:g} m2. Give peaks as"
-            " stresses, in Pa"
+            f"peaks: are forces, but the prior changes the area, {least:g} to {most:g} m2. Give"
+            " peaks as stresses, in Pa"
         )
-    return areas[0] or math.nan
+    return least or math.nan
 
 
 def variable_of(problem: Problem, random: Any, unit: str) -> str:
