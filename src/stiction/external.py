@@ -53,8 +53,8 @@ def simulator(
     problem, random, method, seed
         As in `infer`.
     parameters : sequence of str
-        Keys, as in the prior of `infer`, for example ``("correlation_length",
-        "marginal.low")``.
+        Keys, as in the prior of `infer`, for example
+        ``("correlation_length", "marginal.low")``.
     samples : int
         Number of tests to simulate in each call.
     load_cell_error : float

@@ -63,10 +63,11 @@ def quantiles(values: Any, probability: RealArray) -> Quantiles:
 
     Notes
     -----
-    The number of values below the p-quantile is binomial (N, p). The interval ends
-    are order statistics. The number lies between their ranks with a probability of 90 %
-    (David and Nagaraja, 2003, Sec. 7.1). The coverage is exact for continuous
-    distributions, rounded up to whole ranks.
+    The number of values below the p-quantile is binomial (N, p). The
+    interval ends are order statistics. The number lies between their
+    ranks with a probability of 90 % (David and Nagaraja, 2003, Sec.
+    7.1). The coverage is exact for continuous distributions, rounded up
+    to whole ranks.
 
     Examples
     --------
@@ -113,8 +114,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
 
     Notes
     -----
-    The algorithm follows B. W. Silverman, Density Estimation for Statistics and Data
-    Analysis, 1986:
+    The algorithm follows B. W. Silverman, Density Estimation for
+    Statistics and Data Analysis, 1986:
 
     1. Choose the ends of a grid: the bounds,
        or half a spread beyond the sample.

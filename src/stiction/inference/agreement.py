@@ -1,9 +1,9 @@
 """Test whether measured peaks agree with a prediction. The p-values also hold for few peaks.
 
-Problem. n peaks have the empirical distribution F_n. The prediction has the
-distribution F, given by a sample or by a posterior. Find the probability that n
-peaks drawn from F are at least as far from F as the measured peaks, for two
-distances:
+Problem. n peaks have the empirical distribution F_n. The prediction has
+the distribution F, given by a sample or by a posterior. Find the
+probability that n peaks drawn from F are at least as far from F as the
+measured peaks, for two distances:
 
     Cramer-von Mises    W^2 = n int (F_n - F)^2 dF
     Kolmogorov          D = sqrt(n) max |F_n - F|
@@ -25,7 +25,8 @@ Steps for a predicted sample:
 3. The p-value is the fraction of choices whose distance is at least the
    distance of the measured values.
 
-Steps for a posterior. All peaks of a campaign have the same unknown parameters.
+Steps for a posterior. All peaks of a campaign have the same unknown
+parameters.
 
 4. Tabulate the distribution of a peak at `POSTERIOR_POINTS` draws of
    the posterior.
@@ -128,9 +129,10 @@ def agreement(
 ) -> Agreement:
     """Test whether measured peaks agree with a prediction.
 
-    The test compares distributions, so the order of the tests does not count. If
-    peaks drift, first remove the trend, ``peaks - np.polyval(np.polyfit(time, peaks,
-    1), time) + peaks.mean()``, and report this correction.
+    The test compares distributions, so the order of the tests does not
+    count. If peaks drift, first remove the trend, ``peaks -
+    np.polyval(np.polyfit(time, peaks, 1), time) + peaks.mean()``, and
+    report this correction.
 
     Parameters
     ----------
@@ -173,9 +175,10 @@ def agreement(
 
     Notes
     -----
-    A p-value of 0.3 means: if the prediction is right, three of ten campaigns with as
-    many tests differ from it at least as much. It does not mean that the prediction
-    is right. With few tests, only large errors are found.
+    A p-value of 0.3 means: if the prediction is right, three of ten
+    campaigns with as many tests differ from it at least as much. It
+    does not mean that the prediction is right. With few tests, only
+    large errors are found.
 
     Examples
     --------

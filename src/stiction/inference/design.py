@@ -126,12 +126,13 @@ def design_of_tests(
     problem, random, prior, method, samples, seed, progress
         As in `infer`. The method of a posterior is the default.
     designs : mapping
-        Designs by name. A design is a number of tests, a mapping of lengths (m)
-        to numbers of tests, or a table ``{"tests": ..., "known": [...]}``, in
-        which ``known`` lists parameters of the prior that are known from other
-        measurements. For a fit or a posterior, a design is ``{"tests": ...,
-        "profiles": ...}``, with numbers of further tests and profiles. The default
-        designs are 5, 10, 20 or 40 tests, or, after profiles, 2, 5 or 10 profiles.
+        Designs by name. A design is a number of tests, a mapping of
+        lengths (m) to numbers of tests, or a table ``{"tests": ...,
+        "known": [...]}``, in which ``known`` lists parameters of the
+        prior that are known from other measurements. For a fit or a
+        posterior, a design is ``{"tests": ..., "profiles": ...}``, with
+        numbers of further tests and profiles. The default designs are
+        5, 10, 20 or 40 tests, or, after profiles, 2, 5 or 10 profiles.
     probability : float
         Probability for the design stress. Used for a fit or a posterior.
     load_cell_error : float

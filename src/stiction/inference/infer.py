@@ -16,9 +16,9 @@ Steps:
 2. Refuse peaks that lie beyond the bounds
    of the onset everywhere in the prior.
 3. If the method is expensive and the local criterion applies, first
-   find the posterior by the local criterion. The box around this posterior,
-   slightly widened, is the relevant part of the prior. Otherwise use the whole
-   prior.
+   find the posterior by the local criterion. The box around this
+   posterior, slightly widened, is the relevant part of the prior.
+   Otherwise use the whole prior.
 4. Simulate onsets in this box (`likelihood`), and sum the posterior on
    a grid (`posterior`).
 5. If the posterior reaches an end of the box, widen the box on this
@@ -110,40 +110,49 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from peak stresses in repeated tests.
 
-    With a fit, or without a `prior` of other parameters, the mean strength and its scatter
-    between specimens are inferred. Otherwise the parameters in `prior` are.
+    With a fit, or without a `prior` of other parameters, the mean
+    strength and its scatter between specimens are inferred. Otherwise
+    the parameters in `prior` are.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, a list of interfaces, or None
-        If None, specimens differ only as a whole, and no field within a specimen is assumed.
-        A joint is then a new specimen. For mean and scatter: a fit, whose records are combined
-        with the peaks, or equally likely fields within a specimen. For other parameters: one
-        interface.
+        If None, specimens differ only as a whole, and no field within a
+        specimen is assumed. A joint is then a new specimen. For mean
+        and scatter: a fit, whose records are combined with the peaks,
+        or equally likely fields within a specimen. For other
+        parameters: one interface.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress or force at which each specimen slid, in `unit`, or the result of
-        `read_peaks`. Repeated slip loads of one specimen count as their mean. For several
-        lengths (m) of specimens: ``{0.1: [...], 0.2: [...]}``.
+        Mean shear stress or force at which each specimen slid, in
+        `unit`, or the result of `read_peaks`. Repeated slip loads of
+        one specimen count as their mean. For several lengths (m) of
+        specimens: ``{0.1: [...], 0.2: [...]}``.
     prior : mapping, optional
-        For mean and scatter: ``"mean"``, by default flat in its logarithm, and ``"between"``,
-        the coefficient of variation between specimens, by default half-Cauchy with scale 0.1.
-        Other parameters by the keys of a sweep, such as ``"correlation_length"``,
-        ``"marginal.low"`` or ``"problem.friction.weakening_rate"``. A prior is a frozen
-        `scipy.stats` distribution, a range, or ``{"low": ..., "high": ..., "spacing": "log"}``.
+        For mean and scatter: ``"mean"``, by default flat in its
+        logarithm, and ``"between"``, the coefficient of variation
+        between specimens, by default half-Cauchy with scale 0.1. Other
+        parameters by the keys of a sweep, such as
+        ``"correlation_length"``, ``"marginal.low"`` or
+        ``"problem.friction.weakening_rate"``. A prior is a frozen
+        `scipy.stats` distribution, a range, or ``{"low": ..., "high":
+        ..., "spacing": "log"}``.
     between : str or sequence of str, optional
-        Families of the factor between specimens, as in `fit_field`. By default of the fit, or all.
+        Families of the factor between specimens, as in `fit_field`. By
+        default of the fit, or all.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. It may be left out if `random` is None: then it has no
-        effect on a joint that is equal to the specimens.
+        Method that computes the onset. It may be left out if `random`
+        is None: then it has no effect on a joint that is equal to the
+        specimens.
     load_cell_error : float
         Standard error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
-        Unit of peaks and error. Forces need an area, coefficients ("1") a normal pressure.
+        Unit of peaks and error. Forces need an area, coefficients ("1")
+        a normal pressure.
     samples : int, optional
-        Simulated specimens at each point (2000 by the local criterion, else 500), or for each
-        field within a specimen (200, else 100).
+        Simulated specimens at each point (2000 by the local criterion,
+        else 500), or for each field within a specimen (200, else 100).
     seed, workers, progress
         As in `monte_carlo`.
 
@@ -155,21 +164,24 @@ def infer(
     Raises
     ------
     InputError
-        If any argument is invalid, or no parameters in the prior can produce the peaks.
+        If any argument is invalid, or no parameters in the prior can
+        produce the peaks.
 
     Warns
     -----
     AccuracyWarning
-        For each of the `notes`: the prior determines the result, the method or the number of
-        samples is inaccurate, or profiles and peaks contradict each other.
+        For each of the `notes`: the prior determines the result, the
+        method or the number of samples is inaccurate, or profiles and
+        peaks contradict each other.
     UserWarning
         Before a simulation that takes more than a minute.
 
     Notes
     -----
-    The posterior is summed on a grid, with a kernel density of simulated onsets as likelihood
-    (`stiction.inference.infer` has the steps). At most four parameters are simulated, besides
-    those that only shift and stretch the strength.
+    The posterior is summed on a grid, with a kernel density of
+    simulated onsets as likelihood (`stiction.inference.infer` has the
+    steps). At most four parameters are simulated, besides those that
+    only shift and stretch the strength.
 
     Examples
     --------

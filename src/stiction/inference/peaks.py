@@ -115,8 +115,8 @@ class Peaks(Result):
     def standards(self) -> dict[str, float]:
         """Mean, standard deviation, and values by EN 1990 and EN 1090-2, of all slip loads.
 
-        `stiction.inference.standards` has the formulas. They are from memory, and not yet
-        compared with the printed standards.
+        `stiction.inference.standards` has the formulas. They are from
+        memory, and not yet compared with the printed standards.
         """
         return standards_of(np.concatenate((self.loads or self).values))
 
@@ -157,10 +157,10 @@ def title_of(peaks: Peaks) -> str:
 def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peaks, float]:
     """Return the mean peak of each specimen, and the standard deviation of its error, in SI.
 
-    The unit is a specimen: its slip loads do not show how specimens differ.
-    Their pooled coefficient of variation gives the error in a mean. If
-    specimens have different numbers of slip loads, the error is for their
-    harmonic mean.
+    The unit is a specimen: its slip loads do not show how specimens
+    differ. Their pooled coefficient of variation gives the error in a
+    mean. If specimens have different numbers of slip loads, the error
+    is for their harmonic mean.
     """
     measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
@@ -261,10 +261,10 @@ def read_peaks(
 ) -> Peaks:
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
-    A column is read if its heading, or the caller, says that it is the wanted
-    quantity. If several columns could be it, an error lists them. First plot
-    the peaks in the order of the tests. Peaks that drift are not a sample from
-    one distribution.
+    A column is read if its heading, or the caller, says that it is the
+    wanted quantity. If several columns could be it, an error lists
+    them. First plot the peaks in the order of the tests. Peaks that
+    drift are not a sample from one distribution.
 
     Parameters
     ----------
@@ -403,7 +403,8 @@ def _of_table(
 def _refuse_statistics(table: Table, peak: Column) -> None:
     """Refuse a last row, apart from the tests, that holds the mean or deviation of the tests.
 
-    A row is apart if it follows an empty line, or has nothing in the first column.
+    A row is apart if it follows an empty line, or has nothing in the
+    first column.
     """
     values, first = peak.values, table.columns[0]
     apart = np.diff(table.lines, prepend=table.lines[:1]) > 1

@@ -1,7 +1,8 @@
 """Posteriors: draws, intervals, information gain and accuracy.
 
-`Posterior` holds parameters with a prior, which `PosteriorGrid` computes. `SpecimenPosterior`
-holds the mean, the scatter between specimens, and the field within a specimen.
+`Posterior` holds parameters with a prior, which `PosteriorGrid`
+computes. `SpecimenPosterior` holds the mean, the scatter between
+specimens, and the field within a specimen.
 
 Problem. The prior is uniform in the unit cube. Compute the posterior
 density L(u)/Z of the parameters u from the likelihood L, with the
@@ -248,7 +249,8 @@ class Posterior(WithFactors, Result):
                 f"interfaces: {', '.join(of_problem)} belong to the problem, not to an interface."
                 " Take `at(draw)`, which returns a problem and an interface for each draw"
             )
-        # Each draw counts once, unless more interfaces than draws are wanted.
+        # Each draw counts once, unless more interfaces than draws are
+        # wanted.
         total = self.u.shape[0]
         draws = np.random.default_rng([seed, 4]).choice(total, count, replace=count > total)
         return self._scattered([self.at(int(draw))[1] for draw in draws])

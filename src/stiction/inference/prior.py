@@ -67,7 +67,8 @@ class Prior:
         """Return the parameters at `u`, from inverse distribution functions."""
         result = np.empty_like(u)
         for i, distribution in enumerate(self.distributions.values()):
-            # An infinite end, or an end without density, cannot be simulated.
+            # An infinite end, or an end without density, cannot be
+            # simulated.
             low, high = _tails(distribution)
             result[:, i] = distribution.ppf(low + (high - low) * u[:, i])
         return result
@@ -184,8 +185,8 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
        restricted to one weight. It ignores the
        residual strength, so the equation always holds.
     3. In equilibrium, with slip in units of b, the strength is a + b max(s - W d, (tau_r -
-       a)/b). The problem is the same only if (tau_r - a)/b is the same: if a = 0, and
-       tau_r is zero or proportional to tau_p.
+       a)/b). The problem is the same only if (tau_r - a)/b is the same:
+       if a = 0, and tau_r is zero or proportional to tau_p.
     4. A rupture also depends on the loading
        rate, which would have to scale with b.
     5. If W follows from a critical slip or a fracture energy, W and the

@@ -204,7 +204,8 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     4, ..., and pools records and directions (step 4).
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
-    # A short correlation length shows at few lags, and a long length at many.
+    # A short correlation length shows at few lags, and a long length at
+    # many.
     sums, counts = np.zeros(lags[-1]), np.zeros(lags[-1])
     for window, row in zip(windows, rows, strict=True):
         products = window.products((row - row.mean()) / row.std())
