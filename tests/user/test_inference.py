@@ -1,5 +1,6 @@
 """Inference as a user meets it: what is handed to libraries of others, forces, interruptions."""
 
+import dataclasses
 import itertools
 import runpy
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from refusals import refuses
 from setups import LOCAL
 
 import stiction as st
@@ -59,6 +61,20 @@ def test_p_values_of_agreement_are_those_of_all_permutations():
     assert (found.cramer_von_mises, found.largest_deviation) == pytest.approx(tuple(here))
     error = np.sqrt(exact * (1.0 - exact) / 8000)
     assert np.all(np.abs(np.array(list(found.p_values.values())) - exact) < 4.0 * error + 2e-4)
+
+
+def test_forces_need_an_area_that_the_prior_leaves_alone():
+    interface = dataclasses.replace(PROBLEM.interface, width=0.01)
+    wide = dataclasses.replace(PROBLEM, interface=interface)
+    prior = {"problem.interface.width": (0.008, 0.012)}
+    forces = PEAKS * wide.area
+    refuses(
+        "the prior changes the area, 0.0008 to 0.0012 m2",
+        lambda: infer(forces, wide, prior=prior, unit="N"),
+    )
+    found = infer(forces, wide, unit="N")
+    low, high = found.interval["marginal.low"]
+    assert low < 0.66e6 < high
 
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
