@@ -94,8 +94,7 @@ class LimitState:
 
     def member(self, draws: Array) -> NDArray[np.int64]:
         """Return, for each sample, the number of its equally likely interface."""
-        members: NDArray[np.int64] = self.experiment.random.member(draws)
-        return members
+        return np.asarray(self.experiment.random.member(draws), np.int64)
 
     def profiles(self, draws: Array) -> dict[str, Array]:
         """Return sampled profiles by name, each with shape (samples, *shape)."""
@@ -144,8 +143,7 @@ class LimitState:
     @property
     def several(self) -> bool:
         """Whether there are several equally likely interfaces."""
-        several: bool = self.experiment.random.several
-        return several
+        return bool(self.experiment.random.several)
 
     @cached_property
     def bounds(self) -> tuple[float, float]:

@@ -16,14 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 import numpy as np
 import pydantic
 import tomli_w
-from pydantic import (
-    BeforeValidator,
-    Discriminator,
-    PlainSerializer,
-    Tag,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag
 
 from stiction.base.errors import InputError, StoreError, prefixed
 from stiction.base.files import content_of, write_whole
@@ -109,7 +102,7 @@ RandomOfStudy: Any = Annotated[
 """A random interface, or several equally likely interfaces. A field becomes an interface."""
 
 
-def _profiles_of(given: Any, info: ValidationInfo) -> Any:
+def _profiles_of(given: Any, info: pydantic.ValidationInfo) -> Any:
     """Return profiles. In a study file, a profile may be a file or a table {file, ...}."""
     read = (info.context or {}).get("read")
     if not isinstance(given, Mapping) or read is None:
@@ -161,7 +154,7 @@ class Question:
     probability: Probability | None = None
     target_cv: TargetCv = 0.1
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def _single(self) -> Question:
         asked = [name for name in self._given if name != "target_cv"]
         if len(asked) != 1:
@@ -267,7 +260,7 @@ class Study(_Parts):
         "attributes", "axes", "experiments", "from_dict", "points", "to_dict",
     )  # fmt: skip
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def _fits_together(self) -> Study:
         if (self.random is None) == (self.profiles is None):
             raise InputError("random: give either random properties or profiles")
