@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
-from stiction.base.errors import InputError, prefixed, unknown_name
-from stiction.base.model import describe, is_finite, keys_of
+from stiction.base.errors import InputError, prefixed
+from stiction.base.model import describe, is_finite
 from stiction.base.variables import PROFILES
 from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
 
@@ -40,17 +40,14 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
             changes[name] = value
     if isinstance(owner, ScipyMarginal):
         owner = {"type": owner.type, **dict(owner.parameters)}
-    table, begin = isinstance(owner, Mapping), f"{path}." if path else ""
+    table = isinstance(owner, Mapping)
     if not table and not (dataclasses.is_dataclass(owner) and not isinstance(owner, type)):
         raise InputError(f"{path}: has no keys, because it is {describe(owner)}")
-    names = [] if table else keys_of(type(owner))
-    unknown = [name for name in {**changes, **inside} if not table and name not in names]
-    if unknown:
-        raise InputError([unknown_name(path or "sweep", name, names) for name in unknown])
     # Values below a key replace the object there, from the inside outwards.
     for name, below in inside.items():
-        inner = owner.get(name) if table else getattr(owner, name)
-        changes[name] = with_values({} if inner is None else inner, below, begin + name)
+        inner = owner.get(name) if table else getattr(owner, name, None)
+        place = f"{path}.{name}".removeprefix(".")
+        changes[name] = with_values({} if inner is None else inner, below, place)
     if table:
         return {**owner, **changes}
     try:
@@ -58,9 +55,9 @@ def with_values(owner: Any, values: Mapping[str, Any], path: str = "") -> Any:
     except InputError as error:
         # The path replaces the name of the class, which a user of keys
         # does not know.
-        kind = f"{type(owner).__name__}."
-        texts = (text.removeprefix(kind) for text in error.problems)
-        raise InputError([begin + text for text in texts]) from None
+        kind, begin = type(owner).__name__, path or "sweep"
+        texts = (text.replace(kind, begin, 1) for text in error.problems)
+        raise InputError([text.removeprefix("sweep.") for text in texts]) from None
 
 
 def value_at(owner: Any, key: str) -> Any:
