@@ -19,13 +19,12 @@ Algorithm of the mapping (`from_normal`): our own
 -------------------------------------------------
 1. Reduce the marginal to scale 1, so that all multiples use the same table
    (`_standard`).
-2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-4, 4],
+2. Tabulate (1) as cubic Hermite pieces on a uniform grid of [-8, 8],
    with slopes by central differences of fourth order. Check every piece
    at three points, and mark pieces that miss `TABLE_RTOL`, for example
    at a kink of the density (`quantile_table`).
-3. Interpolate (`interpolate`). Values of z outside the table, or on a
-   marked piece, use a second table for [-8, 8]. scipy computes the
-   values that this table does not cover.
+3. Interpolate (`interpolate`). scipy computes the values outside the
+   table and on marked pieces.
 
 The relative error is at most 1e-9, or the absolute error 1e-15 standard
 deviations.
@@ -59,8 +58,8 @@ from stiction.base.errors import InputError
 from stiction.base.jit import jit
 from stiction.random.marginals import frozen
 
-TABLE_END, SMALL_TABLE_END = 8.0, 4.0
-"""Largest |z| of a whole table, and of the small table that serves most samples."""
+TABLE_END = 8.0
+"""Largest |z| of a table."""
 PIECES_PER_UNIT = 256
 """Number of pieces per unit of z."""
 TABLE_RTOL = 2e-10  # at three points of a piece, so that 1e-9 holds everywhere
@@ -89,16 +88,12 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
     Values are NaN outside the table and on marked pieces.
     """
     pieces = table.shape[0] - 1
-    first = TABLE_END * PIECES_PER_UNIT - 0.5 * pieces  # counted as in a whole table
     missing = 0
     for i in range(z.size):
-        position = (z[i] + TABLE_END) * PIECES_PER_UNIT - first
-        piece = int(position) if 0.0 <= position < pieces else -1
-        if piece < 0:
-            out[i] = np.nan
-            missing += 1
-            continue
-        t = position - piece
+        position = (z[i] + TABLE_END) * PIECES_PER_UNIT
+        inside = 0.0 <= position < pieces
+        piece = int(position) if inside else 0
+        t = position - piece if inside else np.nan
         left, right = table[piece, 0], table[piece + 1, 0]
         slope_left, slope_right = table[piece, 1], table[piece + 1, 1]
         rise = right - left
@@ -112,17 +107,16 @@ def interpolate(z: Array, table: Array, out: Array) -> int:
 
 
 @lru_cache(maxsize=8192)
-def quantile_table(marginal: Any, end: float = TABLE_END) -> Array:
+def quantile_table(marginal: Any) -> Array:
     """Step 2: return an array (nodes, 2) with values of the mapping, and slopes times the step.
 
-    The slopes of a marked piece are NaN. Most
-    tables take 32 KiB, so that the cache can hold
-    the tables of many equally likely interfaces.
+    The slopes of a marked piece are NaN. A table takes 64 KiB, so that
+    the cache can hold the tables of many equally likely interfaces.
     """
     distribution = marginal.distribution
-    step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * end * PIECES_PER_UNIT)
+    step, pieces = 1.0 / PIECES_PER_UNIT, round(2.0 * TABLE_END * PIECES_PER_UNIT)
     # Two nodes beyond each end, for central differences of fourth order.
-    z = -end + step * np.arange(-2, pieces + 3)
+    z = -TABLE_END + step * np.arange(-2, pieces + 3)
     value = quantile_of_normal(distribution, z)
     slope = (8.0 * (value[3:-1] - value[1:-3]) - (value[4:] - value[:-4])) / 12.0
     table = np.ascontiguousarray(np.stack([value[2:-2], slope], axis=1))
@@ -154,14 +148,10 @@ def from_normal(marginal: Any, z: Array) -> Array:
     # 1. The family at scale 1.
     standard, low, scale = _standard(marginal)
     out = np.empty_like(flat)
-    # 2. and 3. The small table, the whole one, and scipy.
-    if interpolate(flat, quantile_table(standard, SMALL_TABLE_END), out):
+    # 2. and 3. The table, and scipy.
+    if interpolate(flat, quantile_table(standard), out):
         missing = np.isnan(out)
-        far, value = flat[missing], out[missing]
-        if interpolate(far, quantile_table(standard, TABLE_END), value):
-            untabulated = np.isnan(value)
-            value[untabulated] = quantile_of_normal(standard.distribution, far[untabulated])
-        out[missing] = value
+        out[missing] = quantile_of_normal(standard.distribution, flat[missing])
     if standard is not marginal:
         out *= scale
         out += low
