@@ -217,9 +217,8 @@ def _complete(
     if not np.isnan(pressure):
         values["friction_coefficient"] = values["critical_stress"] / pressure
         variables["friction_coefficient"] = replace(FRICTION_COEFFICIENT, dims=())
-    if problem.area is not None:
-        values |= forces(values, problem.area, problem.whole_area)
-        variables |= force_variables(variables)
+    values |= forces(values, problem.area, problem.whole_area)
+    variables |= force_variables(variables)
     # Energies and moment are there already, over 'time'. Their last
     # value is the total.
     added = {name: value for name, value in values.items() if name not in SCALARS}

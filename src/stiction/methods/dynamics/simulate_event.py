@@ -232,9 +232,8 @@ class EventRecord:
         nodal = {name: FIELDS[name] for name in self.save.fields} | OVER_NODES
         variables = {name: along(interface, variable) for name, variable in nodal.items()}
         variables |= VARIABLES | of_events
-        if problem.area is not None:
-            values |= forces(values, problem.area, problem.whole_area)
-            variables |= force_variables(variables)
+        values |= forces(values, problem.area, problem.whole_area)
+        variables |= force_variables(variables)
         values["step_time"], values["moment_rate"] = np.array(self.steps).T
         frequency, spectrum = rate_spectrum(problem, values["step_time"], values["moment_rate"])
         values["moment_rate_spectrum"], variables["moment_rate_spectrum"] = spectrum

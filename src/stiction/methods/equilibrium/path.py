@@ -210,9 +210,8 @@ def equilibrium_path(
     variables = VARIABLES | OF_SPECIMENS | event_variables(interface, method is not None)
     for name in ("slip", "stress", "pressure", "opening"):
         variables[name] = along(interface, variables[name])
-    if problem.area is not None:
-        values |= forces(values, problem.area, problem.whole_area)
-        variables |= force_variables(variables)
+    values |= forces(values, problem.area, problem.whole_area)
+    variables |= force_variables(variables)
     coordinates = {
         "load": (given, LOAD),
         "event": (np.arange(values["event_load"].size), EVENT),
