@@ -118,7 +118,7 @@ sphinx_gallery_conf = {
     "subsection_order": [str(SCRIPTS / "how-to"), "*"],
     "backreferences_dir": "api/backreferences",
     "doc_module": ("stiction",),
-    "image_scrapers": ("matplotlib", scrape_figure),
+    "image_scrapers": (scrape_figure, "matplotlib"),  # the second closes figures of pyplot
     "image_srcset": ["3x"],
     "thumbnail_size": (800, 540),
     "filename_pattern": r"\.py$",

@@ -2,8 +2,8 @@
 Strength along an interface
 ===========================
 
-Profiles of a random field at two correlation lengths: the same draws, another spectrum. Where the
-problem has a normal pressure, friction coefficients stand beside the stresses.
+Profiles of a random field at two correlation lengths: the same draws with another
+spectrum. If the problem has a normal pressure, a second axis shows friction coefficients.
 """
 
 import matplotlib.pyplot as plt

@@ -2,7 +2,7 @@
 A field measured in part
 ========================
 
-Median and 90 % band of the strength of a specimen of which a third was scanned.
+Median and 90 % band of the strength of a specimen. A third of the specimen was scanned.
 """
 
 import xarray as xr

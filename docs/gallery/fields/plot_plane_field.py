@@ -2,7 +2,7 @@
 Strength on a plane
 ===================
 
-An anisotropic field: the correlation length across the load is three times that along it.
+An anisotropic field: the correlation length across the load is three times as long as along it.
 """
 
 import stiction as st

@@ -2,7 +2,7 @@
 A measured profile with gaps
 ============================
 
-The onset of a record from a file, on a grid of its own. Straight lines cross its gaps.
+The onset of a record from a file. Straight lines cross its gaps.
 """
 
 from pathlib import Path

@@ -2,7 +2,7 @@
 Precursors under an edge load
 =============================
 
-Slip at the critical load is preceded by arrested events where the load is concentrated.
+Slip at six loads. Events arrest where the load is concentrated, before the interface slides.
 """
 
 import dataclasses
@@ -22,4 +22,5 @@ problem = dataclasses.replace(
 tau_p = st.paper.strength(problem, correlation_ratio=0.5).sample(problem.interface, seed=1)[0]
 onset = st.onset(problem, tau_p, method=st.Equilibrium())
 loads = float(onset.critical_load[0]) * np.array([0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
-st.equilibrium_path(problem, tau_p, loads).slip.plot.line(x="x")
+path = st.equilibrium_path(problem, tau_p, loads)
+path.slip.assign_coords(load=loads.round(-3)).plot.line(x="x")

@@ -2,7 +2,7 @@
 Onset on a plane
 ================
 
-A strength on a plane, and where its onset is by the local criterion and by exact equilibrium.
+Strength on a plane, and the place of its onset by the local criterion and by exact equilibrium.
 """
 
 import stiction as st

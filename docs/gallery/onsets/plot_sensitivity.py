@@ -1,6 +1,6 @@
 """
-Which part decides
-==================
+Which part controls the onset
+=============================
 
 The derivative of the onset with respect to the strength of each place.
 """

@@ -2,7 +2,7 @@
 Sizes of events
 ===============
 
-How frequent events of each size are on random faults that end, by two methods.
+Events of each size on random faults that end: how often they occur, by two methods.
 """
 
 import matplotlib.pyplot as plt

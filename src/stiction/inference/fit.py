@@ -386,8 +386,9 @@ def fit_field(
         For maps, the correlation length along y over that along x. True estimates it.
     between : bool, str or sequence of str
         Whether records come from different specimens, each of which has a factor with mean 1
-        and the coefficient of variation ``between``. Names choose families of the factor
-        ('lognormal', 'normal', 'weibull'). True averages all.
+        and the coefficient of variation ``between``. Names choose its
+        distributions ('lognormal', 'normal', 'weibull'). True averages over
+        all.
     quantity : str
         Measured quantity: 'strength', 'normal_pressure', 'friction_coefficient', ...
     bootstrap : int

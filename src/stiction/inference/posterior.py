@@ -353,7 +353,7 @@ class SpecimenPosterior(Posterior):
         profiles, texts = self.grid.profiles, []
         if profiles.whole:
             texts.append(
-                "specimens differ only as a whole, and no field within a specimen is assumed. A"
+                "specimens differ only as a whole: strength does not vary along a specimen. A"
                 " joint is a new specimen with its own factor"
             )
             if self.peaks.unit == "1":
@@ -363,7 +363,7 @@ class SpecimenPosterior(Posterior):
             field = profiles.fields[0].strength
             more = f" and {len(profiles.fields) - 1} more" * (len(profiles.fields) > 1)
             texts.append(
-                f"the field within a specimen is stated, not measured: {field.marginal!r},"
+                f"the variation along a specimen is stated, not measured: {field.marginal!r},"
                 f" {field.spectrum!r}{more}. Its mean has no effect"
             )
         if self.peaks.loads is not None:

@@ -449,7 +449,7 @@ class Prediction(NamedTuple):
         return cls(tables_of(problem, grid.profiles, simulation, nothing, 0.0), grid)
 
     def quantile(self, probability: float, family: str | None = None) -> float:
-        """Return the stress, Pa, at a probability, for all families of the factor or for one.
+        """Return the stress, Pa, at a probability, averaged over distributions or for one.
 
         The predictive distribution is the mean over field, onset and grid, or over the part of
         the grid with this family. No draws are needed.

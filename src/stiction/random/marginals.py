@@ -314,7 +314,7 @@ FACTOR_FAMILIES: dict[str, Any] = {
     "normal": TruncatedNormal,  # above zero
     "weibull": Weibull,
 }
-"""Families of the factor between specimens, by the names in `infer` and in answers."""
+"""Distributions of the factor between specimens, by the names in `infer` and in answers."""
 
 
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:

@@ -304,7 +304,7 @@ def sensitivities_of(
         # A field that was stated and not measured: what did it change?
         if getattr(source, "assumed", None):
             whole = source.without_field(problem, experiment.method).quantile(probability)
-            rows.append(("field within a specimen", "none", "as stated", whole, reference))
+            rows.append(("variation along a specimen", "none", "as stated", whole, reference))
         # 5.
         for key, ends in ranges_of(problem, source, stated).items():
             state.meter.note = f"what moves the design: {key}"

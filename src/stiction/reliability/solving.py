@@ -116,7 +116,7 @@ def exact_tail(state: LimitState) -> Tail:
 
 
 def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
-    """Return a doubt if the families of the factor lead to very different stresses.
+    """Return a doubt if the distributions between specimens lead to very different stresses.
 
     The number of specimens is that for which the likelihoods of the two families differ by
     `ODDS` on average, by the divergence of one family from the other.
