@@ -491,8 +491,10 @@ def contradictions(law: FrictionLaw) -> list[str]:
         lines = [line for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
         return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
-    # The first violation is reported: the later checks may follow from it.
+    # The first violation is reported: the later checks may follow from
+    # it. f states its slope too, which kernels need.
     rising = u[:-1][np.diff(f) > 1e-9]
+    fall, near = float(np.trapezoid(slope, u)), 1e-3 * max(1.0, slope.max())
     wrong = {
         f"f and -f' must be finite up to u = {u[-1]:.4g}": not np.isfinite([f, slope]).all(),
         f"f(0) must be 1, got {f[0]:g}": not abs(f[0] - 1.0) <= 1e-9,
@@ -502,19 +504,12 @@ def contradictions(law: FrictionLaw) -> list[str]:
         " method follows a hump (begin at its top, with tau_p there)": rising.size,
         f"the integral of f, area(inf), must be finite, got {law.integral:g}; let f end at 0":
             not 0.0 < law.integral < np.inf,
+        f"initial_slope is {law.initial_slope:.3g}, but {slope[0]:.3g} by its f":
+            not abs(law.initial_slope - slope[0]) <= near,
+        f"the integral of -f' is {fall:.3g}, but {1.0 - f[-1]:.3g} by its f":
+            not abs(fall - 1.0 + f[-1]) <= near,
     }  # fmt: skip
-    if violations := [text for text, is_so in wrong.items() if is_so]:
-        return [f"{name}: {violations[0]}"]
-    # f states its slope too, which kernels need.
-    pairs = {
-        "initial_slope": (law.initial_slope, slope[0]),
-        "the integral of -f'": (np.trapezoid(slope, u), 1.0 - f[-1]),
-    }
-    return [
-        f"{name}: {what} is {float(stated):.3g}, but {float(integrated):.3g} by its f"
-        for what, (stated, integrated) in pairs.items()
-        if not abs(stated - integrated) <= 1e-3 * max(1.0, slope.max())
-    ]
+    return [f"{name}: {text}" for text, is_so in wrong.items() if is_so][:1]
 
 
 def _law(value: Any) -> Any:

@@ -349,10 +349,9 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
         array = array.swap_dims({array["x"].dims[0]: "x"})
     names = [str(dim) for dim in array.dims]
     if len(dims) == 1 and "x" not in names:
-        called = [name for name in names if _plain(name) in PLACES]
-        called = called or [name for name in names if _plain(name) not in SAMPLE_NAMES]
-        if len(called) == 1 or (names and all(name.startswith("dim_") for name in names)):
-            array = array.rename({called[-1]: "x"})  # without names the order counts
+        called = [name for name in names if _plain(name) not in SAMPLE_NAMES]
+        if len(called) == 1:
+            array = array.rename({called[0]: "x"})
     along = [dim for dim in (*dims, "row") if dim in array.dims]
     samples = [dim for dim in array.dims if dim not in along]
     single = not along and len(samples) == 1  # a single value for each sample
