@@ -57,7 +57,7 @@ def contradictions_of(
 
     With `overstress`, the initial stress may exceed the strength.
     """
-    along, problems = interface.axes, []
+    problems = []
     over = (strength <= initial).reshape(len(strength), -1)
     if not overstress and over.any():
         number = int(over.any(axis=1).argmax())
@@ -71,7 +71,7 @@ def contradictions_of(
         )
     finite = np.isfinite(strength)
     if np.max(strength, where=finite, initial=0.0) > MAX_STRENGTH_RATIO * strength.min():
-        middle = np.median(strength, axis=along, keepdims=True)
+        middle = np.median(strength, axis=interface.axes, keepdims=True)
         if (huge := finite & (strength > MAX_STRENGTH_RATIO * middle)).any():
             number, node = np.argwhere(huge.reshape(len(strength), -1))[0].tolist()
             problems.append(
@@ -80,10 +80,10 @@ def contradictions_of(
                 f" {middle[number].item():g} Pa. Check its sign, and where nothing breaks give a"
                 " smaller strength"
             )
-    nowhere = ~((strength > residual) & np.isfinite(strength)).any(axis=along)
-    if nowhere.any():
-        number = int(np.argmax(nowhere))
-        known = strength[number][np.isfinite(strength[number])]
+    weakens = ((strength > residual) & finite).reshape(len(strength), -1).any(axis=1)
+    if not weakens.all():
+        number = int(np.argmin(weakens))
+        known = strength[number][finite[number]]
         problems.append(
             "strength: must be above residual_strength at one node or more. In sample"
             f" {number} strength is {known.min():g} to {known.max():g} Pa, and residual_strength is"

@@ -161,18 +161,23 @@ class Problem(Listed):
             )
         if self.interface.is_plane and self.mode != "II":
             problems.append(f"mode: a plane has both modes. Leave 'II', got {self.mode!r}")
-        if self.load.pressing_force is not None and self.area is None:
+        if self.area is None and self.load.pressing_force is not None:
             problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
         if problems:
             raise InputError(problems)
         if isinstance(self.specimen, Blocks):
             self._check_drive()
-        weakening_rate = self.friction.weakening_rate
-        if weakening_rate is not None:
+        scale, rates = self.friction.scale or ("", 0.0)
+        if scale == "weakening_rate":
             steepening = self.friction.steepening
-            check_resolution(self, float(np.max(weakening_rate)) * steepening)
-            warn_if_short(self, float(np.median(weakening_rate)) * steepening)
+            check_resolution(self, float(np.max(rates)) * steepening)
+            warn_if_short(self, float(np.median(rates)) * steepening)
+        # Every sample takes these. The rig of a slider takes longer, so
+        # its profile is computed when it is first needed.
+        self.interface.dims, self.interface.first  # noqa: B018
+        if not isinstance(self.specimen, Slider):
+            self.load_profile, self.normal_pressure  # noqa: B018
         return self
 
     def _of_specimen(self) -> list[str]:

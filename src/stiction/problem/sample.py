@@ -405,9 +405,8 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
         for name in ("residual_strength", "initial_stress", scale, "normal_pressure")
     )
     # Nodes beyond the extent never break.
-    barriers = ~interface.breakable
     if interface.is_held:
-        strength = np.where(barriers, np.inf, strength)
+        strength = np.where(interface.breakable, strength, np.inf)
     drop = strength - residual
     if isinstance(problem.specimen, Slider):
         drop = drop * problem.specimen.checked_pressing(
@@ -417,8 +416,9 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
     if interface.is_held and scale != "weakening_rate":
         # Barriers never weaken. Any finite rate will do, and here
         # it is the fastest.
-        fastest = np.where(barriers, 0.0, W).max(interface.axes, keepdims=True)
-        W = np.where(barriers, fastest, W)
+        can_break = interface.breakable
+        fastest = np.where(can_break, W, 0.0).max(interface.axes, keepdims=True)
+        W = np.where(can_break, W, fastest)
     overstress = "overstress" in accept
     if problems := contradictions_of(interface, strength, residual, initial, overstress):
         raise InputError(problems)
