@@ -238,7 +238,8 @@ def test_a_design_from_tests_names_all_that_it_rests_on(tests_alone, tmp_path):
     named = set(design.sensitivities.source.values)
     assert {"marginal.cv", "correlation_length"} <= named
     text = str(tests_alone)
-    assert text.count("stated, not measured") == 3  # two parameters, and the field in words
+    assert text.count("stated, not measured") == 1  # the field in words
+    assert [*tests_alone.draws] == ["mean", "between"]
     page = design.write_page(tmp_path / "design.html").read_text("utf-8")
     for words in ("cv=0.15", "PowerLawSpectrum", "half-Cauchy", "465", "weibull", "seed 0"):
         assert words in page, words

@@ -43,9 +43,7 @@ from stiction.inference.likelihood import Simulation
 from stiction.inference.peaks import Peaks, title_of
 from stiction.inference.specimens import (
     FEW_FIELDS,
-    MEAN_KEY,
     PRIOR_SCALE,
-    SCATTER_KEY,
     FactorGrid,
     FactorPrior,
     Prediction,
@@ -184,11 +182,6 @@ class Posterior(WithFactors, Result):
         return str(self.likelihood.method.label)
 
     @property
-    def inferred(self) -> tuple[str, ...]:
-        """Parameter keys that measurements changed. The others were stated."""
-        return self.names
-
-    @property
     def families(self) -> dict[str, float]:
         """Posterior probability for each distribution between specimens, if inferred."""
         return {}
@@ -271,8 +264,6 @@ class Posterior(WithFactors, Result):
             remark = f"{' to '.join(ends)} {shown_unit} before the tests".replace("  ", " ")
             if name in self.information:
                 remark += f", {self.information[name]:.2f} nats"
-            elif name not in self.inferred:
-                remark = "stated, not measured"
             rows.append(Row(name, self.mean[name], self.interval[name], unit, remark))
         title = f"{title_of(self.peaks)}; onset by {self.method}, posterior means"
         return Summary(title, rows, "90 % interval", self.notes)
@@ -281,6 +272,9 @@ class Posterior(WithFactors, Result):
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class SpecimenPosterior(Posterior):
     """Posterior of the mean, the scatter between specimens and the field within a specimen.
+
+    The draws describe the field within a specimen only if it was
+    measured. A field that was stated is among the `assumptions`.
 
     Attributes
     ----------
@@ -299,13 +293,6 @@ class SpecimenPosterior(Posterior):
     def specimens(self) -> int:
         """Number of specimens that were scanned or tested."""
         return self.grid.profiles.levels.size + sum(map(len, self.peaks.values))
-
-    @property
-    def inferred(self) -> tuple[str, ...]:
-        """Parameter keys that measurements changed. The others were stated."""
-        if self.grid.profiles.levels.size or len(self.grid.profiles.fields) > 1:
-            return self.names
-        return MEAN_KEY, SCATTER_KEY
 
     @property
     def families(self) -> dict[str, float]:
@@ -341,7 +328,7 @@ class SpecimenPosterior(Posterior):
     def assumed(self) -> dict[str, float]:
         """Parameters of a field within a specimen that was stated and not measured, by key."""
         profiles = self.grid.profiles
-        if profiles.whole or profiles.levels.size or len(profiles.fields) > 1:
+        if profiles.whole or not profiles.stated:
             return {}
         keys = ("marginal.cv", "correlation_length")
         values = {key: value_at(profiles.fields[0], full_key(key)[7:]) for key in keys}
@@ -356,9 +343,6 @@ class SpecimenPosterior(Posterior):
                 "specimens differ only as a whole: strength does not vary along a specimen. A"
                 " joint is a new specimen with its own factor"
             )
-            if self.peaks.unit == "1":
-                ratio = self.likelihood.onsets[0].ratios.mean() / profiles.reference
-                texts.append(f"the slip factor of a specimen is {ratio:.4g} of its mean")
         elif not profiles.levels.size:
             field = profiles.fields[0].strength
             more = f" and {len(profiles.fields) - 1} more" * (len(profiles.fields) > 1)

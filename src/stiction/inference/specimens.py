@@ -179,6 +179,11 @@ class Profiles(NamedTuple):
         fields = (RandomInterface(strength=field),)
         return cls(fields, level, np.zeros(0), np.zeros((1, 0)), whole=True, **more)
 
+    @property
+    def stated(self) -> bool:
+        """Whether the field within a specimen was stated, not measured."""
+        return not self.levels.size and len(self.fields) == 1
+
 
 def of_mean(random: RandomInterface, mean: float, factor: Any = None) -> RandomInterface:
     """Return a random interface with a different mean and a different factor of the strength."""
@@ -304,7 +309,7 @@ class FactorGrid:
         deviations = np.array([one.standard_deviation for one in strengths])
         lengths = np.array([one.spectrum.efolding_length for one in strengths])
         known = {MEAN_KEY: self.profiles.reference * scale, SCATTER_KEY: drawn[:, 2]}
-        if self.profiles.whole:
+        if self.profiles.stated:
             return known
         return known | {
             "standard_deviation": deviations[field] * scale,
