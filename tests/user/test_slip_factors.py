@@ -146,17 +146,19 @@ def test_bad_input_is_refused(written):
 
 
 def test_statistics_without_a_name_are_no_tests(written):
-    """Below an empty line, or with nothing in the first column; a further test is one."""
-    rows = lines_of(FACTORS)
-    loads = np.array([float(row.split(";")[1]) for row in rows])
+    """Without a number where others have one, or below an empty line of a table without numbers."""
+    rows, words = lines_of(FACTORS), "the mean or the deviation of the tests above ... in front"
+    bare = [row.partition(";")[2] for row in rows]
+    heading = HEADING.partition(";")[2]
+    loads = np.array([float(row.partition(";")[0]) for row in bare])
     for value in (loads.mean(), loads.std(ddof=1)):
-        for last in ([f";{value:.3f};"], ["", f"6;{value:.3f};390.0"]):
-            refuses(
-                "the mean or the deviation of the tests above ... Write 'mean' or 'SD' in front",
-                lambda last=last: written([*rows, *last], normal=None),
-            )
-    further = written([*rows, "", f"6;{loads.mean() + 0.01:.3f};390.0"])
-    assert further.values[0].size == 11
+        refuses(words, lambda v=value: written([*rows, f";{v:.3f};"], normal=None))
+        last = ["", f"{value:.3f};390.0"]
+        refuses(words, lambda last=last: written([*bare, *last], heading, normal=None))
+    further = ["", f"6;{loads.mean():.3f};390.0"]  # numbered, so a test
+    assert written([*rows, *further], normal=None).values[0].size == 11
+    other = ["", f"{loads.mean() + 0.01:.3f};390.0"]
+    assert written([*bare, *other], heading, normal=None).values[0].size == 11
 
 
 def test_an_agreement_compares_specimens_not_slip_loads(written):

@@ -403,27 +403,26 @@ def _of_table(
 def _refuse_statistics(table: Table, peak: Column) -> None:
     """Refuse a last row, apart from the tests, that holds the mean or deviation of the tests.
 
-    A row is apart if it follows an empty line, or has nothing in the
-    first column.
+    A row is apart if it has no number of a specimen, or if no column
+    numbers the specimens and the row follows an empty line.
     """
     values, first = peak.values, table.columns[0]
     apart = np.diff(table.lines, prepend=table.lines[:1]) > 1
-    if first is not peak:
-        apart |= np.array(
-            [str(cell).strip() in ("", "nan") for cell in first.cells or first.values]
-        )
+    if role_of(first) == "specimen":
+        apart = np.array([str(cell) in ("", "nan") for cell in first.cells or first.values])
     known = values[np.isfinite(values)].tolist()
-    digits = max(-int(Decimal(f"{value:.12g}").as_tuple().exponent) for value in known)
+    digits = [-int(Decimal(f"{value:.12g}").as_tuple().exponent) for value in known]
     for row in np.flatnonzero(apart):
         tests = values[:row][np.isfinite(values[:row])]
-        if tests.size >= MIN_PEAKS and values.size - row <= MAX_STATISTICS:
-            away = np.abs(values[row] - [tests.mean(), tests.std(ddof=1)])
-            if away.min() <= 0.5001 * 10.0**-digits:
-                raise InputError(
-                    f"line {table.lines[row]} holds the mean or the deviation of the tests above,"
-                    f" {values[row]:g}. Write 'mean' or 'SD' in front of it, or delete it. If it is"
-                    " a test, number it, and remove the empty line"
-                )
+        if tests.size < MIN_PEAKS or values.size - row > MAX_STATISTICS:
+            continue
+        away = np.abs(values[row] - [tests.mean(), tests.std(ddof=1)])
+        if away.min() <= 0.5001 * 10.0 ** -max(digits):
+            raise InputError(
+                f"line {table.lines[row]} holds the mean or the deviation of the tests above,"
+                f" {values[row]:g}. Write 'mean' or 'SD' in front of it, or delete it. If it is a"
+                " test, give the number of its specimen, or remove the empty line"
+            )
 
 
 def _normal_forces(
