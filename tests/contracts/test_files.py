@@ -47,13 +47,20 @@ def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
             assert (np.diff(numbers[:, 0]) > 0.0).all()
             kept = run.step_time.values - run.step_time.values[-1] + numbers[-1, 0]
             np.testing.assert_allclose(numbers[1:, 0], kept[1 - len(numbers) :], atol=1e-6)
-            # Slip, slip rate and stress of the station at the last step, in m, m/s and MPa.
+            # Slip, slip rate and stress of the station at each step, in m, m/s and MPa.
             for key, factor in (("slip", 1.0), ("slip_rate", 1.0), ("shear_stress", 1e-6)):
-                last = factor * float(np.ravel(run[f"station_{key}"].values)[-1])
-                near = np.abs(numbers[-1] - last) <= 1e-5 * abs(last) + 1e-12
-                assert near.any(), key
+                kept = factor * np.ravel(run[f"station_{key}"].values)[1 - len(numbers) :]
+                near = np.abs(numbers[1:].T - kept) <= 1e-5 * np.abs(kept) + 1e-12
+                assert near.all(axis=1).any(), key
         else:
             assert len(numbers) == BODIES[name].interface.size
+            since = run.arrival_time.values.ravel() - float(run.onset_time)
+            np.testing.assert_allclose(numbers[:, -1], np.nan_to_num(since, nan=1e9), rtol=1e-6)
+    for wrong in ({"normal_stress": 2e6}, {"origin": np.inf}, {"origin": (0.0, 0.0, 0.0)}):
+        with pytest.raises(st.InputError, match=r"normal_stress|origin"):
+            st.external.write_scec(run, tmp_path, **options | wrong)
+    with pytest.raises(st.InputError, match="lacks station_slip"):
+        st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **options)
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -128,7 +128,12 @@ def test_each_parameter_counts_or_is_refused_by_its_name(call, name):
 )
 def test_workers_change_no_number(call):
     names = inspect.signature(getattr(st, call)).parameters
-    assert numbers(ask(call, workers=2)) == numbers(ask(call, workers=1))
+    algorithms = ["plain", "subset", "two_level"] if "algorithm" in names else [None]
+    for algorithm in algorithms:
+        given = {"algorithm": algorithm} | (
+            {"method": EXACT} if algorithm == "two_level" else {}
+        )
+        assert numbers(ask(call, workers=2, **given)) == numbers(ask(call, workers=1, **given))
     if "executor" in names:
         with ThreadPoolExecutor(2) as executor:
             assert numbers(ask(call, executor=executor)) == numbers(ask(call))

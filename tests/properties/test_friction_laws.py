@@ -1,11 +1,9 @@
 """What ruptures do whatever the friction law, and what depends on its shape."""
 
 import dataclasses
-from functools import partial
 
 import numpy as np
 import pytest
-from refusals import refuses
 from ruptures import dip, wavy_line
 from setups import QUARTER, make_problem
 
@@ -70,19 +68,6 @@ def test_stress_is_the_strength_of_the_law_wherever_it_slides(runs, name):
     np.testing.assert_allclose(
         run.shear_stress.values[1:][sliding], expected[1:][sliding], rtol=1e-6
     )
-
-
-@pytest.mark.parametrize("name", ["slip", "strength"])
-def test_corners_are_a_list_or_an_array_of_a_single_dimension(name):
-    corners = {"slip": [0.1, 1.0], "strength": [0.3, 0.0]}
-    law = st.PiecewiseWeakening(**corners, weakening_rate=1.0)
-    for shape in ((2,), (2, 1), (1, 2), (1, 1, 2)):
-        given = corners | {name: np.reshape(corners[name], shape)}
-        make = partial(st.PiecewiseWeakening, **given, weakening_rate=1.0)
-        if shape == (2,):
-            assert make() == law
-        else:
-            refuses(name, make)
 
 
 def test_the_front_reaches_a_node_that_does_not_weaken_when_it_first_slips():

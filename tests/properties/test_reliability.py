@@ -25,24 +25,6 @@ def tail(stress, algorithm="subset", target_cv=0.4, method=LOCAL, random=STRENGT
     return st.failure_probability(PROBLEM, random, stress, **options)
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "stress", "method"),
-    [("plain", 0.68e6, LOCAL), ("subset", 0.665e6, LOCAL), ("two_level", 0.665e6, EXACT)],
-)
-def test_the_same_seed_gives_the_same_numbers_for_any_workers(algorithm, stress, method):
-    one, three, other = (
-        tail(stress, algorithm, method=method, seed=seed, workers=workers)
-        for seed, workers in ((4, 1), (4, 3), (5, 1))
-    )
-    assert one.probability == three.probability
-    assert one.cv == three.cv
-    assert one.evaluations == three.evaluations
-    assert one.first_stage_evaluations == three.first_stage_evaluations
-    failing, again = (run.failing_profiles["strength"] for run in (one, three))
-    np.testing.assert_array_equal(failing, again)
-    assert one.probability != other.probability
-
-
 def test_subset_simulation_visits_disjoint_failure_regions():
     """Twelve half-spaces at right angles: each holds a twelfth of the failures."""
     counts = np.zeros(12)

@@ -1,7 +1,6 @@
 """Stations: what fields show at their nodes, after every step, and nothing else changes."""
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from ruptures import BREAKING_PLANE, dip
@@ -26,37 +25,6 @@ def simulate(problem, method=METHOD, **save):
     strength = 1e6 - 3e5 * dip(interface, [0.012] * len(interface.shape), 0.007)
     save = st.Save(**save)
     return st.simulate_rupture(problem, strength, method=method, save=save, progress=False)
-
-
-def test_files_of_a_line_read_back(tmp_path):
-    """Times count from the onset, and stations a node apart have files of their own."""
-    stations = {"a": 0.0131, "b": 0.004}
-    run = simulate(LINE, stations=stations, fields=["slip", "slip_rate", "shear_stress"])
-    about = {"origin": 0.004, "normal_stress": -7e6, "benchmark": "block"}
-    path, other, contours = st.external.write_scec(run, tmp_path, **about)
-    rows, table = (pd.read_csv(one, comment="#", sep=r"\s+") for one in (path, contours))
-    assert path.name == "faultst000.0001dp000.0000.txt"
-    assert other.name == "faultst000.0000dp000.0000.txt"
-    onset = float(run.onset_time)
-    assert onset > 0.0
-    assert rows["t"][0] == 0.0
-    assert rows.columns[1:4].tolist() == ["h-slip", "h-slip-rate", "h-shear-stress"]
-    assert rows["n-stress"].to_numpy() == pytest.approx(-7.0)
-    own = run.sel(station="a")
-    own = own.isel(step=own.step_time >= onset)
-    np.testing.assert_allclose(rows["h-slip"], own.station_slip, rtol=1e-6)
-    np.testing.assert_allclose(
-        rows["h-shear-stress"] * 1e6, own.station_shear_stress, rtol=1e-6
-    )
-    np.testing.assert_allclose(table["j"], run.x - 0.004, atol=1e-9)
-    np.testing.assert_allclose(table["t"], (run.arrival_time - onset).fillna(1e9), rtol=1e-6)
-    with pytest.raises(st.InputError, match="lacks station_slip. Call st.simulate_rupture"):
-        st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **about)
-    with pytest.raises(st.InputError, match="normal_stress: must be negative"):
-        st.external.write_scec(run, tmp_path, **(about | {"normal_stress": 7e6}))
-    run["station_x"] = run.station_x * 0.0
-    with pytest.raises(st.InputError, match="the stations a, b are not"):
-        st.external.write_scec(run, tmp_path, **about)
 
 
 def test_an_end_of_the_interface_is_its_first_node():

@@ -146,34 +146,6 @@ def test_predicted_curves_come_back_from_a_machine(paths):
         assert apart.min(axis=1).max(initial=0.0) < 1e-6
 
 
-def test_every_panel_draws_all_paths_and_tests_in_its_unit(paths):
-    """Places of events and precursors, and the ends of the band, in micrometres on every axis."""
-    curves = curves_of(paths)
-    precursors = 1e6 * np.concatenate([test.drops.travel for test in curves])
-    above, below = st.plot.precursors(paths, measured=curves)
-    labels = {text.get_text() for text in above.get_legend().get_texts()}
-    assert {"6 tests", "measured precursors"} < labels
-    labels = {text.get_text() for text in below.get_legend().get_texts()}
-    assert {"slips in an arrested event", "measured precursors"} == labels
-    for panel in (above, below):
-        marks = [line.get_xdata() for line in panel.lines if line.get_marker() in {"v", "|"}]
-        np.testing.assert_allclose(np.concatenate(marks), precursors, rtol=1e-12)
-    assert "µm" in below.get_xlabel()
-    travels = [path.travel.values for path in paths]
-    ends = [
-        1e6 * np.nanmax(travel[np.isfinite(path.force)])
-        for travel, path in zip(travels, paths, strict=True)
-    ]
-    (band,) = above.collections
-    assert band.get_paths()[0].vertices[:, 0].max() == pytest.approx(np.median(ends))
-    events = [np.concatenate([lines.get_segments() for lines in below.collections])]
-    expected = 1e6 * np.concatenate([path.event_travel for path in paths])
-    np.testing.assert_allclose(np.concatenate(events)[:, 0, 0], expected, rtol=1e-12)
-
-    seconds = st.read_curve((TRAVEL * u.s, machine() * u.N))
-    refuses("curves are N over s", lambda: st.plot.precursors(paths, measured=seconds))
-
-
 def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     def predicted(field):
         method = st.Equilibrium(events=60)
@@ -286,22 +258,3 @@ def test_plateaus_of_records_that_end_in_other_ways(noise):
     ):
         curve = st.read_curve((t, force + added), unit="N", travel_unit="s")[0]
         assert curve.plateau == pytest.approx(plateau, abs=0.5)
-
-
-def test_cycles_of_stick_slip():
-    rng = np.random.default_rng(0)
-    force, strengths, now = [], [45.0 + 2.7 * rng.normal()], 0.0
-    while len(strengths) < 40:
-        now += 0.11
-        if now > strengths[-1]:
-            now = 0.65 * strengths[-1]
-            strengths.append(45.0 + 2.7 * rng.normal())
-        force.append(now)
-    force = np.array(force) + 0.05 * rng.standard_normal(len(force))
-    t = 0.01 * np.arange(force.size)
-    refuses("stick-slip ... split='cycles'", lambda: st.read_curve((t * u.s, force * u.N)))
-    curves = st.read_curve((t * u.s, force * u.N), split="cycles")
-    assert len(curves) == 39
-    assert curves[4].name == "test, cycle 5"
-    # A cycle ends between two readings, which are 0.11 N apart.
-    np.testing.assert_allclose(curves.peaks, strengths[:-1], atol=0.11 + 3.5 * 0.05)

@@ -192,17 +192,6 @@ def test_a_page_of_a_design(tmp_path):
     assert np.log(ratio) == pytest.approx(-0.05 * norm.ppf(0.95), abs=0.03)
 
 
-def test_the_command_writes_the_page(tmp_path):
-    study = make(random=RANDOM, title="Joint A")
-    study.to_toml(tmp_path / "study.toml")
-    page = tmp_path / "out.html"
-    app(
-        ["reliability", str(tmp_path / "study.toml"), "--page", str(page)],
-        standalone_mode=False,
-    )
-    assert "Joint A" in page.read_text(encoding="utf-8")
-
-
 def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeypatch):
     """The file beside the study holds the same interfaces, and a file of peaks is compared."""
     monkeypatch.setattr("stiction.study.study.FIRST_MEMBERS", 20)

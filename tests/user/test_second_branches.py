@@ -1,15 +1,11 @@
 """Second branches of inference: a guide of no use, threads in an estimate, peaks with a unit."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from setups import LOCAL, make_problem
 from stand_ins import StandIn
 
 import stiction as st
-from stiction.base.progress import duration
-from stiction.inference import likelihood as likelihoods
 
 PROBLEM = make_problem(64, 0.05, width=0.013, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.2), st.PowerLawSpectrum(4e-3), mean_mode=True)
@@ -43,30 +39,3 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
     assert guided.mean["correlation_length"] == pytest.approx(
         alone.mean["correlation_length"], rel=1e-6
     )
-
-
-@pytest.mark.parametrize("workers", [1, 4])
-def test_an_estimate_of_the_time_counts_the_threads(workers):
-    slow = SimpleNamespace(seconds=9.0, method=SimpleNamespace(label="stand-in"))
-    with pytest.warns(UserWarning, match=f"about {duration(9000.0 / workers)}:") as caught:
-        likelihoods.warn_if_long(slow, 1000, workers)
-    assert len(caught) == 1
-
-
-@pytest.mark.parametrize("workers", [1, 3])
-@pytest.mark.parametrize(
-    "prior", [None, {"marginal.mean": (0.8e6, 1.2e6), "marginal.cv": (0.1, 0.3)}]
-)
-def test_the_estimate_is_told_the_threads_of_the_call(workers, prior, monkeypatch):
-    seen = []
-
-    def stop(experiment, samples, threads):
-        seen.append(threads)
-        raise RuntimeError
-
-    monkeypatch.setattr(likelihoods, "warn_if_long", stop)
-    monkeypatch.setattr("stiction.inference.specimens.warn_if_long", stop)
-    options = {"prior": prior, "method": st.Equilibrium(), "workers": workers}
-    with pytest.raises(RuntimeError):
-        st.infer(PROBLEM, FIELD, PEAKS, progress=False, **options)
-    assert seen == [workers]

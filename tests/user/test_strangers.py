@@ -24,7 +24,6 @@ import stiction as st
 from stiction.base import files, netcdf
 from stiction.base.files import private_folder
 from stiction.base.netcdf import read_netcdf
-from stiction.ensemble import batches
 from stiction.methods.dynamics.save import open_rupture
 from stiction.problem.reading.files import NETCDF, TEXT
 
@@ -333,19 +332,6 @@ def test_a_file_that_is_written_again_keeps_its_permissions(tmp_path):
 def _noted(aside, mode):
     assert stat.S_IMODE(aside.stat().st_mode) == mode
     aside.write_text("new")
-
-
-def test_a_failure_is_printed_without_escapes():
-    assert "\x1b" not in str(batches.Failure(0, 1, 2, "\x1b[2Jnice"))
-
-
-def test_many_mistakes_and_long_keys_are_told_in_few_words(tmp_path):
-    for keys in ({f"k{i}": i for i in range(10_000)}, {"k" * 10**5: 1}):
-        for tables in ({}, STUDY):
-            (tmp_path / "study.toml").write_text(tomli_w.dumps(keys | tables))
-            with pytest.raises(st.InputError) as refusal:
-                st.Study.from_toml(tmp_path / "study.toml")
-            assert len(str(refusal.value)) < 50_000
 
 
 def test_check_lists_files_outside(tmp_path, command):

@@ -59,7 +59,8 @@ def write_scec(
     ------
     InputError
         If the run has no stations or lacks a variable, if stations
-        have the same node, or if the normal stress is positive.
+        have the same node, if the normal stress is positive, or if the
+        origin has not one finite number for each dimension.
 
     Examples
     --------
@@ -88,7 +89,12 @@ def write_scec(
             " If this is a pressure, change its sign"
         )
     dims = run.arrival_time.dims
-    middle = dict(zip(dims, np.atleast_1d(origin).tolist(), strict=True))
+    numbers = np.atleast_1d(origin)
+    if numbers.shape != (len(dims),) or not np.isfinite(numbers).all():
+        raise InputError(
+            f"origin: must be a finite number (m) for each of {dims}, got {origin!r}"
+        )
+    middle = dict(zip(dims, numbers.tolist(), strict=True))
     away = [run[dim].values - middle[dim] for dim in dims] + [np.zeros(1)] * (2 - len(dims))
     size = " x ".join(f"{float(axis[1] - axis[0]):g}" for axis in away[: len(dims)])
     about = [f"# problem={benchmark}", "# code=stiction", f"# element_size={size} m"]
