@@ -161,6 +161,27 @@ FREE = st.Problem(
 )
 
 
+def test_a_pressure_without_places_is_the_mean_between_glued_plates():
+    """Also where there are as many samples as nodes."""
+    glued = dataclasses.replace(FREE, specimen=st.Blocks(height=0.05, pressing="glued"))
+    strength = np.linspace(1.0e6, 1.1e6, 64 * 64).reshape(64, 64)
+    for pressure, mean in (
+        (np.full(64, 2e6), False),
+        (np.full((64, 1), 2e6), True),
+        (2e6, True),
+    ):
+        rows = glued.sample({"strength": strength, "normal_pressure": pressure})
+        expected = 2e6 * (glued.blocks.pressure if mean else np.ones(64))
+        np.testing.assert_allclose(rows.normal_pressure, np.tile(expected, (64, 1)))
+    words = "initial_stress: must have one sample, or 64 as the strength, got 3"
+    refuses(
+        words,
+        lambda: glued.sample(
+            {"strength": strength, "normal_pressure": 2e6, "initial_stress": np.zeros((3, 64))}
+        ),
+    )
+
+
 def test_a_scan_beyond_a_specimen_or_with_gaps_is_refused():
     """From 12.3 mm on, on a specimen of 150 mm: the coordinates are moved by the user."""
     x = FREE.interface.x

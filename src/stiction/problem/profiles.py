@@ -103,13 +103,13 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
                 del placed[name]
     rows = {name: profile.values for name, profile in placed.items()}
     quantities = {name: profile.quantity for name, profile in placed.items()}
-    samples = len(rows.get("strength", rows.get("friction_coefficient", (None,))))
+    strength = rows.get("strength", rows.get("friction_coefficient"))
     problems = given_twice(problem, {*given, *quantities.values()}, "profiles")
     problems += [text for name in given for text in mistakes.get(name, ())]
     problems += [
-        f"{name}: must have {samples} or one sample, as the strength, got {len(values)}"
+        f"{name}: must have one sample, or {len(strength)} as the strength, got {len(values)}"
         for name, values in rows.items()
-        if values.ndim and len(values) not in (1, samples)
+        if strength is not None and values.ndim and len(values) not in (1, len(strength))
     ]
     if isinstance(problem.specimen, Slider):
         unfit = {name: UNFIT_FOR_SLIDER.get(what) for name, what in quantities.items()}
@@ -117,7 +117,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     if problems:
         raise InputError(problems)
     # 5. Coefficients become stresses, and profiles a sample.
-    if "normal_pressure" in rows and rows["normal_pressure"].size in (1, samples):
+    if "normal_pressure" in rows and {*rows["normal_pressure"].shape[1:]} <= {1}:
         rows["normal_pressure"] = rows["normal_pressure"] * pressing_of(problem)
     pressure = rows.get("normal_pressure", problem.normal_pressure)
     rows |= {
