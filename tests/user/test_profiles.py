@@ -1,5 +1,6 @@
 """Profiles and maps of one's own: units, coordinates and gaps decide, wherever one enters."""
 
+import dataclasses
 from pathlib import Path
 
 import astropy.units as u
