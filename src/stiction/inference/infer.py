@@ -385,7 +385,7 @@ def _of_specimens(
 
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
     """Return the profiles of a fit, or the fields of any other source, which has no levels."""
-    more: dict[str, Any] = {} if prior is None else {"prior": FactorPrior.of(prior)}
+    more: dict[str, Any] = {"prior": FactorPrior.of(prior)} if prior else {}
     more |= {} if families is None else {"families": families_of(families)}
     if isinstance(random, Profiles):
         return random._replace(**more)

@@ -15,14 +15,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-import pydantic
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import (
+    Count,
     FilePath,
     Number,
     Positive,
@@ -253,7 +253,7 @@ def read_peaks(
     value: Wanted = None,
     unit: str | None = None,
     normal: Positive | str | None = None,
-    surfaces: Annotated[Number, pydantic.Field(ge=1)] = 1,
+    surfaces: Count = 1,
     missing: Missing | None = None,
     decimal: Literal[".", ","] | None = None,
     skip: Number = 0,

@@ -132,9 +132,6 @@ class FactorPrior(NamedTuple):
     @classmethod
     def of(cls, given: Any) -> Self:
         """Return the prior, given a mapping from `MEAN_KEY` and `SCATTER_KEY` to distributions."""
-        given, keys = given or {}, (MEAN_KEY, SCATTER_KEY)
-        if unknown := [str(key) for key in given if key not in keys]:
-            raise InputError([unknown_name("prior", key, keys) for key in unknown])
         with prefixed("prior"):
             priors = {key: distribution_of(key, value) for key, value in given.items()}
         prior = cls(priors.get(SCATTER_KEY, cls().scatter), priors.get(MEAN_KEY))
