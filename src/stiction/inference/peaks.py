@@ -300,8 +300,9 @@ def read_peaks(
     InputError
         If a unit is missing or unknown, columns are ambiguous, a number
         is missing, there are fewer than three specimens, the slip
-        factors are not between 0.05 and 1, or the file is the curve of
-        one test.
+        factors are not between 0.05 and 1, a last row without a name
+        holds the mean or the deviation of the tests, or the file is the
+        curve of one test.
 
     Examples
     --------

@@ -1,8 +1,8 @@
 """The prior: unknown parameters, their distributions before the tests, and those that scale."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -78,12 +78,10 @@ class Prior:
         with self.named(theta):
             return with_parameters(self.problem, self.random, self.names, theta)
 
-    @contextmanager
-    def named(self, theta: Array) -> Iterator[None]:
+    def named(self, theta: Array) -> AbstractContextManager[None]:
         """Let messages of errors that are raised meanwhile begin with the point (parameters,)."""
         pairs = zip(self.names, theta, strict=True)
-        with prefixed("prior: at " + ", ".join(f"{name} = {v:.4g}" for name, v in pairs)):
-            yield
+        return prefixed("prior: at " + ", ".join(f"{name} = {v:.4g}" for name, v in pairs))
 
 
 def with_parameters(
