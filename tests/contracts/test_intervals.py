@@ -235,6 +235,10 @@ def test_a_design_from_tests_names_all_that_it_rests_on(tests_alone, tmp_path):
     # With five tests large scatters are likely, at which the normal is cut off at zero.
     assert min(families["weibull"], families["normal"]) < families["lognormal"]
     assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
+    spread = abs(design.sensitivities.stress_at_high - design.sensitivities.stress_at_low)
+    assert (
+        np.diff(spread) <= 1e-9 * design.stress
+    ).all()  # the largest effect of any sign first
     named = set(design.sensitivities.source.values)
     assert {"marginal.cv", "correlation_length"} <= named
     text = str(tests_alone)

@@ -14,6 +14,7 @@ from contracts.bodies import SOLID, attempt
 import stiction as st
 from stiction.problem.sample import REPLACED
 from stiction.random.dotted_keys import with_values
+from stiction.random.synthesis import FACTORS
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET, MEMBERS = {"progress": False}, 20
@@ -150,3 +151,35 @@ def test_a_property_that_hardly_varies_is_a_constant(name, call):
     assert bool(refusal) == bool(other), refusal or other
     if not refusal:
         np.testing.assert_allclose(found, expected, rtol=CLOSE.get(call, 1e-5))
+
+
+STATED = {  # the constant of a problem that a factor multiplies
+    "residual_strength": ("friction.residual_ratio", 0.3),
+    "initial_stress": ("load.initial_stress", 5e4),
+    "normal_pressure": ("load.normal_pressure", 2e6),
+    "pressing_force": ("load.pressing_force", 1.3e3),
+    "critical_slip": ("friction.critical_slip", 5e-6),
+    "fracture_energy": ("friction.fracture_energy", 4.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_no_onset_lies_beyond_the_bounds_whatever_has_a_factor(name):
+    """Of samples near the ends of the strength and of the factor."""
+    key, value = STATED.get(name, ("friction.weakening_rate", 0.25e12))
+    pressed = name in ("normal_pressure", "pressing_force")
+    scale = 1.0 if pressed else 2e6
+    marginal = st.Beta(alpha=0.7, beta=0.7, low=0.4 * scale, high=0.6 * scale)
+    strength = dataclasses.replace(COEFFICIENT if pressed else FIELD, marginal=marginal)
+    friction = st.LinearWeakening() if key in REPLACED["critical_slip"] else FRICTION
+    problem = dataclasses.replace(PROBLEM, friction=friction, load=st.Load())
+    problem = with_values({"problem": problem}, {f"problem.{key}": value})["problem"]
+    factor = st.Beta(alpha=2.0, beta=2.0, low=0.6, high=1.4)
+    random = st.RandomInterface(strength=strength, between={name: factor})
+    state = st.external.limit_state(problem, random, EXACT)
+    onsets, (low, high) = state(2.5 * state.draws(0, 0, 60)), state.bounds
+    assert low * (1.0 - 1e-9) <= onsets.min() < onsets.max() <= high * (1.0 + 1e-9)
+    answer = st.design_stress(
+        problem, random, probability=1e-3, method=LOCAL, sensitivities=False, **ASKED
+    ) if key not in REPLACED["critical_slip"] else None  # fmt: skip
+    assert answer is None or answer.lower_bound <= onsets.min() * (1.0 + 1e-9)

@@ -356,27 +356,27 @@ def test_a_longer_list_without_others_is_not_computed(monkeypatch):
     assert "more repetitions" in found.warnings[-1]
 
 
-@pytest.mark.parametrize("spread", [0.0, 1.2])
-def test_the_error_of_a_list_is_not_that_of_its_samples(spread):
-    """Pairs of runs of 40 and 60 families, pooled; of 25 entries two are equal."""
+@pytest.mark.parametrize(("spread", "count"), [(0.0, 25), (1.2, 25), (1.2, 3), (0.7, 4)])
+def test_the_error_of_a_list_is_not_that_of_its_samples(spread, count):
+    """Pairs of runs of 40 and 60 families, pooled; of a few or many entries two are equal."""
     rng = np.random.default_rng(2)
-    chances = np.exp(spread * rng.standard_normal(25))
-    chances[7] = chances[24]
-    shares, kinds = chances / chances.sum(), np.append(np.arange(24), 7)
+    chances = np.exp(spread * rng.standard_normal(count))
+    chances[count // 3] = chances[-1]
+    shares, kinds = chances / chances.sum(), np.append(np.arange(count - 1), count // 3)
     found = []
     for _ in range(200):
         runs = []
         for size, copies in ((40, 5), (60, 3)):
-            members = np.repeat(rng.choice(25, size, p=shares), copies)
+            members = np.repeat(rng.choice(count, size, p=shares), copies)
             ancestors = np.repeat(np.arange(size), copies)
             values = np.zeros(members.size)
             level = Population(math.inf, 0.0, values, ancestors, members, np.zeros((0, 0)))
             runs.append(Descent(1000, [level], 1.0, 1000, True))
         found.append(Tail(runs).members_cv(1.0, kinds) ** 2)
-    entries, own = np.bincount(kinds) / 25.0, np.bincount(kinds, shares)
+    entries, own = np.bincount(kinds) / count, np.bincount(kinds, shares)
     expected = np.sum((own - entries) ** 2) / (1.0 - np.sum(entries**2))
     # With the samples of each entry as they are it is 0.01 higher; below zero it is cut off.
-    assert np.mean(found) == pytest.approx(expected, abs=4e-3)
+    assert np.mean(found) == pytest.approx(expected, abs=4e-3, rel=0.05 * (count < 9))
 
 
 def test_small_repetitions_over_members_are_unbiased():
