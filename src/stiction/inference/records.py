@@ -14,14 +14,13 @@ Steps:
 1. Find the spacing of the points: a common divisor of the distances
    between neighbours, which the printed digits may have rounded.
 2. Place the values on a regular grid. Missing points are NaN.
-3. Refuse short, constant and infinite records. Warn about lengths and
-   stresses that are probably in another unit. Warn about outliers,
+3. Refuse short, constant and infinite records. Warn about lengths that
+   are probably in another unit. Warn about outliers,
    which are far from the median, and about dropouts, which are far from
    both neighbours.
 4. Refuse records of white noise (`refuse_uncorrelated`).
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -46,8 +45,8 @@ OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
 CORRELATED = 2.5
 """Standard deviations by which neighbours must be more correlated than white noise."""
-USUAL_LENGTH, USUAL_STRESS = (1e-5, 1e3), (1e3, math.inf)
-"""Lengths of records, m, and sizes of stresses, Pa, beyond which their unit is doubted."""
+USUAL_LENGTH = (1e-5, 1e3)
+"""Lengths of records, m, beyond which their unit is doubted."""
 JUMPING = 10.0
 """Difference of a dropout from its neighbours, in robust standard deviations of differences."""
 
@@ -78,7 +77,7 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
         problems.append("profiles: lines and planes are mixed. Fit them in separate calls")
     if problems:
         raise InputError(problems)
-    _doubt_units(records, quantity)
+    _doubt_lengths(records)
     if (again := len(records) - len({one.values.tobytes() for one in records})) > 0:
         warn_accuracy(
             f"{again} of {len(records)} profiles repeat another profile, value by value. They count"
@@ -87,16 +86,12 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     return records
 
 
-def _doubt_units(records: Sequence[Record], quantity: str) -> None:
-    """Warn about lengths and stresses that are probably in another unit than m and Pa."""
+def _doubt_lengths(records: Sequence[Record]) -> None:
+    """Warn about the first record whose length is probably in another unit than m."""
     for record in records:
         length = max(n * h for n, h in zip(record.values.shape, record.spacings, strict=True))
-        size, units = float(np.nanmean(np.abs(record.values))), QUANTITIES[quantity].units
         text = f"profiles: a record is {length:.3g} m long. Check the unit of x and y (m)"
-        doubts = [Doubt(text, length, USUAL_LENGTH)]
-        text = f"profiles: the mean {quantity} is {size:.3g} Pa. Check its unit (Pa)"
-        doubts += [Doubt(text, size, USUAL_STRESS)] * (units == "Pa")
-        if doubt_units(doubts):
+        if doubt_units([Doubt(text, length, USUAL_LENGTH)]):
             return
 
 
