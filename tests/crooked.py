@@ -1,24 +1,17 @@
 """A line and a plane with nothing symmetric: what holds on them does not hold by accident.
 
 The load has a mean other than one, initial stress, residual strength and pressure vary, cells have
-unequal sides, the weakest place and the gap lie across the seam, and what is measured comes in mm
-and MPa from an x that is not 0.
+unequal sides, and the weakest place lies across the seam.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from setups import make_problem
 
 import stiction as st
-
-BEGIN = 0.0113
-"""Where the coordinates of measured profiles begin, m."""
 
 
 def uneven(interface: st.Interface, *, seed: int) -> Any:
@@ -66,43 +59,3 @@ PLANE, PLANE_STRENGTH = crooked((24, 20), (0.023, 0.0164))
 TWO = np.stack(
     [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
 )
-LINE_GAP = np.isin(np.arange(96), (93, 94, 95, 0, 1))
-PLANE_GAP = np.logical_and.outer(
-    np.isin(np.arange(24), (22, 23, 0)), np.isin(np.arange(20), (19, 0))
-)
-"""Nodes where nothing was measured, across the seam of x and, on the plane, of y."""
-
-
-def of_width(problem: st.Problem, width: float) -> st.Problem:
-    """The problem on an interface of a width, so that forces are known."""
-    wide = dataclasses.replace(problem.interface, width=width)
-    return dataclasses.replace(problem, interface=wide)
-
-
-def as_measured(
-    interface: st.Interface, values: Any, unit: str = "MPa", scale: float = 1e6
-) -> Any:
-    """Values at the nodes, in another unit, over coordinates in mm that begin at `BEGIN`."""
-    steps = [round(BEGIN / h) for h in interface.spacings]
-    rolled = np.roll(values, [-step for step in steps], range(-len(steps), 0)) / scale
-    coordinates = {
-        dim: (dim, (np.arange(n) + step) * h * 1e3, {"units": "mm"})
-        for dim, n, step, h in zip(
-            interface.dims, interface.shape, steps, interface.spacings, strict=True
-        )
-    }
-    return xr.DataArray(rolled, coordinates, interface.dims, attrs={"units": unit})
-
-
-def in_mm(array: Any) -> Any:
-    """Stresses along x, Pa, in kPa over places in mm, the last one first."""
-    there = ("x", 1e3 * array.x.values, {"units": "mm"})
-    return (1e-3 * array).assign_coords(x=there).assign_attrs(units="kPa")[::-1]
-
-
-def write_table(path: Path, measured: Any, name: str = "strength") -> Path:
-    """A measured profile as a table with a line of names such as 'x (mm);strength (MPa)'."""
-    table = measured.to_dataframe(name).reset_index()
-    heads = [f"{dim} (mm)" for dim in measured.dims] + [f"{name} ({measured.units})"]
-    table[[*measured.dims, name]].to_csv(path, sep=";", header=heads, index=False)
-    return path

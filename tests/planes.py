@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from stiction.elasticity.protocol import HalfSpaces
-from stiction.methods.equilibrium.strength import LINEAR, make_sample
-from stiction.methods.equilibrium.transforms.plane import AT_CORNER
 
 
 class Lattice(HalfSpaces):
@@ -33,11 +31,3 @@ WAVENUMBERS = {"spectral": HalfSpaces, "lattice": Lattice}
 def moduli(modulus, ratio):
     """G* along x and G along y, of a shear modulus and Poisson's ratio."""
     return modulus / (1.0 - ratio), modulus
-
-
-def plane_sample(strength, residual, weakening_rate):
-    """A sample on a plane under a uniform load, of (nx, ny) fields or numbers."""
-    shape = np.shape(strength)
-    fields = (strength, residual, 1.0, weakening_rate)
-    flat = (np.broadcast_to(field, shape).flatten() for field in fields)
-    return make_sample(*flat, LINEAR._replace(at_corner=AT_CORNER))

@@ -32,9 +32,3 @@ class StandIn:
             return values | {"critical_stress": self.onset(rows, values["critical_stress"])}
 
         return changed
-
-
-class BoundedStandIn(StandIn):
-    """One whose onsets lie between the ends of the strength, as those of the local criterion."""
-
-    bounded_by_strength = staticmethod(LOCAL.bounded_by_strength)

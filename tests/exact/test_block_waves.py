@@ -227,25 +227,6 @@ def test_heavy_attenuation_comes_to_rest_where_an_overdamped_jump_does(drive):
     assert checked
 
 
-def test_a_mirrored_block_ruptures_like_its_mirror_image():
-    events, options = [], {"nodes": 64, "load": st.Load()}
-    left, right = (
-        crooked(drive=dataclasses.replace(LOW, side=side), **options)
-        for side in ("left", "right")
-    )
-    strength = rough(left, 4)[0]
-    for problem, profile in ((left, strength), (right, strength[::-1])):
-        sample = of(problem, profile)
-        path = path_of(make_search(problem), sample)
-        state = path.events[0].before if path.events else path.last
-        events.append(begin(sample, make_mesh(problem), problem.blocks.stiffness, state, 0.5))
-        events[-1].run(10**6)
-    one, other = events
-    added = one.waves.slip - one.before.slip
-    assert one.steps == other.steps
-    assert np.abs(one.waves.slip - other.waves.slip[::-1]).max() < 1e-4 * added.max()
-
-
 @pytest.mark.parametrize("mode", ["II", "III"])
 def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
     """From an overstressed patch in the middle, until the first echo."""

@@ -26,23 +26,12 @@ def test_the_smallest_unstable_patch_at_a_free_end(kappa, published):
 @pytest.mark.parametrize("kappa", [3.0 - 4.0 * 0.45, None])
 @pytest.mark.parametrize("pushes", [None, Pushes(("right",), 0.03, 0.02)])
 def test_a_uniform_slip_is_free_and_stiffness_is_symmetric(kappa, pushes):
-    stiffness, shear, drive, _ = block_response(0.1, 96, 0.07, MODULUS, kappa, pushes)
+    stiffness, shear, *_ = block_response(0.1, 96, 0.07, MODULUS, kappa, pushes)
     scale = stiffness[0, 0]
     assert np.abs(stiffness.sum(axis=1)).max() < 1e-12 * scale
     assert np.abs(stiffness - stiffness.T).max() < 1e-12 * scale
     assert np.linalg.eigvalsh(stiffness)[1] > 0.0
     assert shear.mean() == pytest.approx(1.0, rel=1e-12)
-    # A push from the other side is the mirror image.
-    if pushes:
-        other = block_response(0.1, 96, 0.07, MODULUS, kappa, Pushes(("left",), 0.03, 0.02))
-        np.testing.assert_allclose(other.shear[::-1], shear, rtol=1e-9)
-        both = block_response(
-            0.1, 96, 0.07, MODULUS, kappa, Pushes(("left", "right"), 0.03, 0.02)
-        )
-        np.testing.assert_allclose(both.shear, 0.5 * (shear + shear[::-1]), rtol=1e-9)
-        # A force of half at each end does half the work of a force at one, and half of its share
-        # at the other: between half and all of the compliance.
-        assert drive < both.drive_stiffness < 2.0 * drive
 
 
 def test_a_clamped_strip_in_mode_three():

@@ -38,19 +38,9 @@ def field_of(marginal, correlation_length=2e-3, **options):
     return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length), **options)
 
 
-@pytest.mark.parametrize(
-    ("exponent", "kept"), [(4.0, 0.9997), (2.0, 0.977), (1.5, 0.93), (1.0, 0.76)]
-)
-def test_power_kept_by_truncating_at_two_and_a_half_lambda(exponent, kept):
-    usual = st.PowerLawSpectrum(correlation_length=1.0, exponent=exponent)
-    digits = len(str(kept)) - 2  # as many as are printed
-    assert round(usual.power_within(2.5 * usual.scale), digits) == kept
-    assert usual.power_within(usual.cutoff()) == pytest.approx(0.9997, abs=3e-5)
-
-
 @EACH
 def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
-    """g(kx) of the line is the integral over ky of the plane's; shares of power of both."""
+    """g(kx) of the line is the integral over ky of the plane's."""
     wave = 2.0 * np.pi / 0.3
     k = np.array([0.0, 0.3, 1.0, 2.0]) * wave
 
@@ -61,31 +51,6 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     along = spectrum.density(k)
     # 1e-7 of the quadrature, or of the integral at k = 0.
     np.testing.assert_allclose(across / across[0], along / along[0], rtol=1e-7, atol=1e-9)
-    for dimensions in (1, 2):
-        cutoff = spectrum.cutoff(dimensions)
-        inside, outside = (
-            quad(
-                lambda q, d=dimensions: q ** (d - 1) * spectrum.density(q, d), *ends, limit=200
-            )[0]
-            for ends in ((0.0, cutoff), (cutoff, np.inf))
-        )
-        share = inside / (inside + outside)
-        assert share == pytest.approx(spectrum.power_within(cutoff, dimensions), rel=1e-6)
-        assert share == pytest.approx(spectrum.power_kept or spectrum.default_power, rel=1e-6)
-
-
-@pytest.mark.parametrize("spectrum", SPECTRA[1:3], ids=lambda s: s.type)
-def test_a_cut_of_a_plane_has_the_correlation_of_the_line(spectrum):
-    """Of z and of the strength, on the periodic grid, but for what truncation leaves out."""
-    field = dataclasses.replace(beta_strength(1.0), spectrum=spectrum, mean_mode=True)
-    left_out = 1.0 - spectrum.power_within(spectrum.cutoff(2), 2)
-    for of in ("z", "strength"):
-        plane = field.correlation(st.Interface((4.0, 4.0), (128, 128)), of=of)
-        line = field.correlation(st.Interface(4.0, 128), of=of)
-        assert plane[0, 0] == pytest.approx(1.0, rel=1e-12)
-        # Each is a mean of cosines with its share missing, and 1 at zero lag.
-        assert np.abs(plane[:, 0] - line).max() <= 2.0 * left_out + 1e-6
-        np.testing.assert_allclose(plane, plane.T, atol=1e-12)
 
 
 @pytest.mark.filterwarnings("ignore:Error in function:RuntimeWarning")  # scipy, of invgauss
@@ -359,23 +324,15 @@ def test_multiples_share_one_table(family):
 
 
 SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
-FAMILIES = [
-    st.Lognormal(mean=1e6, cv=0.2, low=0.3e6),
-    st.Weibull(mean=1e6, cv=0.2, low=0.3e6),
-    st.Gamma(mean=1e6, cv=0.2, low=0.3e6),
-    st.TruncatedNormal(mean=1e6, cv=0.2),
-    st.TruncatedNormal(mean=1e6, cv=0.2, low=0.6e6),
-    st.TruncatedNormal(mean=1e6, cv=0.1, high=1.2e6),
-    st.TruncatedNormal(mean=1e6, cv=0.2, low=0.6e6, high=1.5e6),
-]
 
 
-@pytest.mark.parametrize("marginal", FAMILIES, ids=lambda one: one.type)
-def test_fields_have_the_moments_and_bounds_that_were_given_and_files_hold_them(marginal):
-    frozen, high = marginal.distribution, getattr(marginal, "high", None)
+@pytest.mark.parametrize("bounds", [{}, {"low": 0.6e6}, {"high": 1.2e6}], ids=str)
+def test_normal_fields_have_the_moments_and_bounds_that_were_given(bounds):
+    marginal = st.TruncatedNormal(mean=1e6, cv=0.12, **bounds)
+    frozen, high = marginal.distribution, marginal.high
     # To what the equations for scipy's parameters are solved to.
-    assert frozen.mean() == pytest.approx(marginal.mean, rel=1e-9)
-    assert frozen.std() == pytest.approx(marginal.cv * marginal.mean, rel=1e-7)
+    assert frozen.mean() == pytest.approx(1e6, rel=1e-9)
+    assert frozen.std() == pytest.approx(0.12e6, rel=1e-7)
     # scipy keeps bounds in units of the scale, here about 1e6: 1e-9 is its round-off.
     support = marginal.low, np.inf if high is None else high
     assert frozen.support() == pytest.approx(support, abs=1e-9)
@@ -387,9 +344,6 @@ def test_fields_have_the_moments_and_bounds_that_were_given_and_files_hold_them(
     values = field.sample(interface, samples=2000, seed=3)[:, 0]
     # 0.043 is exceeded once in a thousand times by 2,000 independent values.
     assert scipy.stats.kstest(values, frozen.cdf).statistic < 0.043
-    table = {name: getattr(marginal, name) for name in ("type", "mean", "cv", "low")}
-    table |= {"high": high} if high else {}
-    assert st.RandomField(table, SPECTRUM) == field
 
 
 LINE = st.Interface(length=0.1, nodes=256)

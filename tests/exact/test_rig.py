@@ -81,15 +81,6 @@ def test_energy_and_betti(pressing):
     assert F / rig.C + rig.T @ j == pytest.approx(travel, rel=1e-11)
 
 
-def test_the_mirrored_rig():
-    """A push towards -x is the mirror image of a push towards +x."""
-    right, left = (rig_of("acrylic", towards=sign) for sign in (1, -1))
-    n = len(right.T) // 2
-    assert np.array_equal(left.T[:n], right.T[:n][::-1])
-    assert np.array_equal(left.K[n:, :n], right.K[n:, :n][::-1, ::-1])
-    assert left.C == right.C
-
-
 def test_a_stop_takes_the_push_of_a_base_on_rollers():
     """The length of the base ahead of the slider is a bar that the whole push compresses."""
     name, E_plane = (

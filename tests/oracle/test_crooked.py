@@ -4,25 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from crooked import (
-    LINE,
-    LINE_GAP,
-    LINE_STRENGTH,
-    PLANE,
-    PLANE_GAP,
-    PLANE_STRENGTH,
-    across_the_seam,
-    as_measured,
-    uneven,
-    write_table,
-)
+from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, across_the_seam, uneven
 from oracles import angle_rule, dense, largest_load, symbol_of
 from setups import exact_onset, local_onset
 
-import stiction as st
 from stiction.methods.criterion.griffith import release_rates
 from stiction.methods.criterion.windows import STRETCHES, weight
-from stiction.problem.profiles import at_nodes
 from stiction.theory import griffith_length
 
 BOTH = pytest.mark.parametrize(
@@ -121,54 +108,6 @@ def test_critical_ellipses_of_a_plane_by_dense_eigenvectors():
         found.critical_position.values[0], node, spacings, PLANE.interface.lengths, strict=True
     ):
         assert apart(place, at * h, length) <= 0.5 * h
-
-
-@pytest.mark.parametrize(
-    ("problem", "strength", "gap"),
-    [(LINE, LINE_STRENGTH, LINE_GAP), (PLANE, PLANE_STRENGTH, PLANE_GAP)],
-)
-def test_what_is_measured_elsewhere_in_other_units_lands_on_its_nodes(
-    problem, strength, gap, tmp_path
-):
-    """As an array and as a table, rolled, in mm and MPa; and a gap across the seam of a line."""
-    given = as_measured(problem.interface, strength)
-    for source in (given, write_table(tmp_path / "scan.csv", given)):
-        read = st.read_profile(source, interface=problem.interface)
-        np.testing.assert_allclose(read.values, strength, rtol=1e-9)
-    holes = as_measured(problem.interface, np.where(gap, np.nan, strength))
-    np.testing.assert_array_equal(
-        np.isnan(at_nodes("strength", holes, problem.interface, missing=True)), gap
-    )
-
-
-@BOTH
-def test_moving_and_mirroring_everything_moves_places_only(problem, strength):
-    """By seven nodes along x, and about the first node of each axis."""
-    line = problem.interface
-    moves = [(lambda field: np.roll(field, 7, 0), 1.0, np.eye(len(line.shape))[0] * 7.0)]
-    for axis in range(len(line.shape)):
-        sign = 1.0 - 2.0 * np.eye(len(line.shape))[axis]
-        moves.append((lambda f, axis=axis: np.roll(np.flip(f, axis), 1, axis), sign, 0.0))
-    names = "profile", "initial_stress", "normal_pressure"
-    alike = "critical_patch_area", "critical_patch_extent", "slip_patches", "arrested_events"
-    for change, sign, nodes in moves:
-        load = st.Load(**{name: change(getattr(problem.load, name)) for name in names})
-        residual = change(problem.friction.residual_strength)
-        friction = dataclasses.replace(problem.friction, residual_strength=residual)
-        other = dataclasses.replace(problem, load=load, friction=friction)
-        closed = {"tolerance": 1e-10} if problem is PLANE else {}
-        for onset, options in ((local_onset, {}), (exact_onset, closed)):
-            here = onset(problem, strength, **options)
-            there = onset(other, change(strength), **options)
-            for name in ("critical_load", "critical_stress", "friction_coefficient"):
-                assert there[name].item() == pytest.approx(here[name].item(), rel=1e-9)
-            for name in {*alike} & {*here}:
-                assert there[name].values == pytest.approx(here[name].values, rel=1e-9)
-            for name in {"critical_position", "sliding_position"} & {*here}:
-                place = sign * here[name].values[0] + nodes * np.array(line.spacings)
-                off = apart(there[name].values[0], place, np.array(line.lengths))
-                # The multiplier goes with the root of the gap.
-                assert np.all(off < 1e-2 * np.array(line.spacings))
 
 
 @pytest.mark.parametrize(("problem", "radius"), [(LINE, 3.2e-3), (PLANE, 4.6e-3)])

@@ -110,6 +110,12 @@ def test_events_against_relaxation(problem, make_strength):
     for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
         loads = load * np.array([0.8, 0.95, 0.999])
         path = st.equilibrium_path(problem, profile, loads)
+        assert np.diff(path.slip, axis=0).min() >= -1e-15
+        # Where it slips the stress is the strength, elsewhere below.
+        strength = np.maximum(profile - problem.friction.weakening_rate * path.slip.values, 0.0)
+        over = path.stress.values - strength
+        assert over.max() < 1e-10 * load
+        assert np.abs(over)[path.slip.values > 0.0].max() < 1e-10 * load
         for i in range(3):
             slip = relaxed(problem, profile, loads[i])
             assert slip is not None

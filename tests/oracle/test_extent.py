@@ -88,25 +88,6 @@ def test_an_extent_of_everything_is_none(method):
     assert_same(whole, given)
 
 
-def test_waves_find_the_last_instability_and_the_local_criterion_the_first():
-    """Under slow loading; patches that lie inside bound the load of the first."""
-    problem = within(LINE, (0.006, 0.041))
-    strength = FIELD.sample(problem.interface, samples=3, seed=2)
-    exact = exact_onset(problem, strength, events=1)
-    waves = st.onset(problem, strength, method=st.Rupture(loading_rate=1e6), progress=False)
-    for name in ("critical_load", "critical_stress", "first_instability"):
-        assert waves[name].values == pytest.approx(exact[name].values, rel=1e-3)
-    local = st.onset(problem, strength, method=LOCAL, progress=False)
-    arrested = exact.arrested_events.values > 0
-    first = np.where(arrested, exact.event_load.values[:, 0], exact.critical_load.values)
-    assert np.all(
-        first <= 1.01 * local.critical_load.values
-    )  # a bound, to the error of the grid
-    half = 0.5 * problem.nucleation_length
-    assert np.all(local.critical_position > 0.006 + half - 1e-3)
-    assert np.all(local.critical_position < 0.041 - half + 1e-3)
-
-
 def test_the_event_that_breaks_a_fault_is_not_arrested_and_slip_that_restarts_is_no_event():
     """Locked nodes slip again as the load rises, and the last nodes beside the ends creep."""
     law = st.LinearWeakening(critical_slip=8e-6, residual_strength=3e5)

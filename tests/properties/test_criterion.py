@@ -79,10 +79,6 @@ def test_failure_probability_of_a_plane_is_that_of_counting():
     found = st.failure_probability(plane, field, stress, algorithm="subset", seed=1, **options)
     assert abs(found.probability / counted - 1.0) < 4.0 * np.hypot(own, found.cv)
     assert found.failing_profiles.strength.dims[-2:] == ("x", "y")
-    wanted = st.design_stress(plane, field, probability=0.01, seed=2, **options)
-    # Four standard errors on either side, by the density of the onsets there.
-    low, high = np.quantile(onsets, [0.01 * (1.0 - 4.0 * own) + 1e-4, 0.01 * (1.0 + 4.0 * own)])
-    assert low < wanted.stress < high
 
 
 def test_coarse_directions_are_named():

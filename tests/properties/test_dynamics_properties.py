@@ -5,13 +5,18 @@ import pytest
 from checks import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as some
-from ruptures import BREAKING_PLANE, BREAKING_STRENGTH, dip, run_of
+from ruptures import BREAKING_PLANE, dip, run_of
 from setups import make_problem, within
+from specimens import crooked, rough
 
 import stiction as st
 from stiction import Rupture, simulate_rupture
 from stiction.methods.dynamics.save import read_checkpoint, write_checkpoint
+from stiction.methods.dynamics.specimens import RuptureSearch
 from stiction.methods.dynamics.state import Reason
+from stiction.methods.equilibrium.solver import follow_to_sliding, make_search, sample_of
+from stiction.methods.equilibrium.state import Outcome
+from stiction.methods.equilibrium.strength import present_pieces
 
 NODES = 128
 PROBLEM = make_problem(NODES, 0.05, solid=st.paper.problem().solid)
@@ -108,24 +113,17 @@ def test_creep_stops_where_the_load_falls_and_never_runs_back():
     assert slip[-1] == pytest.approx(late[0], abs=1e-4 * slip.max())
 
 
-PLANE = BREAKING_PLANE.interface
-FAST = st.Rupture(loading_rate=1e8)
-
-
-def break_plane(strength=BREAKING_STRENGTH, method=FAST, problem=BREAKING_PLANE, **options):
-    return simulate_rupture(problem, strength, method=method, progress=False, **options)
-
-
 def test_an_arrested_rupture_radiates_no_more():
     """A strong frame stops it; then work, friction and strain energy balance for good."""
-    x, y = np.meshgrid(*PLANE.coordinates.values(), indexing="ij")
+    plane = BREAKING_PLANE.interface
+    x, y = np.meshgrid(*plane.coordinates.values(), indexing="ij")
     inside = (np.abs(x - 0.02) < 0.011) & (np.abs(y - 0.015) < 0.009)
-    tau_p = 8e5 - 2e5 * dip(PLANE, (0.018, 0.014), 0.007)
-    method = st.Rupture(
+    tau_p = 8e5 - 2e5 * dip(plane, (0.018, 0.014), 0.007)
+    method = Rupture(
         load_history=([0.0, 6e-3, 1.0], [0.0, 6.2e5, 6.2e5]), stop="time", end_time=0.5
     )
     problem = within(BREAKING_PLANE, inside)
-    run = break_plane(tau_p, method, problem, save=st.Save(every=20))
+    run = simulate_rupture(problem, tau_p, method=method, save=st.Save(every=20))
     slip = run.slip.values[-1]
     assert np.all(slip[~inside] == 0.0)
     assert np.all(slip[inside] > 0.0)
@@ -135,8 +133,55 @@ def test_an_arrested_rupture_radiates_no_more():
     assert np.ptp(radiated[settled]) < 1e-6 * radiated[-1]
     # The strain energy is the work of the stress change on the slip.
     change = run.shear_stress.values[-1] - 6.2e5
-    strain = -0.5 * float(np.sum(change * slip)) * PLANE.cell
+    strain = -0.5 * float(np.sum(change * slip)) * plane.cell
     # Waves along the interface fade like the square root of time only.
     assert run.strain_energy.values[-1] == pytest.approx(strain, rel=1e-3)
-    moment = BREAKING_PLANE.solid.shear_modulus * float(slip.sum()) * PLANE.cell
+    moment = BREAKING_PLANE.solid.shear_modulus * float(slip.sum()) * plane.cell
     assert run.seismic_moment.values[-1] == pytest.approx(moment, rel=1e-12)
+
+
+LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
+DRIVES = [
+    LOW,
+    st.Pusher(height=0.012, width=0.005),
+    st.Platen(stiffness=2e7, mass=0.1),
+    st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf")),
+]
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(drive):
+    problem = crooked(nodes=64, drive=drive)
+    search, overdamped = RuptureSearch(problem, Rupture()), make_search(problem)
+    for strength in rough(problem, 5, samples=4):
+        sample = sample_of(problem.sample(strength), search.pieces, 0)
+        for before, after, _ in follow_to_sliding(search, sample).events:
+            least = overdamped.jump(sample, before)
+            assert least.outcome == Outcome.ARRESTED
+            assert np.all(after.slip >= least.state.slip - 1e-6 * after.slip.max())
+            pieces = present_pieces(sample, after.slip)
+            load = before.load * sample.profile - problem.blocks.stiffness @ after.slip
+            over = load - (pieces.strength - pieces.weakening_rate * after.slip)
+            assert over.max() < 1e-9 * sample.excess.max()
+
+
+def test_one_event_in_space_and_time():
+    """It comes to rest; every tenth step is kept."""
+    specimen = crooked(nodes=64, drive=LOW)
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"])
+    strength = rough(specimen, 3)
+    run = simulate_rupture(specimen, strength, method=Rupture(), event=0, save=save)
+    energies = (f"{name}_energy" for name in ("friction", "strain", "kinetic", "attenuated"))
+    assert sum(run[name] for name in energies).values == pytest.approx(run["work"].values)
+    assert run.attrs["stopped"] == "rest"
+    assert run["attenuated_energy"].values[-1] > 0.0
+    assert np.all(np.diff(run["slip"].values, axis=0) >= 0.0)
+    added = (run["slip"][-1] - run["slip"][0]).values.sum() * specimen.interface.cell
+    moment = specimen.solid.shear_modulus * added  # the frames begin just after the event
+    assert st.external.event_table(run)["event_moment (N)"][0] == pytest.approx(
+        moment, rel=0.02
+    )
+    over = run["shear_stress"] - run["strength"]
+    assert over.values[1:].max() < 0.02 * float(run["peak_strength"].mean())
+    assert run["machine_force"].values[0] == pytest.approx(run["force"].values[0], rel=1e-3)
+    assert run["block_velocity"].dims == ("snapshot", "height", "x")

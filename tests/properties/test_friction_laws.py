@@ -56,20 +56,6 @@ def test_energies_balance(runs, name):
     assert law.reach > 0.0
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_stress_is_the_strength_of_the_law_wherever_it_slides(runs, name):
-    run, law = runs[name], LAWS[name]
-    peak = run.peak_strength.values
-    drop = peak - 0.2e6
-    W = law.weakening_rate_of(drop, *law.scale)
-    expected = 0.2e6 + drop * law.fraction(run.slip.values / law.critical_slip_of(drop, W))
-    np.testing.assert_allclose(run.strength, expected, rtol=1e-12)
-    sliding = run.slip_rate.values[1:] > 0.0
-    np.testing.assert_allclose(
-        run.shear_stress.values[1:][sliding], expected[1:][sliding], rtol=1e-6
-    )
-
-
 def test_the_front_reaches_a_node_that_does_not_weaken_when_it_first_slips():
     problem, strength = wavy_line()
     firm = np.arange(60, 70)

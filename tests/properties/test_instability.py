@@ -132,32 +132,6 @@ def test_nodes_that_creep_beside_a_barrier_do_not_raise_the_onset():
     assert onsets[1] == pytest.approx(onsets[0], rel=2e-3)  # 8e-4: of second order in the grid
 
 
-def fault_between_barriers():
-    """2 km of a period of 4 km, overstressed in the middle, under a load that stays."""
-    line = st.Interface(length=4e3, nodes=250)
-    away = np.abs(line.x - 2e3)
-    solid = st.Solid(shear_modulus=24.3e9, poisson_ratio=0.25, density=2700.0, plane="strain")
-    load = st.Load(initial_stress=np.where(away <= 200.0, 32.2e6, 30e6))
-    friction = st.LinearWeakening(critical_slip=0.06, residual_strength=25e6)
-    problem = st.Problem(solid, line, friction, load, mode="III")
-    return within(problem, (1e3, 3e3)), np.full(250, 32e6)
-
-
-def test_a_fault_between_barriers_is_followed_until_nothing_slips():
-    """All of it is at its residual strength long before, slipping at metres a second."""
-    problem, strength = fault_between_barriers()
-    runs = {}
-    for stop in ("rest", "sliding", "time"):
-        method = st.Rupture(load_history=([0.0, 20.0], [0.0, 0.0]), stop=stop, end_time=6.0)
-        runs[stop] = simulate(method, strength, problem)
-    for stop in ("rest", "sliding"):
-        run = runs[stop]
-        assert run.attrs["stopped"] == "rest"
-        assert run.step_time.values[-1] < 6.0
-        assert run.top_slip_rate.values[-1] == 0.0
-        assert np.array_equal(run.slip[-1], runs["time"].slip[-1])
-
-
 def test_an_interface_that_slid_is_at_rest_once_it_is_unloaded(exact):
     top = 1.003 * exact.critical_load.item()
     times = top / 2e7 + np.array([-top / 2e7, 0.0, 1e-4, 2e-4])
