@@ -40,31 +40,32 @@ def digest(values: Any) -> list[float]:
 
 
 def differences(
-    outputs: Mapping[str, Any], recorded: Mapping[str, Any], close: float
+    outputs: Mapping[str, Any], recorded: Mapping[str, Any], close: float, floor: float = FLOOR
 ) -> list[str]:
     """The outputs of a call that differ from the recorded outputs, a line each."""
     return [
         f"{path}: {outputs.get(path, 'is gone')} for {recorded.get(path, 'nothing')}"
         for path in sorted({*outputs, *recorded})
-        if not _same(outputs.get(path), recorded.get(path), close)
+        if not _same(outputs.get(path), recorded.get(path), close, floor)
     ]
 
 
-def _same(output: Any, recorded: Any, close: float) -> bool:
+def _same(output: Any, recorded: Any, close: float, floor: float) -> bool:
     if not isinstance(output, list) or not isinstance(recorded, list):
         return type(output) is type(recorded) and bool(output == recorded)
     size = max((abs(number) for number in recorded if np.isfinite(number)), default=0.0)
     return len(output) == len(recorded) and np.allclose(
-        output, recorded, rtol=close, atol=FLOOR * size, equal_nan=True
+        output, recorded, rtol=close, atol=floor * size, equal_nan=True
     )
 
 
 def compare(
-    path: Path, name: str, outputs: Mapping[str, Any], record: bool, close: float
-) -> None:
+    path: Path, name: str, outputs: Mapping[str, Any], record: bool, close: float,
+    floor: float = FLOOR,
+) -> None:  # fmt: skip
     """Compare outputs with those recorded under a name, or record them."""
     recorded = read(path)
-    changed = differences(outputs, recorded.get(name, {}), close)
+    changed = differences(outputs, recorded.get(name, {}), close, floor)
     if record and changed:
         print(f"\n{name}", *changed, sep="\n  ")
         write(path, recorded | {name: outputs})
