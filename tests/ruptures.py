@@ -75,12 +75,6 @@ def dip(interface: st.Interface, centre: Any, radius: float) -> Any:
 BREAKING_PLANE = make_problem(
     (40, 36), (0.04, 0.03), solid=QUARTER, weakening_rate=3e11, residual_strength=2e5
 )
-BREAKING_STRENGTH = (
-    1e6
-    - 3e5 * dip(BREAKING_PLANE.interface, (0.012, 0.011), 0.007)
-    - 1e5 * dip(BREAKING_PLANE.interface, (0.03, 0.02), 0.007)
-)
-"""A plane that breaks from the weaker one of two dips."""
 
 _ANGLE = turns(128)
 CROOKED = make_problem(

@@ -1,4 +1,4 @@
-"""The local criterion against its definition, against theory and against exact onsets."""
+"""The local criterion against its definition, its bounds, theory and exact onsets."""
 
 import dataclasses
 import re
@@ -7,12 +7,30 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
-from setups import LENGTH, RATE, exact_onset, local_onset, make_problem, turns
+from checks import assert_mean
+from hypothesis import given, settings
+from hypothesis import strategies as hs
+from oracles import symbol_of, times
+from refusals import warning_texts
+from setups import (
+    LENGTH,
+    LOCAL,
+    RATE,
+    ROUND_OFF,
+    beta_strength,
+    ensemble,
+    exact_onset,
+    local_onset,
+    make_problem,
+    turns,
+)
 from specimens import crooked, rough
 
 import stiction as st
 from stiction.elasticity.line import line_of
+from stiction.methods.criterion.average import averages
 from stiction.methods.criterion.onset_bracket import slides
+from stiction.methods.criterion.windows import windows_of
 
 
 # Error of a polynomial through ten nodes where the strength varies within a quarter of h_n, in
@@ -133,12 +151,12 @@ def test_a_line_slides_above_its_exact_onset_only(ratio):
     field = lognormal(0.5 * LENGTH, 0.3)
     tau_p = np.maximum(field.sample(problem.interface, samples=12, seed=4), 3e5)
     weakening_rate = RATE * (1.0 + 0.3 * np.sin(3.0 * x))
-    given = {
+    profiles = {
         "strength": tau_p, "residual_strength": ratio * tau_p, "weakening_rate": weakening_rate
     }  # fmt: skip
-    exact = exact_onset(problem, given)
+    exact = exact_onset(problem, profiles)
     assert (exact.arrested_events > 0).any()
-    sample = problem.sample(given)
+    sample = problem.sample(profiles)
     column = line_of(problem.half_spaces, 256).entries.column
     for i, load in enumerate(exact.critical_load.values):
         peak, residual = sample.strength[i] - 2e5, sample.residual_strength[i] - 2e5
@@ -179,3 +197,63 @@ def test_behind_a_machine_the_local_criterion_returns_a_stress_and_not_the_drive
     assert 0.0 < found.mean() / first.mean() - 1.0 < of_drive
     if mode == "II":
         assert 0.6 < (local.critical_load.values - found).mean() / relief.mean() < 1.2
+
+
+PLANE = make_problem((48, 48), (5.0 * LENGTH, 4.0 * LENGTH))
+
+
+@settings(max_examples=40, deadline=None)
+@given(levels=hs.lists(hs.floats(3.0, 9.0), min_size=2, max_size=12), seed=hs.integers(0, 1000))
+def test_lies_between_the_least_and_the_greatest_strength_whatever_the_jumps(levels, seed):
+    """Blocks of strengths over six decades, 4.4 nodes in h_n."""
+    rng = np.random.default_rng(seed)
+    tau_p = np.repeat(10.0 ** np.array(levels), 11)[: 128 - 1]
+    tau_p = np.append(tau_p, np.full(128 - tau_p.size, tau_p[-1])) * rng.uniform(0.9, 1.1, 128)
+    problem = make_problem(128)
+    load = local_onset(problem, tau_p).critical_load.item()
+    tau_n = st.theory.nucleation_stress(problem, tau_p)
+    least, most = (1.0 - ROUND_OFF) * tau_p.min(), (1.0 + ROUND_OFF) * tau_p.max()
+    assert least <= load <= tau_n.min() * (1.0 + ROUND_OFF)
+    assert tau_n.max() <= most
+
+
+def test_weights_certify_the_bound():
+    """(K - W) y <= 0 everywhere, with spectral wave vectors too: an upper bound."""
+    for window in windows_of(PLANE, RATE):
+        y = window.weight
+        assert y.min() >= 0.0
+        assert y.sum() == pytest.approx(1.0, rel=1e-12)
+        forces = times(symbol_of(PLANE), y) - RATE * y
+        assert forces.max() < 1e-6 * RATE * y.max()  # residual of the eigenvector
+
+
+@pytest.mark.parametrize("mean_mode", [False, True])
+def test_variance_of_the_nucleation_stress_of_a_plane_is_that_of_theory(mean_mode):
+    field = beta_strength(LENGTH, mean_mode=mean_mode, anisotropy=1.4)
+    theory = st.theory.nucleation_statistics(PLANE, field)
+    middle = windows_of(PLANE, RATE, stretches=(1.0,))
+    strength = field.sample(PLANE.interface, samples=400, seed=2)
+    each = averages(PLANE.interface, middle, strength, np.ones((48, 48)))
+    tau_n = np.array([next(windows) for windows in each])
+    assert_mean(((tau_n - theory.mean) ** 2).mean(axis=(1, 2)), theory.variance, errors=4.0)
+    assert_mean(tau_n.mean(axis=(1, 2)), theory.mean, errors=4.0)
+
+
+def test_failure_probability_of_a_plane_is_that_of_counting():
+    plane = make_problem((20, 24), (4.0 * LENGTH, 3.5 * LENGTH))
+    field = beta_strength(0.7 * LENGTH)
+    options = {"method": LOCAL, "progress": False, "target_cv": 0.25}
+    onsets = ensemble(plane, field, 3000, seed=9).critical_stress.values
+    stress, counted, own = float(np.quantile(onsets, 0.01)), 0.01, 1.0 / np.sqrt(30.0)
+    found = st.failure_probability(plane, field, stress, algorithm="subset", seed=1, **options)
+    assert abs(found.probability / counted - 1.0) < 4.0 * np.hypot(own, found.cv)
+    assert found.failing_profiles.strength.dims[-2:] == ("x", "y")
+
+
+def test_coarse_directions_are_named():
+    def onset_on(*nodes):
+        local_onset(make_problem(nodes, PLANE.interface.length), np.full(nodes, 1e6))
+
+    (text,) = warning_texts(lambda: onset_on(48, 26))
+    assert "9.6 nodes along x and, in mode III, 4.4 along" in text
+    assert warning_texts(lambda: onset_on(60, 72)) == []
