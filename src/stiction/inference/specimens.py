@@ -18,8 +18,8 @@ In the steps, x = log(m b/reference) is the log strength of one specimen:
    sufficient if T(c)/c does not depend on c. Otherwise simulate at
    `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
 2. Tabulate the likelihood of each measured number over x:
-   the normal density for the logarithm of a level, or the density of simulated
-   onsets at a peak (`stiction.inference.density`).
+   the normal density for the logarithm of a level, or the density of
+   simulated onsets at a peak (`stiction.inference.density`).
 3. Choose `SCATTER_CELLS` values of s at equal steps of its prior
    probability, and `MEAN_CELLS` values of log m. The likelihood of a
    number at (family, s, m) is the integral of step 2 over the density
@@ -238,7 +238,8 @@ class Onsets:
 def points_between(ranges: Sequence[tuple[float, float, float]]) -> Array:
     """Return points x over all ranges, spaced by a quarter of the smallest deviation."""
     lows, highs, deviations = zip(*ranges, strict=True)
-    # A coarser grid would lose the narrowest likelihood between two points.
+    # A coarser grid would lose the narrowest likelihood between two
+    # points.
     low, high = min(lows), max(highs)
     count = int(np.clip(np.ceil(FINE * (high - low) / min(deviations)), 64, MAX_X_POINTS))
     return np.linspace(low, high, count)
@@ -318,7 +319,8 @@ def grid_of_profiles(
     profiles: Profiles, tables: "Tables | None" = None
 ) -> tuple[FactorGrid, FactorGrid]:
     """Return two posteriors: from profiles alone, and from profiles and peaks (steps 2 to 5)."""
-    # The logarithm of a level lies below log(m b) by half its variance on average.
+    # The logarithm of a level lies below log(m b) by half its variance
+    # on average.
     levels = np.log(profiles.levels / profiles.reference) + 0.5 * profiles.within
     deviations = np.maximum(np.sqrt(profiles.within), LEAST_DEVIATION)
     ranges = [] if tables is None else tables.ranges()
@@ -376,7 +378,8 @@ def _products(kernel: Array, tables: Array) -> Array:
     flat = kernel.reshape(-1, kernel.shape[-1]).T
     total = np.zeros((len(tables), flat.shape[1]))
     for table in np.moveaxis(tables, 1, 0):
-        # The likelihood of a number may be far below the smallest number of the computer.
+        # The likelihood of a number may be far below the smallest
+        # number of the computer.
         top = table.max(axis=1, keepdims=True)
         total += np.log(np.maximum(np.exp(table - top) @ flat, 1e-300)) + top
     return total.reshape(-1, *kernel.shape[:-1])
@@ -412,7 +415,8 @@ class Tables:
 
     def parts(self, u: Array) -> Array:
         """Return log densities (draws, peaks) of all peaks at draws (draws, 4)."""
-        # The density of a peak at a draw is the integral over x, as in step 3.
+        # The density of a peak at a draw is the integral over x, as in
+        # step 3.
         x = points_between(self.ranges())
         rows = np.empty((len(u), x.size))
         for family, cv, places in _factor_groups(self.profiles, u):
@@ -428,7 +432,8 @@ class Tables:
         """Draw a peak of one specimen type for each draw (draws, 4)."""
         rng = np.random.default_rng([seed, 1, kind])
         known, share = self.onsets[kind], rng.random(len(u))
-        # A further specimen has its own factor and one of the simulated onsets.
+        # A further specimen has its own factor and one of the simulated
+        # onsets.
         x = u[:, 3].copy()
         for family, cv, places in _factor_groups(self.profiles, u):
             x[places] += np.log(factor_of_family(family, cv).distribution.ppf(share[places]))
@@ -453,8 +458,9 @@ class Prediction(NamedTuple):
     def quantile(self, probability: float, family: str | None = None) -> float:
         """Return the stress, Pa, at a probability, averaged over distributions or for one.
 
-        The predictive distribution is the mean over field, onset and grid, or over the part of
-        the grid with this family. No draws are needed.
+        The predictive distribution is the mean over field, onset and
+        grid, or over the part of the grid with this family. No draws
+        are needed.
         """
         chance, (low, high) = self._distribution(family)
         if chance(low) < probability:  # or else a rarer peak than those of the table
@@ -475,7 +481,8 @@ class Prediction(NamedTuple):
         if family is not None:
             mass_of = {family: mass_of[family] / mass_of[family].sum()}
         x = np.linspace(means[0] - LOWEST, means[-1] + LOG_MEAN_MARGIN, PREDICTED)
-        # Probability that x of a further specimen lies below each point, for each field.
+        # Probability that x of a further specimen lies below each
+        # point, for each field.
         below, half = np.zeros((len(profiles.fields), x.size)), 0.5 * (x[1] - x[0])
         for name, of_family in mass_of.items():
             for cell, cv in enumerate(profiles.prior.cells()):
@@ -483,7 +490,8 @@ class Prediction(NamedTuple):
                 below += mass @ masses(name, cv, means, x)
                 below[:, 0] += mass @ np.interp(x[0] - half - means, *_tabulated(name, cv))
         below = np.cumsum(below, axis=1)
-        # T(c) rises with c. Find the c at which it is t, for each field and sample.
+        # T(c) rises with c. Find the c at which it is t, for each field
+        # and sample.
         logs = np.log(known.area * known.ratios) + known.at[:, None]
 
         def chance(log_peak: float) -> float:
@@ -570,7 +578,8 @@ def _onsets(
 
     at, fields = np.zeros(1), range(len(profiles.fields))
     if not scales_with_strength(problem, profiles.fields[0], method):
-        # The onsets at the reference show over which strengths the peaks range.
+        # The onsets at the reference show over which strengths the
+        # peaks range.
         first, known = onsets(0, at)
         peaks = peaks if peaks.size else area * first.ravel()
         known = () if profiles.whole else (known,)
@@ -583,7 +592,8 @@ def _onsets(
     ratios, densities = map(tuple, zip(*run, strict=True))
     if profiles.whole:
         return Onsets(at, np.stack(ratios), (), area)
-    # Standardised densities differ little between fields. Their mean has a smaller error.
+    # Standardised densities differ little between fields. Their mean
+    # has a smaller error.
     table = np.log(np.mean([np.exp(known.table) for known in densities], axis=0))
     densities = tuple(known._replace(table=table) for known in densities)
     return Onsets(at, np.stack(ratios), densities, area)
