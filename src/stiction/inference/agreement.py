@@ -54,14 +54,17 @@ from stiction.inference.peaks import Peaks, peaks_and_error, title_of
 from stiction.inference.posterior import Posterior
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
-"""Draws that represent a posterior, and number of values in the table of a distribution."""
+"""Draws that represent a posterior, and number of values in the table of
+a distribution."""
 RANGE_MARGIN = 0.25
-"""Fraction of the range of predicted peaks that is added to it on either side."""
+"""Fraction of the range of predicted peaks that is added to it on either
+side."""
 OUTLYING_SHARE = 1e-3
-"""Fraction of the predicted peaks on either side that is left out of this range, because their
-distribution may have heavy tails."""
+"""Fraction of the predicted peaks on either side that is left out of
+this range, because their distribution may have heavy tails."""
 DOUBTFUL_P_VALUE = 0.05
-"""P-value below which measured and predicted peaks contradict each other."""
+"""P-value below which measured and predicted peaks contradict each
+other."""
 BAND_LEVEL = 0.9
 PRECURSORS = ("number", "size", "first_load")
 """Compared properties of precursors."""

@@ -86,7 +86,8 @@ from stiction.random.spectra import Share
 CAMPAIGN_GRID_POINTS = 8_000
 """Points of the grid of each posterior."""
 MIN_BOX_WIDTH = 1e-12
-"""Width of a box, as a fraction of the prior, below which rounding hides the posterior."""
+"""Width of a box, as a fraction of the prior, below which rounding hides
+the posterior."""
 MAX_FIELDS = 12
 """Fields within a specimen that represent all of them."""
 WIDTH_DRAWS = 2_000

@@ -76,20 +76,25 @@ from stiction.random.stresses import mean_in_stress
 LIKELY_FIELDS = 60
 """Fields within a specimen that represent all likely fields."""
 LITTLE_INFORMATION = math.log(4.0 / 3.0)
-"""Information on the scatter, nats, below which its prior controls the result: a uniform range
-would shrink by less than a quarter."""
+"""Information on the scatter, nats, below which its prior controls the
+result: a uniform range would shrink by less than a quarter."""
 TOLERABLE = 0.25
-"""Monte Carlo error over the standard deviation of the posterior above which a note reports it."""
+"""Monte Carlo error over the standard deviation of the posterior above
+which a note reports it."""
 NEVER = 1e-9
 """Neglected probability of a peak outside the bounds of the onset."""
 WIDEN = 0.1
-"""Fraction of the width of the first posterior by which its box is widened on either side."""
+"""Fraction of the width of the first posterior by which its box is
+widened on either side."""
 BOX_END_SHARE, HELD = 0.05, 1e-3
-"""Fraction of the box at either end, and posterior mass there above which the box grows."""
+"""Fraction of the box at either end, and posterior mass there above
+which the box grows."""
 PRIOR_END, PILED = 0.02, 4.0
-"""Fraction of a prior at either end, and multiple of it above which the posterior piles up."""
+"""Fraction of a prior at either end, and multiple of it above which the
+posterior piles up."""
 OUTWARDS = np.array([[-1.0], [1.0]])
-"""Directions in which the lower and the upper corner of a box move when it grows."""
+"""Directions in which the lower and the upper corner of a box move when
+it grows."""
 
 
 @checked

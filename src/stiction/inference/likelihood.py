@@ -53,18 +53,24 @@ from stiction.random.synthesis import SAMPLES_PER_BLOCK
 
 NODES = {0: 1, 1: 25, 2: 11, 3: 7, 4: 5}
 COARSE = {0: 1, 1: 5, 2: 4, 3: 3, 4: 2}
-"""Nodes along each simulated parameter, by the number of these parameters. An expensive
-method that the local criterion guides is simulated at the coarse nodes only."""
+"""Nodes along each simulated parameter, by the number of these
+parameters. An expensive method that the local criterion guides is
+simulated at the coarse nodes only."""
 LOG = 3.0
-"""Ratio of the ends of a prior from which on a parameter is interpolated in its logarithm."""
+"""Ratio of the ends of a prior from which on a parameter is interpolated
+in its logarithm."""
 MIN_CORRELATION = 0.8
-"""Correlation of the onsets by two methods above which step 4 is worthwhile."""
+"""Correlation of the onsets by two methods above which step 4 is
+worthwhile."""
 SPECIMEN = 2**20
-"""Samples of each further kind of specimen begin at the next multiple of this number."""
+"""Samples of each further kind of specimen begin at the next multiple of
+this number."""
 WARN_SECONDS = 60.0
-"""Seconds of simulation above which a warning states the time before it begins."""
+"""Seconds of simulation above which a warning states the time before it
+begins."""
 REACH_SPREADS = 2.0
-"""Standard deviations beyond all simulated onsets at which a peak is out of reach."""
+"""Standard deviations beyond all simulated onsets at which a peak is out
+of reach."""
 
 
 class Axis(NamedTuple):

@@ -61,15 +61,19 @@ from stiction.problem.reading.tables import Options, table_of_frame
 MIN_PEAKS = 3
 """Fewest different peaks in all: of two numbers, one may be a mistake."""
 MAX_PEAK_RATIO = 50.0
-"""Ratio of measured and predicted peaks above which their unit must be wrong."""
+"""Ratio of measured and predicted peaks above which their unit must be
+wrong."""
 MAX_STATISTICS = 4
 """Most rows of statistics without names below a table."""
 MIN_CURVE_LINES = 100
-"""Fewest lines of a table that is taken for a curve if its time or travel only rises."""
+"""Fewest lines of a table that is taken for a curve if its time or
+travel only rises."""
 PART = re.compile(r"(.*\d)[ ._-]?[A-Za-z]")
-"""Name of a slip load that consists of the number of its specimen and a letter."""
+"""Name of a slip load that consists of the number of its specimen and a
+letter."""
 SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
-"""Beginnings of the heading of a column that says which specimen was tested."""
+"""Beginnings of the heading of a column that says which specimen was
+tested."""
 COEFFICIENTS = (0.05, 1.0)
 """Range of slip factors. Swapped columns or units lead far beyond it."""
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}

@@ -63,7 +63,8 @@ MOST_ALONG = 512
 """Most points along a parameter."""
 MAX_GRID_ZOOMS = 6
 OUTSIDE_MASS = 1e-6
-"""Posterior mass outside on either side of a parameter when the grid closes in."""
+"""Posterior mass outside on either side of a parameter when the grid
+closes in."""
 MAX_BATCH = 5_000
 """Points at which the likelihood is computed at once."""
 

@@ -20,7 +20,8 @@ from stiction.random.fields import RandomField, RandomInterface, as_random_inter
 from stiction.random.marginals import affine_parameters
 
 TAIL_PROBABILITY = 1e-4
-"""Probability that is cut off at an end of a prior if its density is zero there."""
+"""Probability that is cut off at an end of a prior if its density is
+zero there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +141,8 @@ OF_AREA = ("problem.interface.", "problem.specimen.")
 """Beginnings of keys that change the area."""
 PRESSURE = {"problem.load.normal_pressure", "problem.load.pressing_force"}
 SLOPES = {"low": (1, -1), "high": (0, 1), "loc": (1, 0), "scale": (0, 1), "mean": (0, 1)}
-"""Derivatives of location and scale of a marginal by its parameters, see `affine_parameters`."""
+"""Derivatives of location and scale of a marginal by its parameters, see
+`affine_parameters`."""
 
 
 class Scaling(NamedTuple):

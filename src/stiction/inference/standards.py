@@ -35,7 +35,8 @@ from stiction.base.arrays import Array
 DESIGN = 1e-3
 """Probability below the design value of EN 1990."""
 SCATTERS, PER_SPECIMEN = 0.08, 3.5
-"""Coefficient of variation above which EN 1090-2 asks for more specimens, and its divisor, %."""
+"""Coefficient of variation above which EN 1090-2 asks for more
+specimens, and its divisor, %."""
 
 
 def fractile_factor(count: int, probability: float = 0.05) -> float:
