@@ -389,10 +389,10 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
         [c for c in numeric if role_of(c) == "time" or c.name.casefold() == "x_value"],
         [c for c in numeric if is_in(c.unit, "m")], [c for c in numeric if is_in(c.unit, "s")],
     )  # fmt: skip
-    found = next(filter(None, choices), [])
-    if len(found) != 1:
-        raise InputError(unclear(columns, "travel or time", "travel", found))
-    return found[0]
+    chosen = next(filter(None, choices), [])
+    if len(chosen) != 1:
+        raise InputError(unclear(columns, "travel or time", "travel", chosen))
+    return chosen[0]
 
 
 def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:

@@ -220,8 +220,8 @@ def infer(
         raise InputError("random: was not given, so the prior can hold mean and between only")
     # Tests of a single length must be tests of the problem. A posterior
     # from several lengths holds for any problem.
-    (length, *others), size = measured.lengths, problem.interface.measure
-    several = bool(others) or problem.interface.is_plane
+    (length, *further), size = measured.lengths, problem.interface.measure
+    several = bool(further) or problem.interface.is_plane
     if not (several or length is None or math.isclose(length, size)):
         raise InputError(
             f"peaks: the specimens are {length:g} m long, but the problem {size:g} m. Pass the"

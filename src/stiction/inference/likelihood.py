@@ -207,7 +207,7 @@ def simulate(
 def area_of(prior: Prior, method: Any, length: float | None) -> float:
     """Return the area, m², of specimens with a given length, m, or as in the problem if None."""
     least, most = (
-        one.problem.area for one in experiments_at(prior, prior.ends, method, length)
+        ends.problem.area for ends in experiments_at(prior, prior.ends, method, length)
     )
     if least != most:
         raise InputError(

@@ -340,7 +340,7 @@ def _of_table(
     if len(lengths) > 1 or len(names) > 1:
         raise InputError(unclear(columns, "specimen or its length", "value", lengths + names))
     used = {
-        what: found[0] for what, found in (("length", lengths), ("specimen", names)) if found
+        what: group[0] for what, group in (("length", lengths), ("specimen", names)) if group
     }
     if isinstance(normal, str):
         used["normal force"] = stated_column(columns, "normal", normal)
