@@ -115,13 +115,13 @@ def test_a_local_criterion_that_leaves_out_what_the_ends_take_over_is_doubted():
         st.onset(problem, strength, method=LOCAL, progress=False)
 
 
-PLANE = make_problem((48, 40), (0.03, 0.025), weakening_rate=4e11, residual_strength=2e5)
+PLANE = make_problem((32, 28), (0.02, 0.0175), weakening_rate=4e11, residual_strength=2e5)
 
 
 def test_a_plane_with_a_hole_follows_its_rows_and_columns_of_the_stiffness():
     x, y = np.meshgrid(*PLANE.interface.coordinates.values(), indexing="ij")
-    hole = (np.abs(x - 0.01) < 0.001) & (np.abs(y - 0.01) < 0.001)
-    inside = (np.abs(x - 0.015) < 0.0125) & (np.abs(y - 0.012) < 0.011) & ~hole
+    hole = (np.abs(x - 0.006) < 0.001) & (np.abs(y - 0.006) < 0.001)
+    inside = (np.abs(x - 0.01) < 0.0085) & (np.abs(y - 0.0085) < 0.0075) & ~hole
     problem = within(PLANE, inside)
     strength = beta_strength(4e-3).sample(PLANE.interface, seed=2)[0]
     stiffness = dense(symbol_of(problem), inside.shape)
