@@ -24,15 +24,6 @@ def assert_same(found: Mapping[Any, Any], expected: Mapping[Any, Any]) -> None:
         assert one.tobytes() == other.tobytes(), name
 
 
-def assert_close(found: Mapping[Any, Any], expected: Mapping[Any, Any], share: float) -> None:
-    """Arrays of the same names agree within a share of the largest value of each."""
-    assert set(found) == set(expected)
-    for name in found:
-        one, other = (np.asarray(each[name], dtype=float) for each in (found, expected))
-        largest = np.nanmax(np.abs(other), initial=0.0)
-        np.testing.assert_allclose(one, other, rtol=0.0, atol=share * largest, err_msg=name)
-
-
 def assert_second_order(errors: Any, within: float) -> None:
     """Halving a step divides each error by four."""
     for coarse, fine in pairwise(errors):

@@ -112,11 +112,8 @@ def test_grid_transfer_keeps_linear_and_uniform_fields():
 
 
 @pytest.mark.parametrize("nodes", [16, 128])
-def test_onset_close_to_the_weakest_node_or_to_the_mean(nodes):
+def test_onset_close_to_the_weakest_node(nodes):
     one, plane = np.ones((nodes, nodes)), HalfSpaces((0.03, 0.03), moduli(1e9, 0.33))
-    for strength in (0.7e6, 0.9e6):
-        uniform = plane_onset(plane, strength * one, one, RATE * one)
-        assert uniform.lower == uniform.upper == strength
     # So wide a weak strip that the first node to slip is nearly unstable; views of any layout.
     wave = np.asfortranarray(1e6 + 1e5 * np.cos(turns(nodes))[:, None] * one)
     found = plane_onset(plane, wave, np.broadcast_to(1.0, one.shape), RATE * one)

@@ -71,6 +71,12 @@ def test_arrested_events_are_those_of_equilibrium_whatever_the_rate(loading_rate
     expected = [int(np.sum(moment / whole > 5e-3 * unit)) for moment in moments]
     found = rupture(problem, tau_p, loading_rate)
     assert found["arrested_events"].tolist() == expected == [1, 1]
+    exact = exact_onset(problem, tau_p)
+    for name in (
+        "first_instability",
+        "critical_stress",
+    ):  # inertia lifts both, as the rate grows
+        assert found[name] == pytest.approx(exact[name].values, rel=2e-11 * loading_rate)
 
 
 @pytest.mark.parametrize(

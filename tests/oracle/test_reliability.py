@@ -4,11 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from brute_force import BruteForce
 from crooked import LINE
 from importance import by_importance
 from setups import EXACT, LOCAL, beta_strength, ensemble, without
-from specimens import crooked
 
 import stiction as st
 
@@ -111,29 +109,3 @@ def test_two_very_different_interfaces_against_counting_and_each_alone():
     # In the other order they are the same two.
     back = by((problem, pair[::-1]), stress, "plain", 0.1)
     assert back.members[::-1] == pytest.approx(each, rel=0.3, abs=0.05 * each.max())
-
-
-def test_failure_probability_of_a_lap_joint_is_that_of_counting():
-    """Behind a rigid machine, where nodes stop: fields of its own, some by brute force."""
-    drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=math.inf)
-    problem = crooked(
-        nodes=24, height=0.009, weakening_rate=0.04e12, residual=0.2e6, drive=drive
-    )
-    field = st.RandomField(st.Weibull(mean=1e6, cv=0.2), st.PowerLawSpectrum(8e-3))
-    strength = field.sample(problem.interface, samples=1500, seed=11)
-    counted = st.onset(problem, strength, method=EXACT, progress=False)
-    stops = np.isnan(counted.certificate_gap.values) & np.isfinite(
-        counted.first_instability.values
-    )
-    assert stops.mean() > 0.1
-    for i in np.flatnonzero(stops)[:4]:
-        brute = BruteForce(problem, strength[i : i + 1]).run()
-        assert counted.critical_stress[i].item() == pytest.approx(brute.peak, rel=1e-9)
-        assert counted.first_instability[i].item() == pytest.approx(brute.first, rel=1e-9)
-    own, share = counted.critical_stress.values, 0.05
-    stress = float(np.nanquantile(own, share))
-    share = float((own < stress).mean())
-    options = {"method": EXACT, "algorithm": "subset", "target_cv": 0.15}
-    found = st.failure_probability(problem, field, stress, progress=False, **options)
-    error = np.hypot((share * len(own)) ** -0.5, found.cv)
-    assert abs(np.log(found.probability / share)) < 3.5 * error

@@ -168,14 +168,6 @@ def test_an_ensemble_counts_what_survived():
         axis=1
     )
     assert 0 < np.sum(first_slip > top) < np.sum(~failed)
-    stress = 1.001 * top * problem.load_profile.mean()
-    with pytest.warns(st.AccuracyWarning, match=SURVIVED):
-        answer = st.failure_probability(
-            problem, field, stress, method=method, algorithm="plain", target_cv=0.5,
-            max_evaluations=250, progress=False,
-        )  # fmt: skip
-    assert answer.evaluations == 50
-    assert answer.probability == pytest.approx(failed.mean())
 
 
 def test_a_fault_becomes_unstable_where_and_when_its_patch_breaks():
