@@ -183,3 +183,23 @@ def test_no_onset_lies_beyond_the_bounds_whatever_has_a_factor(name):
         problem, random, probability=1e-3, method=LOCAL, sensitivities=False, **ASKED
     ) if key not in REPLACED["critical_slip"] else None  # fmt: skip
     assert answer is None or answer.lower_bound <= onsets.min() * (1.0 + 1e-9)
+
+
+def test_what_a_result_holds_gives_its_numbers_again():
+    """Kept and failing profiles as profiles, and onsets as peaks, of several random properties."""
+    residual, initial = (
+        st.RandomField(st.Beta(alpha=2.0, beta=2.0, low=low, high=high), SPECTRUM)
+        for low, high in ((0.0, 2e5), (-2e4, 5e4))
+    )
+    random = st.RandomInterface(
+        strength=FIELD, residual_strength=residual, initial_stress=initial
+    )
+    drawn = st.monte_carlo(PROBLEM, random, method=EXACT, samples=5, keep=random.names, **QUIET)
+    answer = st.failure_probability(PROBLEM, random, 0.8e6, method=LOCAL, **ASKED)
+    assert (answer.failing_profiles.critical_stress < 0.8e6).all()
+    for result, method in ((drawn, EXACT), (answer.failing_profiles, LOCAL)):
+        again = st.onset(PROBLEM, result[[*random.names]], method=method, **QUIET)
+        np.testing.assert_array_equal(again.critical_stress, result.critical_stress)
+    onsets = drawn.critical_stress
+    labelled, plain = (inferred(FIELD, peaks).mean["mean"] for peaks in (onsets, onsets.values))
+    assert labelled == plain

@@ -67,27 +67,6 @@ def test_a_curve_is_monotone_and_that_of_counting():
     assert np.all(np.abs(np.log(chance[seen] / counts[seen] * 4000.0)) < 4.0 * error)
 
 
-def test_more_that_is_random_is_sampled_with_it():
-    residual, initial = (
-        st.RandomField(
-            st.Beta(alpha=2.0, beta=2.0, low=low, high=high), STRENGTH.spectrum, mean_mode=True
-        )
-        for low, high in ((0.0, 0.3e6), (-0.05e6, 0.05e6))
-    )
-    random = st.RandomInterface(
-        strength=STRENGTH, residual_strength=residual, initial_stress=initial
-    )
-    result = tail(0.68e6, "plain", 0.2, random=random, seed=7)
-    onsets = ensemble(PROBLEM, random, result.evaluations, seed=7)["critical_stress"].values
-    assert result.probability == (onsets < 0.68e6).mean()  # of the samples of the ensemble
-    assert result.cv <= 0.2
-    assert float(result.failing_profiles["critical_stress"].max()) < 0.68e6
-    assert set(result.failing_profiles.data_vars) >= {"strength", "residual_strength"}
-    rare = tail(0.68e6, target_cv=0.15, random=random)
-    error = math.hypot(rare.cv, result.cv)
-    assert abs(math.log(rare.probability / result.probability)) < 4.0 * error
-
-
 INTERFACES = {"line": st.Interface(0.036, 72), "plane": st.Interface((0.02, 0.017), (16, 22))}
 DRIVES = {
     "dead load": st.Platen(),
