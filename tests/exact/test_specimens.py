@@ -270,17 +270,6 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     assert any(f"up to {share:.2g} of the load apart" in text for text in texts)
 
 
-def test_nucleation_length_at_a_free_end_and_in_the_middle():
-    """In units of G*/W; 1.158 in the middle, half of it at an end in mode III."""
-    problem = crooked(nodes=256, height=0.4, mode="III", weakening_rate=0.06e12)
-    places = problem.blocks.windows(0.12e12, 0.12e12)
-    unit = problem.effective_modulus / 0.12e12 / problem.interface.spacing
-    lengths = places.widths / unit
-    assert lengths[0] == pytest.approx(0.579, rel=0.03) == lengths[-1]
-    assert lengths[len(lengths) // 2] == pytest.approx(1.158, rel=0.02)
-    assert places.starts[-1] + places.widths[-1] == 256
-
-
 def test_fields_end_with_the_specimen():
     """Both ends are far from each other, and measured values are met."""
     problem = crooked(nodes=64)

@@ -1,7 +1,5 @@
 """Interfaces that end, beside own dense linear algebra, and beside interfaces that do not."""
 
-from contextlib import nullcontext
-
 import numpy as np
 import pytest
 from checks import assert_same
@@ -142,38 +140,19 @@ RATES = np.where(np.arange(64) == 10, 3.6e11, 2e11)
 
 
 @pytest.mark.parametrize(
-    ("end", "law", "stable"),
+    ("problem", "extent"),
     [
-        (0.03, {"weakening_rate": 3e11, "residual_strength": 2e5}, False),
-        (0.0095, {"weakening_rate": RATES, "residual_strength": 2e5}, True),
+        (PLANE, st.Ellipse(centre=(0.015, 0.012), semi_axes=(0.0024, 0.0034))),
+        (make_problem(64, 0.04, weakening_rate=RATES, residual_strength=2e5), (0.004, 0.0095)),
     ],
+    ids=["ellipse", "line"],
 )
-def test_a_strip_across_a_plane_is_the_line(end, law, stable):
-    """A strip that slides stably too, whose slip grows 200 times as fast as its load."""
-    line = within(make_problem(64, 0.04, **law), (0.004, end))
-    wide = {
-        name: np.transpose([value] * 8) if np.ndim(value) else value
-        for name, value in law.items()
-    }
-    plane = within(make_problem((64, 8), (0.04, 0.005), **wide), ((0.004, end), (0.0, 0.005)))
-    strength = FIELD.sample(line.interface, seed=4)[0]
-    with pytest.warns(st.AccuracyWarning, match="slides stably") if stable else nullcontext():
-        along = exact_onset(line, strength)
-        across = exact_onset(plane, np.repeat(strength[:, None], 8, axis=1))
-    for name in ("critical_load", "critical_stress", "first_instability"):
-        expected = pytest.approx(along[name].item(), rel=2e-6, nan_ok=True)
-        assert across[name].item() == expected
-        assert np.isnan(along[name].item()) == stable
-    for name in ("critical_position", "critical_patch_extent"):
-        assert bool(np.isnan(across[name]).all()) == stable
-
-
-def test_a_small_ellipse_slides_stably():
-    ellipse = st.Ellipse(centre=(0.015, 0.012), semi_axes=(0.0024, 0.0034))
-    strength = beta_strength(4e-3).sample(PLANE.interface, seed=2)[0]
+def test_a_small_extent_slides_stably(problem, extent):
+    strength = beta_strength(4e-3).sample(problem.interface, seed=2)[0]
     with pytest.warns(st.AccuracyWarning, match="slides stably"):
-        found = exact_onset(within(PLANE, ellipse), strength)
-    assert np.isnan(found.first_instability)
+        found = exact_onset(within(problem, extent), strength)
+    for name in ("critical_load", "critical_stress", "first_instability", "critical_position"):
+        assert np.isnan(found[name]).all(), name
 
 
 def test_results_depend_on_the_period_through_the_square_of_extent_over_period():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from rigs import LoadSteps, plain_rig
 
-import stiction as st
 from stiction.elasticity.rig import on_cells
 from stiction.methods.equilibrium.contact_path import (
     LOAD,
@@ -194,42 +193,6 @@ def test_slip_and_weakening_of_one_cell_by_hand():
             while follow(contact, load) != Status.AT_TARGET:
                 assert (W, contact.loads[LOAD]) == (4.0, 2.0)  # the jump
             assert contact.moved[0] == pytest.approx(slip)
-
-
-def test_without_coupling_the_onset_is_that_of_equal_blocks():
-    blocks = st.Problem(
-        solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
-        interface=st.Interface(length=0.1, nodes=64),
-        friction=st.LinearWeakening(weakening_rate=0.1e12, residual_strength=0.3e6),
-        specimen=st.Blocks(height=0.05, drive=st.Pusher(height=0.01, width=0.005)),
-    )
-    field = st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=0.66e6, high=1.66e6),
-        st.PowerLawSpectrum(correlation_length=2e-3),
-    )
-    strength = field.sample(blocks.interface, seed=1, samples=5)
-    solved = st.onset(blocks, strength, method=st.Equilibrium(), progress=False)
-    n, dx = 64, blocks.interface.spacing
-    K, T = np.eye(2 * n + 1), np.zeros(2 * n + 1)
-    K[:n, :n] = blocks.blocks.stiffness * dx
-    T[:n] = blocks.blocks.shear * dx
-    pressure = np.zeros(2 * n + 1)
-    pressure[n:] = -1.0
-    pressure[[n, -1]] *= 0.5  # N is 1 on each cell but at the ends
-    for row, tau_p in enumerate(strength):
-        on_cells = np.ones(n)
-        peak, residual = tau_p * dx / on_cells, np.full(n, 0.3e6 * dx) / on_cells
-        friction = Friction(peak, residual, np.full(n, 0.1e12 * dx))
-        overstress = pressure.copy()
-        overstress[:n] = -peak
-        contact = make_contact(K, T, friction, overstress, np.zeros(2 * n + 1))
-        stops = to_the_end(contact)
-        events = sum(status == Status.ARRESTED for status, _ in stops)
-        assert events == solved.arrested_events[row]
-        assert stops[-1][1][LOAD] == pytest.approx(float(solved.critical_load[row]), rel=1e-13)
-        assert stops[0][1][LOAD] == pytest.approx(
-            float(solved.first_instability[row]), rel=1e-13
-        )
 
 
 def test_stick_widths_of_cattaneo():
