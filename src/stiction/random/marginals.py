@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeAlias
 
 import numpy as np
 import scipy.stats
@@ -385,7 +385,15 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     return ScipyMarginal(name, tuple(values.items()))
 
 
+class FrozenDistribution(Protocol):
+    """A frozen distribution of `scipy.stats`."""
+
+    def ppf(self, q: Any) -> Any: ...
+
+
 MarginalObject: TypeAlias = Annotated[Any, OneOf(MARGINALS, marginal_of), "Marginal"]
-AnyMarginal: TypeAlias = Converted[MarginalObject, Any]
-AnyMarginals: TypeAlias = Converted[dict[str, MarginalObject] | None, Mapping[str, Any] | None]
+AnyMarginal: TypeAlias = Converted[MarginalObject, Marginal | FrozenDistribution]
+AnyMarginals: TypeAlias = Converted[
+    dict[str, MarginalObject] | None, Mapping[str, Marginal | FrozenDistribution] | None
+]
 """A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""
