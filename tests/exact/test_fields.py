@@ -346,9 +346,6 @@ def test_normal_fields_have_the_moments_and_bounds_that_were_given(bounds):
     assert scipy.stats.kstest(values, frozen.cdf).statistic < 0.043
 
 
-LINE = st.Interface(length=0.1, nodes=256)
-
-
 @pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])
 def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
     """A and B are correlated, B and C: the response to each draw, as a matrix, times itself."""

@@ -67,15 +67,6 @@ def test_expectation_and_trend_of_a_map():
     np.testing.assert_allclose(powers[1:], [powers[0]] * 2, rtol=1e-8, atol=1e-12)
 
 
-def test_a_spectrum_is_whole():
-    """What its usual truncation leaves out, 1 % of a rough one, would be taken for noise."""
-    family, window = SpectrumFamily("exponential", {}, 1.0, 0.0, (1e-4, 1.0)), window_of(512)
-    model = family.model(np.log([1.0, 1e-3]), np.array([0.0, 1.0]))
-    rho = window.correlation(model.power(window))[1:64]
-    exact = model.spectrum.untruncated_correlation(SPACING * np.arange(1, 64))
-    np.testing.assert_allclose(rho, exact, atol=5e-4)
-
-
 def test_power_above_the_sampling_wavenumber_is_folded_back():
     """A third of this spectrum's power lies above what its points resolve."""
     rough = st.ExponentialSpectrum(5e-4)
