@@ -78,8 +78,6 @@ def unknown(given: str, valid: Iterable[str]) -> str:
     shown = repr(given) if len(given) <= 60 else f"{given[:57]!r}..."
     near = nearest(given, names)
     hint = f"; did you mean {near!r}?" if near else ""
-    if given == "anisotropy":
-        hint = "; it belongs to RandomField(anisotropy=), next to the spectrum"
     return f"unknown {shown}{hint} (valid: {', '.join(names)})"
 
 

@@ -81,18 +81,9 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
     try:
         return read_regular(path, max_bytes=max_bytes)
     except FileNotFoundError:
-        raise InputError(f"does not exist{_near_file(path)}") from None
+        raise InputError("does not exist") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}") from None
-
-
-def _near_file(path: Path) -> str:
-    """Return a question that suggests a file whose name differs only in case, or ''."""
-    with suppress(OSError):
-        for name in os.listdir(path.parent):
-            if name.casefold() == path.name.casefold():
-                return f"; did you mean {str(path.with_name(name))!r}?"
-    return ""
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
@@ -257,13 +248,8 @@ def _stand_in(weakness: str, name: str) -> Path:
 
 @cache
 def _temporary_folder() -> Path:
-    folder, process = tempfile.mkdtemp(prefix="stiction-"), os.getpid()
-
-    def remove() -> None:
-        if os.getpid() == process:  # not at the end of a fork
-            shutil.rmtree(folder, ignore_errors=True)
-
-    atexit.register(remove)
+    folder = tempfile.mkdtemp(prefix="stiction-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
 
 

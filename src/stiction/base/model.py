@@ -21,6 +21,7 @@ from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
+    ClassVar,
     Generic,
     Literal,
     Protocol,
@@ -361,25 +362,26 @@ def _named_keys(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
         raise named(error, valid_keys(cls)) from None
 
 
-INTERNAL_MEMBERS = (
-    "accepts", "bounded_by_strength", "counted_only", "first_stage", "exact_method", "label",
-    "may_differ", "medium", "prepare", "samples_at_point", "scaling", "search",
-    "seconds_per_sample", "supports", "type", "unfit_as_guide", "variables",
-)  # fmt: skip
-"""Members that a method has for other parts of the package."""
-
-
 class _Listing(ABCMeta):
     """Type of `Listed`."""
 
     def __dir__(cls) -> list[str]:
         """Return public names, less fields, which the signature shows, and internal members."""
-        hidden = {*getattr(cls, "__dataclass_fields__", ()), *getattr(cls, "_internal", ())}
+        hidden = {*getattr(cls, "__dataclass_fields__", ())}
+        for kind in cls.__mro__:
+            if "_shown" in vars(kind):
+                hidden |= {*vars(kind)} - {*vars(kind)["_shown"]}
         return [name for name in super().__dir__() if name not in hidden and name[0] != "_"]
 
 
 class Listed(metaclass=_Listing):
-    """Base of models whose `dir` and `help` show what users need only."""
+    """Base of models whose `dir` and `help` show what users need only.
+
+    `_shown` names the members of a class that users need, by default all.
+    Its other members are for other parts of the package.
+    """
+
+    _shown: ClassVar[tuple[str, ...]]
 
 
 @typing.overload

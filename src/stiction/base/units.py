@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from stiction.base.arrays import Array
-from stiction.base.errors import AccuracyWarning, InputError, UnitWarning, warn_user
+from stiction.base.errors import AccuracyWarning, InputError, UnitWarning, prefixed, warn_user
 from stiction.base.variables import OF_THE_FIELD, QUANTITIES, UNITS
 
 
@@ -125,17 +125,11 @@ def is_in(text: str | None, si: str) -> bool:
     return given is not None and wanted is not None and given.powers == wanted.powers
 
 
-def number_and_unit(text: str) -> tuple[float, str]:
-    """Return the number and the unit, which may be empty, in a text such as '4 cm'."""
-    number, _, unit = text.strip().partition(" ")
-    return float(number), unit
-
-
 def states_unit(text: str) -> bool:
     """Return whether a text is a number, with a known unit or without, such as '4 cm'."""
+    number, _, unit = text.strip().partition(" ")
     with suppress(ValueError):
-        number, unit = number_and_unit(text)
-        return math.isfinite(number) and (not unit or parse(unit) is not None)
+        return math.isfinite(float(number)) and (not unit or parse(unit) is not None)
     return False
 
 
@@ -154,11 +148,6 @@ def conversion(text: str, units: Sequence[str]) -> tuple[float, str]:
         if given.powers == wanted.powers:
             return given.factor / wanted.factor, si
     raise InputError(f"is in {text}, which cannot be converted to {' or '.join(units)}")
-
-
-def factor_to(si: str, text: str) -> float:
-    """Return the factor from the unit `text` to the SI unit `si`."""
-    return conversion(text, (si,))[0]
 
 
 def unit_for(units: str, values: Any) -> tuple[float, str]:
@@ -372,10 +361,8 @@ def profile_in_si(
     parts |= {dim: (value[dim], ("m",), x_unit) for dim in ("x", "y") if dim in value.coords}
     converted, lines = {}, value.attrs.get("lines", ())
     for name, (array, valid, given) in parts.items():
-        try:
+        with prefixed(name, " "):
             converted[name] = in_si(array, valid, given)
-        except InputError as error:
-            raise InputError(f"{name} {text}" for text in error.problems) from None
     values, si = converted.pop(quantity)
     shown = value.values if isinstance(value.data, np.ndarray) else values
     check_measured(values, quantity, lines, shown, doubted)

@@ -33,7 +33,7 @@ from stiction.base.model import (
     is_finite,
 )
 from stiction.base.representation import Result, Row, Summary
-from stiction.base.units import factor_to, is_in, magnitude_in_one_of
+from stiction.base.units import conversion, is_in, magnitude_in_one_of
 from stiction.inference.curves import Curves
 from stiction.inference.standards import standards_of
 from stiction.problem.reading.columns import (
@@ -226,7 +226,7 @@ def factor_of(unit: str, peaks: Any = None) -> float:
     if isinstance(peaks, Peaks | Curves):
         return 1.0
     with prefixed("unit"):
-        return factor_to(si_of(unit), unit)
+        return conversion(unit, (si_of(unit),))[0]
 
 
 def _in_si(given: Any, unit: str) -> Array:

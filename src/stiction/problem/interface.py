@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,12 +196,7 @@ class Interface(Listed):
     width: Positive | None = None
     ends: Literal["periodic", "free"] | None = None
     extent: Extent = None
-    _internal: ClassVar[tuple[str, ...]] = (
-        "axes", "breakable_measure", "cell", "describe_node", "dims", "embedding", "first",
-        "in_plane_share", "inverse_transform", "is_free", "is_held", "is_plane", "lengths",
-        "mean", "measure", "reach", "size", "spacings", "transform", "wave_vectors",
-        "wavenumbers",
-    )  # fmt: skip
+    _shown = "breakable", "coordinates", "shape", "spacing", "x", "y"
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Interface:

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Collection
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import model_validator
@@ -145,11 +145,7 @@ class Problem(Listed):
     load: Load = Load()
     mode: Mode = "II"
     specimen: Specimen | None = None
-    _internal: ClassVar[tuple[str, ...]] = (
-        "blocks", "effective_modulus", "given_pressure", "half_spaces", "has_machine",
-        "load_profile", "nucleation_lengths", "released_stress", "relief",
-        "relief_of_nodes", "rig", "whole_area",
-    )  # fmt: skip
+    _shown = "area", "normal_pressure", "nucleation_length", "sample"
 
     @model_validator(mode="after")
     def _consistent(self) -> Problem:

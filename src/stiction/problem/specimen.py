@@ -33,9 +33,7 @@ def _written(value: float) -> Any:
 Stiffness = Annotated[
     float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.0)
 ]
-Quality = Annotated[
-    float, BeforeValidator(_stiffness), PlainSerializer(_written), Field(ge=0.01)
-]
+Quality = Annotated[Stiffness, Field(ge=0.01)]
 MAX_SIZE_RATIO = 20.0
 """Sizes of a slider and its base over its length above which their unit is probably wrong."""
 MIN_PRESSURE = 1e-6

@@ -104,12 +104,7 @@ class RandomField(Listed):
     anisotropy: Positive | None = None
     quantity: Literal["friction_coefficient"] | None = None
     conditions: Conditions | None = None
-    _internal: ClassVar[tuple[str, ...]] = (
-        "correlation",
-        "modes",
-        "specimens_of_fit",
-        "warn_if_inaccurate",
-    )
+    _shown = "efolding_length", "given", "mean", "quantile", "sample", "standard_deviation"
     specimens_of_fit: ClassVar[int | None] = None
     """Set for `FieldFit.field`: `specimens` of its fit, so that a call can ask for the fit."""
 
@@ -335,10 +330,7 @@ class RandomInterface(Listed):
     normal_pressure: RandomField | None = None
     correlation: Correlation = None  # type: ignore[assignment]  # converted
     between: AnyMarginals = None  # type: ignore[assignment]
-    _internal: ClassVar[tuple[str, ...]] = (
-        "dimension", "draws", "from_draws", "linked", "matrix", "names", "properties",
-        "varying", "warn_if_inaccurate",
-    )  # fmt: skip
+    _shown = ("profiles",)
 
     @field_validator(*NAMES, mode="before")
     @classmethod

@@ -38,7 +38,7 @@ class Marginal(Listed):
     """
 
     family: ClassVar[str] = "marginals"
-    _internal: ClassVar[tuple[str, ...]] = ("check_moments", "family", "of_normal")
+    _shown: ClassVar[tuple[str, ...]] = ("distribution",)
     type: str
     _scipy_family: ClassVar[Any] = None
 
@@ -174,6 +174,7 @@ class Lognormal(_ByMoments):
     """
 
     type: Literal["lognormal"] = "lognormal"
+    _shown = ()
     _scipy_family: ClassVar[Any] = scipy.stats.lognorm
 
     def _shape(self, ratio: float) -> tuple[float, float]:

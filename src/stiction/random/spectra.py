@@ -56,10 +56,7 @@ class SpectralDensity(Listed):
     """Base class for spectra on infinite lines (`dimensions` = 1) and planes (2)."""
 
     family: ClassVar[str] = "spectra"
-    _internal: ClassVar[tuple[str, ...]] = (
-        "cutoff", "default_power", "family", "power_within", "quantile", "scale",
-        "untruncated_correlation",
-    )  # fmt: skip
+    _shown: ClassVar[tuple[str, ...]] = ("correlation", "density", "efolding_length")
 
     @abstractmethod
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
@@ -166,6 +163,7 @@ class ScaledSpectrum(SpectralDensity):
 
     correlation_length: Magnitude
     power_kept: Kept | None = dataclasses.field(default=None, kw_only=True)
+    _shown = "efolding_length", "with_efolding_length"
     default_power: ClassVar[float] = 0.9997
     """Fraction of the power retained by the default truncation."""
 

@@ -184,12 +184,9 @@ class StoredRun:
             # Numbers are written as the shortest text that reads back to
             # the same bits.
             write_whole(place, lambda aside: frame.to_csv(aside, index=False, na_rep="nan"))
-        elif events:
-            raise InputError(
-                f"{place}: a table of events is .csv; .nc holds them without --events"
-            )
         else:
-            raise InputError(f"{place}: the suffix must be .nc or .csv, got {place.suffix!r}")
+            valid = ".csv for a table of events" if events else ".nc or .csv"
+            raise InputError(f"{place}: the suffix must be {valid}, got {place.suffix!r}")
 
 
 # -- files for other programs --------------------------------------------------------------------

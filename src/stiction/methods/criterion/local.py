@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from stiction.base.arrays import Array
 from stiction.base.errors import InputError, warn_accuracy
-from stiction.base.model import INTERNAL_MEMBERS, Listed, checked, model
+from stiction.base.model import Listed, checked, model
 from stiction.base.variables import Variable
 from stiction.elasticity.weakest import weakest_window
 from stiction.methods.criterion.average import averages, least_average
@@ -131,7 +131,7 @@ class LocalCriterion(Listed):
     """
 
     type: Literal["local_criterion"] = "local_criterion"
-    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
+    _shown = ()
     label = "local criterion"
     exact_method: ClassVar[str] = "equilibrium"
     scaling: ClassVar[str] = "affine"

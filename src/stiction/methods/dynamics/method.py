@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, PlainSerializer
 
 from stiction.base.errors import InputError
-from stiction.base.model import (
-    INTERNAL_MEMBERS,
-    Count,
-    Flag,
-    Listed,
-    Number,
-    Positive,
-    Real,
-    model,
-)
+from stiction.base.model import Count, Flag, Listed, Number, Positive, Real, model
 from stiction.base.units import as_numbers
 from stiction.base.variables import Variable
 from stiction.methods.dynamics import checks, specimens
@@ -155,7 +146,7 @@ class Rupture(Listed):
     # Profiles that `Problem.sample` refuses for other methods.
     accepts: ClassVar[tuple[str, ...]] = ("overstress",)
     label = "rupture"
-    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
+    _shown = ()
     counted_only: ClassVar[bool] = True
 
     @pydantic.model_validator(mode="after")

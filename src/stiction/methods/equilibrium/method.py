@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 from numpy.typing import NDArray
 from pydantic import Field
 
-from stiction.base.model import INTERNAL_MEMBERS, Flag, Listed, Number, Real, model
+from stiction.base.model import Flag, Listed, Number, Real, model
 from stiction.base.variables import Variable
 from stiction.methods.equilibrium.events import event_variables, of_samples
 from stiction.methods.equilibrium.slider import OF_SLIDERS, SliderSolver, push_variables
@@ -128,7 +128,7 @@ class Equilibrium(Listed):
     scaling: ClassVar[str] = "stretch"
     samples_at_point: ClassVar[int] = 500
     label = "equilibrium"
-    _internal: ClassVar[tuple[str, ...]] = INTERNAL_MEMBERS
+    _shown = ()
 
     def seconds_per_sample(self, problem: Problem) -> float:
         """Return the approximate time for a sample on a core, s."""

@@ -64,9 +64,8 @@ class FrictionLaw(Listed):
     """
 
     family: ClassVar[str] = "laws"
-    _internal: ClassVar[tuple[str, ...]] = (
-        "critical_slip_of", "dissipated", "family", "linear", "plateau", "reach",
-        "residual", "scale", "uniform_weakening_rate", "weakening_rate_of",
+    _shown: ClassVar[tuple[str, ...]] = (
+        "area", "fraction", "initial_slope", "integral", "parameters", "slip_at", "steepening",
     )  # fmt: skip
     weakening_rate: OptionalProfile = None  # type: ignore[assignment]  # converted
     critical_slip: OptionalProfile = None  # type: ignore[assignment]
@@ -332,9 +331,7 @@ class PiecewiseWeakening(FrictionLaw):
     slip: Corners
     strength: Corners
     type: Literal["piecewise"] = "piecewise"
-    _internal: ClassVar[tuple[str, ...]] = (
-        *FrictionLaw._internal, "area", "corners", "parameters", "slip_at", "steepening",
-    )  # fmt: skip
+    _shown = "fraction", "from_law", "initial_slope", "integral"
 
     @model_validator(mode="after")
     def _falling(self) -> PiecewiseWeakening:
