@@ -120,11 +120,6 @@ def _profile(value: Any, info: pydantic.ValidationInfo) -> Any:
         raise ValueError(SI_NUMBER)
     if isinstance(value, str | Path | dict) and read is not None:
         value = read(value, str(info.field_name))
-    if isinstance(value, str | Path | dict):
-        raise ValueError(
-            "files, and tables with the key 'file', belong in a study file. In Python give a"
-            " number, an array or st.read_profile(path)"
-        )
     if is_unplaced(value):
         return value
     if isinstance(value, numbers.Real) or is_finite(value):

@@ -34,7 +34,9 @@ from stiction.base.model import (
     Text,
     check,
     checked,
+    describe,
     explain,
+    keys_of,
     model,
     to_plain,
 )
@@ -60,8 +62,12 @@ from stiction.study.sweep import SWEPT, Point, Sweep, grid_axes
 if TYPE_CHECKING:
     import xarray as xr
 
+TABLES = "problem", "random", "method"
+"""Tables that a study file must have."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
 """Bytes of a study file, bytes apart from lists of numbers, and dots in a line of those bytes."""
+SHOWN_KEYS = 10
+"""Keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 """A line that holds numbers, or a key and numbers."""
 MOST_WRITTEN = 8
@@ -486,6 +492,12 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) -> Study:
     """Return the study in plain form. Its files are in `folder`, and are added to `files`."""
     check("study", given, dict)
+    if given and not {*keys_of(Study)} & {*given}:
+        some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))
+        raise InputError(
+            f"study: must have the tables {', '.join(TABLES)}, got {some}. `stiction example FILE`"
+            " writes a study to start from"
+        )
     context = {}
     if folder is not None:
 

@@ -22,7 +22,6 @@ SWEPT = "problem", "random", "method", "seed"
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
 """Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
-FIXED = "samples", "keep"
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
@@ -94,9 +93,7 @@ def read_axes(given: Any) -> list[Axis]:
     for key in keys:
         table = key.split(".")[0]
         inside = [longer for longer in keys if f"{longer}.".startswith(f"{key}.")]
-        if key in FIXED:
-            problems[f"{key}: cannot be swept"] = None
-        elif table not in SWEPT:
+        if table not in SWEPT:
             problems[unknown_name(key, table, SWEPT)] = None
         elif len(inside) > 1:
             problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
