@@ -93,14 +93,12 @@ def _differences(
         if not solved.size:
             return {}
         # 2.
-        may_differ = False
         for rows in chosen.values():
             draws = np.concatenate([experiment.draws(row, 1) for row in rows.tolist()])
             sample = experiment.sample(experiment.profiles(draws))
             if optional_member(method, "may_differ")(problem, sample, stress[rows]):
-                may_differ = True
                 break
-        if not may_differ:
+        else:
             return {}
         # 3.
         some = np.unique(np.concatenate(list(chosen.values())))

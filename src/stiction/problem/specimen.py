@@ -193,8 +193,7 @@ class Blocks(Listed):
 
     @model_validator(mode="after")
     def _consistent(self) -> Blocks:
-        drive, problems = self.drive, []
-        problems += _beyond_side(drive, self.height)
+        drive, problems = self.drive, _beyond_side(self.drive, self.height)
         if self.thickness is None and (drive.mass or 0.0 < drive.stiffness < math.inf):
             problems.append(
                 "thickness: is needed with drive.mass, and unless drive.stiffness is 0 or inf"

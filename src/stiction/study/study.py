@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from concurrent.futures import Executor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import pydantic
@@ -22,6 +22,7 @@ from stiction.base.errors import InputError, StoreError, prefixed
 from stiction.base.files import content_of, write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
+    Converted,
     Count,
     FilePath,
     Flag,
@@ -193,12 +194,6 @@ class Question:
         return design_stress(experiment.problem, experiment.random, **options)
 
 
-if TYPE_CHECKING:  # a table becomes a question
-    QuestionTable: TypeAlias = Any
-else:
-    QuestionTable = Question
-
-
 @model(kw_only=True)
 class _Parts(Listed):
     """The parts of a study at a sweep point. Each part is valid by itself."""
@@ -253,7 +248,7 @@ class Study(_Parts):
     samples: Samples = 1
     keep: Names = ()
     sweep: Sweep = ()
-    reliability: QuestionTable | None = None
+    reliability: Converted[Question | None, Any] = None  # type: ignore[assignment]  # converted
     peaks: PeaksOfStudy | None = None
     title: Text = ""
     _shown = "from_result", "from_toml", "run", "to_toml"

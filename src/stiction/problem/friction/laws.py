@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -515,8 +515,5 @@ def _law(value: Any) -> Any:
     return NotImplemented if isinstance(value, dict) else value
 
 
-if TYPE_CHECKING:
-    Friction: TypeAlias = FrictionLaw
-else:
-    Friction = Annotated[Any, OneOf(LAWS, _law, default="linear"), "FrictionLaw"]
+Friction: TypeAlias = Annotated[FrictionLaw, OneOf(LAWS, _law, default="linear"), "FrictionLaw"]
 """Any friction law. In a study file ``type`` selects it (default: linear)."""
