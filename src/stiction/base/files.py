@@ -81,9 +81,18 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
     try:
         return read_regular(path, max_bytes=max_bytes)
     except FileNotFoundError:
-        raise InputError("does not exist") from None
+        raise InputError(f"does not exist{_near_file(path)}") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}") from None
+
+
+def _near_file(path: Path) -> str:
+    """Return a question that suggests a file whose name differs only in case, or ''."""
+    with suppress(OSError):
+        for name in os.listdir(path.parent):
+            if name.casefold() == path.name.casefold():
+                return f"; did you mean {str(path.with_name(name))!r}?"
+    return ""
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:

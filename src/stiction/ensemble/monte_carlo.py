@@ -12,9 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from stiction.base.errors import InputError, RunError, Warned, merge_warnings, warn_accuracy
+from stiction.base.errors import (
+    InputError,
+    RunError,
+    Warned,
+    merge_warnings,
+    warn_accuracy,
+    warn_user,
+)
 from stiction.base.model import Count, Flag, Names, Number, Progress, checked
-from stiction.base.progress import Meter, Show
+from stiction.base.progress import Meter, Show, duration
 from stiction.ensemble.batches import solve_spans, spans_of, usable_cores
 from stiction.ensemble.dataset import Gathered, GridAxes, distinct
 from stiction.ensemble.experiment import Experiment
@@ -31,6 +38,8 @@ if TYPE_CHECKING:
 Samples: TypeAlias = Annotated[Count, Field(le=10**10)]
 MAX_SHOWN_FAILURES = 3
 """Number of failures that a warning lists."""
+LONG_RUN_SECONDS = 3600.0
+"""Estimated seconds above which a run says so before it begins."""
 MAX_FAILED_FROM_START = 16
 """Failed items after which a run without any solved item is given up."""
 
@@ -46,6 +55,19 @@ def check_run(points: Sequence[Experiment]) -> None:
     """Check the fields, and prepare the method, before the first sample of a run."""
     check_fields(points)
     points[0].prepare()  # in this thread, so that it warns at the line of the caller
+
+
+def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
+    """Warn, before it begins, about an ensemble that takes hours."""
+    # Points of a sweep may take different times for a sample.
+    counts = missing.sum(axis=1)
+    seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
+    if seconds > LONG_RUN_SECONDS:
+        warn_user(
+            f"samples: {int(missing.sum()):,} samples take about {duration(seconds)} on {workers}"
+            f" core{'s' * (workers > 1)}",
+            UserWarning,
+        )
 
 
 def complete(
@@ -113,6 +135,8 @@ def gather(
     missing = ~(elsewhere | rows.done)
     if missing.any():
         check_run(points)
+        if executor is None:
+            _warn_if_long(points, missing, cores)
     complete(rows, missing, store=store, executor=executor, workers=cores, progress=progress)
     # A stored run is compared once, by the
     # first process that finishes its part.
