@@ -3,13 +3,12 @@
 import base64
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import date
-from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import Any
 
+import jinja2
 import numpy as np
 import pandas as pd
 import tomli_w
@@ -43,43 +42,43 @@ CONTROLS = {
 """Letters that steer terminals, because a terminal may print a page."""
 
 
+@dataclass
 class Page:
     """Text, figures, tables and listings in the order in which they are added."""
 
-    def __init__(self, title: str) -> None:
-        self.title = title
-        self.parts: list[str] = []
+    title: str
+    parts: list[dict[str, Any]] = field(default_factory=list)
 
-    def text(self, text: str, kind: str = "text") -> None:
+    def text(self, text: str, *, warning: bool = False) -> None:
         """Add a paragraph."""
-        self.parts.append(f'<p class="{kind}">{escape(text)}</p>')
+        self.parts.append({"kind": "text", "text": text, "warning": warning})
 
     def figure(self, figure: Figure, caption: str) -> None:
         """Add a figure as a picture."""
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=150)
-        data, text = base64.b64encode(buffer.getvalue()).decode("ascii"), escape(caption)
-        self.parts.append(
-            f'<figure>\n<img alt="{text}" src="data:image/png;base64,{data}">\n'
-            f"<figcaption>{text}</figcaption>\n</figure>"
-        )
+        data = base64.b64encode(buffer.getvalue()).decode("ascii")
+        self.parts.append({"kind": "figure", "caption": caption, "data": data})
 
     def table(self, title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
         """Add a table. Its numbers are shown with five digits."""
-        self.parts.append(f'<h2>{escape(title)}</h2>\n<div class="wide"><table>')
-        for tag, entries in (("th", columns), *(("td", row) for row in rows)):
-            cells = (f"<{tag}>{escape(shown(entry))}</{tag}>" for entry in entries)
-            self.parts.append(f"<tr>{''.join(cells)}</tr>")
-        self.parts.append("</table></div>")
+        cells = [[shown(entry) for entry in row] for row in rows]
+        self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
 
     def listing(self, title: str, text: str) -> None:
         """Add the text of a file."""
-        self.parts.append(f"<h2>{escape(title)}</h2>\n<pre>{escape(text)}</pre>")
+        self.parts.append({"kind": "listing", "title": title, "text": text})
 
     def write(self, path: Path) -> None:
         """Write the page to a file, completely or not at all."""
-        frame = Template(files("stiction.cli").joinpath("page.html").read_text("utf-8"))
-        page = frame.substitute(title=escape(self.title), body="\n".join(self.parts))
+        environment = jinja2.Environment(
+            loader=jinja2.PackageLoader("stiction.cli"),
+            autoescape=True,
+            trim_blocks=True,
+            lstrip_blocks=True,
+            undefined=jinja2.StrictUndefined,
+        )
+        page = environment.get_template("page.html.j2").render(page=self)
         write_whole(path, page.translate(CONTROLS).encode())
 
 
@@ -106,7 +105,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     page = Page(run.study.title or "Onset of sliding: a Monte Carlo study")
     page.text(f"{state.done:,} of {state.samples:,} samples by {run.methods}.")
     if not state.complete:
-        page.text("The run is not complete.", kind="warning")
+        page.text("The run is not complete.", warning=True)
     axes, profiles = run.study.axes, run.study.profiles
     result = run.dataset(only=[*REPORTED, "critical_position", "critical_load"])
     with paper_style():
