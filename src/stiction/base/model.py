@@ -467,14 +467,10 @@ def checked(function: Function) -> Function:
     return typing.cast(Function, call)
 
 
-class _Plain:
-    """An annotation that is shown as a name."""
+class _Plain(str):
+    """An annotation that is shown as a name, without quotation marks."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def __repr__(self) -> str:
-        return self.name
+    __repr__ = str.__str__
 
 
 def plain_name(hint: Any) -> str:

@@ -15,11 +15,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self, TypeAlias, runtime_checkable
+from typing import Annotated, Any, Protocol, Self, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, SkipValidation
 from scipy.special import ndtr, ndtri
 
 from stiction.base.arrays import Array
@@ -125,12 +125,10 @@ def _known(given: Any) -> Any:
     return interfaces
 
 
-if TYPE_CHECKING:
-    AnyRandom: TypeAlias = (
-        RandomInterface | RandomField | Source | Sequence[RandomInterface | RandomField]
-    )
-else:
-    AnyRandom = Annotated[Any, BeforeValidator(_known), "RandomInterface | RandomField | list"]
+AnyRandom: TypeAlias = Annotated[
+    RandomInterface | RandomField | Source | Sequence[RandomInterface | RandomField],
+    SkipValidation, BeforeValidator(_known), "RandomInterface | RandomField | list",
+]  # fmt: skip
 """A random interface or field, a list of equally likely interfaces, or their source."""
 
 
