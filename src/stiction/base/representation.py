@@ -158,10 +158,7 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the public fields as dicts, lists and numbers for JSON. NaN becomes None."""
-        plain: dict[str, Any] = to_jsonable_python(
-            _public(self), inf_nan_mode="null", fallback=_plain
-        )
-        return plain
+        return to_jsonable_python(_public(self), inf_nan_mode="null", fallback=_plain)
 
     __eq__, __hash__ = equal, hash_of
 

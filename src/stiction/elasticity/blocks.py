@@ -188,8 +188,7 @@ def _rollers_correction(harmonics: Harmonics, effective: float, nodes: int) -> A
     end = even[mirrored] + np.outer(x, x) * odd[mirrored]
     kernel = along[np.abs(i[:, None] - i)] + end + end[::-1, ::-1]
     kernel += harmonics.reflected(harmonics.k, SLOPE, x, SLOPE, x)
-    scaled: Array = 0.5 * effective / harmonics.height * kernel
-    return scaled
+    return 0.5 * effective / harmonics.height * kernel
 
 
 def _glued(top: GluedTop, nodes: int) -> tuple[Array, Array, float]:
@@ -280,8 +279,7 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
         traction = narrowed - narrowed.sum() / shifted.sum() * shifted
         x = (np.arange(nodes) + 0.5) * length / nodes
         pressure = 1.0 - top.step * top.normal(x) @ traction
-    scaled: Array = pressure / pressure.mean()
-    return scaled
+    return pressure / pressure.mean()
 
 
 def _anti_plane(
@@ -336,8 +334,7 @@ def lattice_symbol(angle: Array) -> Array:
     entries of the lattice symbol except the diagonal are negative.
     """
     s = np.abs(np.sin(0.5 * angle))
-    symbol: Array = 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
-    return symbol
+    return 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
 
 
 def lattice_entries(count: int) -> Array:
@@ -370,5 +367,4 @@ def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     edge = np.arange(nodes + 1.0)
     share = np.outer(edge, edge) / np.maximum(np.add.outer(edge, edge), 1.0) ** 2
     rest = np.diff(np.diff(share, axis=0), axis=1) * (2.0 / np.pi)
-    stiffness: Array = (0.5 * modulus / spacing) * (both - rest - rest[::-1, ::-1])
-    return stiffness
+    return (0.5 * modulus / spacing) * (both - rest - rest[::-1, ::-1])

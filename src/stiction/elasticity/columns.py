@@ -158,8 +158,7 @@ def eliminated(matrix: Array, kept: Mask) -> Array:
     """Return the Schur complement of a symmetric matrix on the rows that are kept."""
     factor = cholesky(matrix[np.ix_(~kept, ~kept)], lower=True)
     half = solve_triangular(factor, matrix[np.ix_(~kept, kept)], lower=True)
-    complement: Array = matrix[np.ix_(kept, kept)] - half.T @ half
-    return complement
+    return matrix[np.ix_(kept, kept)] - half.T @ half
 
 
 class Columns(NamedTuple):
@@ -281,8 +280,7 @@ def block(
             outside = (points == 0) | ((points == last_point) & (far == "free"))
             outside &= (lines >= 0) & (lines <= last)
             border = borders & ((lines < 2) | (lines // 2 == length))
-            result: Mask = outside | border | (labels == PUSH)
-            return result
+            return outside | border | (labels == PUSH)
 
         return kept
 

@@ -69,8 +69,7 @@ class Driven:
 
     def mean_relief(self, slip: Array) -> Array:
         """Return h <q, d>/n, by which slip (..., n) lowers the mean stress, Pa."""
-        mean: Array = self.relief * (slip * self.shear).mean(axis=-1)
-        return mean
+        return self.relief * (slip * self.shear).mean(axis=-1)
 
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows at the lowest weakening rate (Pa/m), with their places."""

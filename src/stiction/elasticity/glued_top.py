@@ -122,13 +122,11 @@ class GluedTop:
         points = self._traction, self.x
         remainder = harmonics.reflected(1.0 / harmonics.k, *points, *points)
         matrix -= self.step * (kappa + 1.0) ** 2 / 16.0 * remainder
-        scaled: Array = matrix / (self.modulus * harmonics.height * (kappa + 1.0))
-        return scaled
+        return matrix / (self.modulus * harmonics.height * (kappa + 1.0))
 
     def solve(self, displacement: Array) -> Array:
         """Step 3: return t dx/dz (Pa m) for displacements u (m) with shape (points, cases)."""
-        traction: Array = scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
-        return traction
+        return scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
 
     def shear(self, x: Array) -> Array:
         """Return the shear stress at places on the interface due to unit t at a point, 1/m."""
@@ -146,8 +144,7 @@ class GluedTop:
             stress += (place - point) * sums.first + 2.0 * place * point * sums.second
         remainder = harmonics.reflected(harmonics.at_top, SLOPE, x, self._traction, self.x)
         stress -= 0.25 * (kappa + 1.0) * remainder
-        scaled: Array = stress * 2.0 / ((kappa + 1.0) * harmonics.height)
-        return scaled
+        return stress * 2.0 / ((kappa + 1.0) * harmonics.height)
 
     def normal(self, x: Array) -> Array:
         """Return s_yy on the interface of a pressed block due to unit t at a point, 1/m.
@@ -168,5 +165,4 @@ class GluedTop:
             stress += sign * 2.0 * place * point * sums.second
         remainder = harmonics.reflected(harmonics.at_top, CURVATURE, x, self._traction, self.x)
         stress += 0.25 * (kappa + 1.0) * remainder
-        scaled: Array = stress * 2.0 / ((kappa + 1.0) * harmonics.height)
-        return scaled
+        return stress * 2.0 / ((kappa + 1.0) * harmonics.height)

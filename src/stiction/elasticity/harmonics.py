@@ -154,5 +154,4 @@ class Harmonics:
         remainder, at (x, s)."""
         # The remainder couples the solutions in x with the solutions in s.
         left = self.solutions(along_x, x) @ (weights[:, None, None] * self._remainder)
-        total: Array = np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))
-        return total
+        return np.tensordot(left, self.solutions(along_s, s), ((0, 2), (0, 2)))

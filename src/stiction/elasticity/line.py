@@ -89,8 +89,7 @@ class Line:
 
     def block(self, nodes: Array) -> Array:
         """Return K between some nodes, Pa/m."""
-        block: Array = self.entries.column[np.abs(np.subtract.outer(nodes, nodes))]
-        return block
+        return self.entries.column[np.abs(np.subtract.outer(nodes, nodes))]
 
     def windows(self, low: float, high: float) -> Windows:
         """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""

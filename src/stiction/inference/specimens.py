@@ -211,8 +211,7 @@ class Onsets:
             deviation = np.maximum(error / peaks, LEAST_DEVIATION)[:, None]
             onsets = np.log(self.area * self.ratios[field].mean(axis=1))
             away = np.log(peaks)[:, None] - x - np.interp(x, self.at, onsets)
-            normal: Array = -0.5 * (away / deviation) ** 2 - np.log(deviation * peaks[:, None])
-            return normal
+            return -0.5 * (away / deviation) ** 2 - np.log(deviation * peaks[:, None])
         known, near = (
             self.densities[field],
             corners([Axis(0, self.at, np.positive)], x[:, None]),

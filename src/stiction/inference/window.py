@@ -170,8 +170,7 @@ class RecordWindow:
         def density(k: Array) -> Array:
             """Return the density, which fades out at its end."""
             fade = np.minimum(np.maximum((end - k) / width + 0.5, 0.0), 1.0)
-            faded: Array = spectrum.density(k, dimensions) * fade
-            return faded
+            return spectrum.density(k, dimensions) * fade
 
         total = folded(density, axes, folds, sampling, end + width)
         missed = 0.0
@@ -223,8 +222,7 @@ def _folded_line(
     """Return the sum of the density over all wavenumbers with the same alias on the grid."""
 
     def added(at: Array, multiples: Array) -> Array:
-        total: Array = density(np.abs(at + multiples[:, None] * sampling[0])).sum(axis=0)
-        return total
+        return density(np.abs(at + multiples[:, None] * sampling[0])).sum(axis=0)
 
     near = min(folds[0], NEAR)
     line = added(axes[0], np.arange(-near, near + 1))

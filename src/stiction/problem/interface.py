@@ -284,10 +284,9 @@ class Interface(Listed):
 
     def mean(self, profiles: Array) -> Array:
         """Return means of profiles (..., *shape) over the nodes that can break."""
-        means: Array = (
+        return (
             profiles[..., self.breakable].mean(-1) if self.is_held else profiles.mean(self.axes)
         )
-        return means
 
     @property
     def breakable_measure(self) -> float:

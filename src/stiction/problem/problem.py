@@ -322,8 +322,7 @@ class Problem(Listed):
         """
         interface, can_break = self.interface, self.interface.breakable
         profile = np.broadcast_to(self.load_profile, interface.shape)[can_break].sum()
-        relief: Array = self.released_stress(1.0 * can_break).reshape(-1) / profile
-        return relief
+        return self.released_stress(1.0 * can_break).reshape(-1) / profile
 
     @cached_property
     def half_spaces(self) -> HalfSpaces:

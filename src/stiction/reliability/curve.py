@@ -181,8 +181,7 @@ def chances(smallest: float) -> Array:
     # power of ten.
     decades = max(np.log10(COMMONEST / smallest), 0.0)
     count = int(np.ceil(decades * PER_DECADE)) + 1
-    probabilities: Array = COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
-    return probabilities
+    return COMMONEST * 10.0 ** -np.linspace(0.0, decades, count)
 
 
 def curve_of(

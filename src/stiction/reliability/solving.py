@@ -274,8 +274,7 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
 def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """Return up to `count` positions of distinct values, in random order."""
     _, first = np.unique(values, return_index=True)  # chains repeat states
-    chosen: NDArray[np.int64] = rng.permutation(first)[:count]
-    return chosen
+    return rng.permutation(first)[:count]
 
 
 def exact_doubts(point: TailPoint) -> list[str]:

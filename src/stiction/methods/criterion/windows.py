@@ -154,8 +154,7 @@ def grid_weights(half_width: float) -> Array:
     importance[0] = WEIGHT_OF_SUM
     missing = transform - np.fft.rfft(around(w, 2 * half)).real
     w[inner:], _ = nnls(columns * importance[:, None], missing * importance)
-    result: Array = w * (transform[0] / np.fft.rfft(around(w, 2 * half)).real[0])
-    return result
+    return w * (transform[0] / np.fft.rfft(around(w, 2 * half)).real[0])
 
 
 def around(w: Array, nodes: int) -> Array:

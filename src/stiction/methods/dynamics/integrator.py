@@ -93,8 +93,7 @@ class Run:
         """Return the strength after a slip (m), Pa."""
         nodes, law = self.setting.nodes, self.setting.law
         peak, residual, W = nodes.peak, nodes.residual, nodes.weakening_rate
-        strength: Floats = strengths(law, peak, residual, W, slip)
-        return strength
+        return strengths(law, peak, residual, W, slip)
 
     def scale_at(self, load: float) -> float:
         """Return the stress scale, Pa, at a load, or at `least_load` if it is larger."""

@@ -111,8 +111,7 @@ class DenseSearch:
         if not hasattr(self._of_thread, "workspaces"):
             elements = (self.elastic.entries, self.nodes)
             self._of_thread.workspaces = make_workspace(*elements), make_workspace(*elements)
-        pair: tuple[Workspace, Workspace] = self._of_thread.workspaces
-        return pair
+        return self._of_thread.workspaces
 
     def bound(self, sample: StaticSample) -> tuple[float, Array]:
         """Return the bound from the weakest window of a sample (Pa), and its multiplier."""

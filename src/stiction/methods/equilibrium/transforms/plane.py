@@ -363,5 +363,4 @@ class PlaneSearch:
     def stress_released(self, state: EquilibriumState) -> Array:
         symbol = self.elastic.symbol(self.shape)
         slip = state.slip.reshape(self.shape)
-        released: Array = np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
-        return released
+        return np.fft.irfft2(symbol * np.fft.rfft2(slip), self.shape).reshape(-1)
