@@ -54,7 +54,7 @@ def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray
     """Return a mask (points, samples) of the samples in a part. Parts take blocks in turn."""
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
-    mine: NDArray[np.bool_] = np.arange(total) // block % of == number - 1
+    mine = np.arange(total) // block % of == number - 1
     return mine.reshape(points, samples)
 
 
