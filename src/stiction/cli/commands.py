@@ -43,8 +43,8 @@ Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
 ]
 TIMED_POINTS, TIMING_SECONDS, SLOW_SECONDS = 5, 0.2, 3.0
-"""Points of a sweep that `check` times, processor time of each, s, and estimate of the seconds
-of a sample above which it does not time."""
+"""Points of a sweep that `check` times, least processor time of the last batch at each, s, and
+estimate of the seconds of a sample above which it does not time."""
 COMPARED_SAMPLES = 1_000
 """Samples with which measured peaks are compared."""
 
@@ -321,16 +321,24 @@ def _cost(study: Any) -> dict[str, str]:
 
 
 def _seconds(point: Any) -> float:
-    """Return the processor time of a sample, s, or its estimate if samples are slow or fail."""
-    seconds: list[float] = []
+    """Return the processor time of a sample, s, or its estimate if samples are slow or fail.
+
+    The batches double until the last batch takes long enough. Only the
+    last batch counts, because kernels compile in the first batches.
+    """
+    seconds, first, count = point.seconds, 0, 1
     with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():
-        if point.seconds < SLOW_SECONDS:
-            point.results(0, 1)  # compiles
-        while point.seconds < SLOW_SECONDS and sum(seconds) < TIMING_SECONDS:
+        while point.seconds < SLOW_SECONDS:
             begin = time.thread_time()
-            point.results(len(seconds), 1)
-            seconds.append(time.thread_time() - begin)
-    return max(sum(seconds) / len(seconds), 1e-9) if seconds else point.seconds
+            point.results(first, count)
+            seconds = (time.thread_time() - begin) / count
+            first += count
+            # Among single samples, the first compiles.
+            enough = first > 1 if point.seconds > TIMING_SECONDS else count >= point.batch
+            if enough or (count > 2 and seconds * count >= TIMING_SECONDS):
+                break
+            count = min(2 * count, point.batch) if point.seconds < TIMING_SECONDS else 1
+    return max(seconds, 1e-9)
 
 
 # -- failure probabilities -----------------------------------------------------------------------
