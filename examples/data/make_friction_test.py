@@ -2,8 +2,8 @@
 
 Nothing here was measured. Nine interfaces are samples of one random field. The first was scanned:
 its strength gets the noise of a sensor and lost readings, -9999, and is written with few digits.
-Eight were sheared in the rig of the tutorial: each equilibrium path gets sliding at its end and the
-noise of a load cell, and is written as by a testing machine that counts time.
+Eight were sheared in the rig of the tutorial: each equilibrium path gets sliding at its residual
+strength and the noise of a load cell, and is written as by a testing machine that counts time.
 
     python examples/data/make_friction_test.py
 """
@@ -28,7 +28,6 @@ FIELD = st.RandomField(
 )
 SENSOR, CELL = 20e3, 0.15  # noise, Pa and N
 RATE, SPEED = 20.0, 1e-6  # readings per second, m/s
-KINETIC = 0.82  # force of sliding over that at the peak
 LOST = slice(140, 144)
 
 
@@ -56,7 +55,8 @@ def curve(number: int, strength: np.ndarray) -> list[str]:
     travel, force = travel[known], force[known]
     rng = np.random.default_rng(number)
     at = np.arange(0.0, 1.3 * travel[-1], SPEED / RATE)
-    values = np.where(at > travel[-1], KINETIC * force.max(), np.interp(at, travel, force))
+    sliding = PROBLEM.friction.residual_strength * 0.1 * 0.006  # N, on 100 mm by 6 mm
+    values = np.where(at > travel[-1], sliding, np.interp(at, travel, force))
     values = values + CELL * rng.standard_normal(at.size)
     head = [f"Test;{number}", "Crosshead speed;1;um/s", "Time (s);Force (kN)"]
     return head + [f"{x / SPEED:.3f};{f * 1e-3:.6f}" for x, f in zip(at, values, strict=True)]
