@@ -1,6 +1,6 @@
 """I have a criterion of my own: how does it fare against the exact onset?
 
-A method is a frozen dataclass with the seven members of `stiction.extensions.Method`. This one says
+A method is a frozen dataclass with the members of `stiction.extensions.Method`. This one says
 that the interface slides when the mean strength over a window of given length is reached somewhere.
 """
 
