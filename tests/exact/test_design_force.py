@@ -129,3 +129,26 @@ def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
     given = LOCAL | {"probability": 1e-2, "target_cv": 0.2}
     low, high = st.design_stress(LINE, posterior, seed=1, **given).interval["stress"]
     assert low < exact < high
+
+
+@pytest.mark.parametrize(
+    "law", [{"critical_slip": 9e-5}, {"critical_slip": 5e-5, "residual_ratio": 0.4}]
+)
+def test_a_uniform_specimen_slides_at_its_strength_by_any_law(law):
+    """So the law moves no probability, also far below the simulated mean strengths."""
+    peaks, options = [27.3e3, 29.1e3, 25.8e3, 31.4e3, 28.2e3], {"seed": 1, "progress": False}
+    answers = []
+    for weakening in ({"weakening_rate": 1e11}, law):
+        problem = make_problem(
+            256, 0.173, width=0.023, load=st.Load(pressing_force=117e3), **weakening
+        )
+        source = st.infer(problem, None, peaks, unit="N", between="normal", **options)
+        answers.append(
+            [
+                st.failure_probability(problem, source, force=force, progress=False).probability
+                for force in (1e3, 1e4, 19e3, 28e3, 60e3)
+            ]
+        )
+    assert (np.diff(answers) > 0.0).all()
+    # Onsets in the middle of the range are interpolated between means, to 1e-9.
+    assert answers[1] == pytest.approx(answers[0], rel=1e-6)

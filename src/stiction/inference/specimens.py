@@ -17,6 +17,7 @@ In the steps, x = log(m b/reference) is the log strength of one specimen:
 1. Simulate onsets T of each field at the reference mean. This is
    sufficient if T(c)/c does not depend on c. Otherwise simulate at
    `ONSET_MEANS` means and interpolate T(c)/c, sample by sample.
+   T(c)/c is constant beyond these means.
 2. Tabulate the likelihood of each measured number over x:
    the normal density for the logarithm of a level, or the density of
    simulated onsets at a peak (`stiction.inference.density`).
@@ -497,6 +498,9 @@ class Prediction(NamedTuple):
             at = log_peak - logs[:, 0]
             if known.at.size > 1:
                 at = np.array([[np.interp(log_peak, s, known.at) for s in f.T] for f in logs])
+                # Beyond the simulated means T(c)/c is that of the ends.
+                at += np.minimum(log_peak - logs[:, 0], 0.0)
+                at += np.maximum(log_peak - logs[:, -1], 0.0)
             pairs = zip(at, below, strict=True)
             shares = [np.interp(row, x, part).sum() for row, part in pairs]
             return float(sum(shares)) / logs.shape[2]
