@@ -38,7 +38,7 @@ WHOLE = ("nodes", "events", "samples", "seed", "first", "every", "max_steps", "w
 WHOLE += ("max_evaluations", "bootstrap")
 PROFILES = ("normal_pressure", "profile", "weakening_rate", "residual_strength")
 PROFILES += ("critical_slip", "residual_ratio", "fracture_energy")
-OPTIONAL = ("width", "thickness", "power_kept", "anisotropy", "end_time")
+OPTIONAL = ("width", "ends", "thickness", "power_kept", "anisotropy", "end_time")
 OPTIONAL += ("loading_rate", "workers", "max_evaluations", "pressing_force", *PROFILES)
 OTHERS = ("1.5", "", [], {}, 1j, math.nan, -math.inf)
 
