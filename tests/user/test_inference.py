@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from refusals import refuses
-from setups import LOCAL
+from setups import LOCAL, make_problem
 
 import stiction as st
 
@@ -111,3 +111,18 @@ def test_dynesty_finds_the_same_posterior(example):
     smoothing = 0.5 * 25 * np.log1p(750.0**-0.4)
     expected = found["posterior"].log_evidence - smoothing
     assert found["evidence"] == pytest.approx(expected, abs=0.66)
+
+
+@pytest.mark.parametrize(
+    ("unit", "force", "refused"),
+    [("N", 117e3, False), ("MN", 117e3, True), ("kN", 117.0, True)],
+)
+def test_peaks_of_whole_specimens_in_a_wrong_unit_are_doubted(unit, force, refused):
+    problem = make_problem(
+        256, 0.173, width=0.023, load=st.Load(pressing_force=force), weakening_rate=1e11
+    )
+    options = {"unit": unit, "between": "normal", "progress": False}
+    raised = pytest.raises(st.InputError, match="times the normal pressure")
+    doubted = pytest.warns(st.UnitWarning, match="times the normal pressure")
+    with raised if refused else doubted:
+        st.infer(problem, None, [27.3, 29.1, 25.8, 31.4], **options)

@@ -226,7 +226,8 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
         )
     if variable == "critical_force":
         warn_of_weld(problem, "peaks")
-    pressed = problem.given_pressure is not None or "normal_pressure" in random.names
+    given = () if random is None else random.names
+    pressed = problem.given_pressure is not None or "normal_pressure" in given
     if variable == "friction_coefficient" and not pressed:
         raise InputError(
             "peaks: are friction coefficients, which need a normal pressure. Give"

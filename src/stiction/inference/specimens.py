@@ -66,6 +66,7 @@ from stiction.inference.likelihood import (
 )
 from stiction.inference.marginal_fit import multiplied
 from stiction.inference.peaks import Peaks
+from stiction.problem.checks import doubt_strengths
 from stiction.problem.problem import Problem
 from stiction.random.dotted_keys import distribution_of
 from stiction.random.fields import RandomField, RandomInterface
@@ -164,11 +165,14 @@ class Profiles(NamedTuple):
     @classmethod
     def without_field(cls, problem: Problem, peaks: Peaks, **more: Any) -> Self:
         """Return specimens with a uniform strength, a coefficient if there is a pressure."""
+        variable_of(problem, None, peaks.unit)  # checks it
         level, pressure = float(np.median(peaks.values[0])), problem.given_pressure
         if peaks.unit == "N":
             level /= problem.area or math.nan
-        if pressure is not None and peaks.unit != "1":
-            level /= float(np.mean(pressure))
+        mean = 1.0 if pressure is None else float(np.mean(pressure))
+        if peaks.unit != "1":
+            level /= mean
+        doubt_strengths(problem, level * mean)
         length = 0.25 * float(np.max(problem.interface.length))
         field = RandomField(
             Lognormal(mean=level, cv=UNIFORM), PowerLawSpectrum(length),
