@@ -11,6 +11,7 @@ import math
 import numbers
 import operator
 import os
+import re
 import types
 import typing
 from abc import ABCMeta
@@ -277,6 +278,7 @@ def explain(
         else:
             name = str(context.get("class_name") or context.get("class") or "")
             text = item["msg"].removeprefix("Input should be ")
+            text = re.sub(r"0\.0000\d+", lambda digits: f"{float(digits[0]):g}", text)
             text = f"{'an' if name[0] in 'AEIO' else 'a'} {name}" if name else text
             members.setdefault((begin + "must be ", got), {})[text] = None
     texts = [text + " or ".join(names) + got for (text, got), names in members.items()]

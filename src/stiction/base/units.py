@@ -246,7 +246,11 @@ def as_numbers(value: Any) -> Array:
     if given.dtype.kind not in "fiu":
         kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
         text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
-        read = ". st.read_profile(path) reads a file" if Path(text).suffix else ""
+        read = (
+            ". st.read_profile(path) reads profiles, st.read_peaks(path) peaks"
+            if Path(text).suffix
+            else ""
+        )
         raise InputError(f"must be numbers, got {kind}{read}")
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)
 

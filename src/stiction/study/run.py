@@ -174,7 +174,8 @@ class StoredRun:
         if not (partial or rows.done.all()):
             raise RunError(
                 f"{self.path}: {int(rows.done.sum())} of {rows.done.size} samples exist."
-                " Run the study again to compute the others, or pass partial=True"
+                " Run the study again to compute the others, or export a part: partial=True, in"
+                " a shell --partial"
             )
         result = self._checked(rows)
         if place.suffix == ".nc" and not events:
