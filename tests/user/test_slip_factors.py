@@ -137,7 +137,9 @@ def test_bad_input_is_refused(written):
     refuses("not swapped", lambda: written(rows, swapped))
     units = "specimen;slip load (N);clamping force (kN)"
     refuses("their units", lambda: written(rows, units))
-    refuses("holds no force in line", lambda: written([*rows[:4], "3;180.0;", *rows[5:]]))
+    refuses(
+        "has no positive force in line", lambda: written([*rows[:4], "3;180.0;", *rows[5:]])
+    )
     refuses("holds 2 specimens", lambda: written(rows[:4]))
     peaks = written(rows)
     refuses("method: is needed with a random", lambda: st.infer(JOINT, FIELD, peaks))

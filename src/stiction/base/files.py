@@ -96,7 +96,7 @@ def _near_file(path: Path) -> str:
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
-    """Refuse content that would unpack to more than `least` and `times` the size of its file."""
+    """Refuse content that unpacks to more than `least` bytes and `times` the size of its file."""
     limit = max(least, times * len(content))
     if size > limit:
         raise InputError(f"would unpack to {size}, more than the limit of {limit} for its size")
@@ -220,7 +220,7 @@ def private_folder(folder: Path) -> Path:
         weakness = _weakness(folder) if os.name == "posix" else ""
     except OSError as error:  # nothing can be kept there
         _warn_once(
-            f"{folder.parent} cannot be used ({error.strerror or error}), so that kernels are"
+            f"{folder.parent} cannot be used ({error.strerror or error}), so kernels are"
             " compiled in every process. Set STICTION_CACHE_DIR to a folder of your own"
         )
         return folder
@@ -247,8 +247,8 @@ def _weakness(folder: Path) -> str:
 def _stand_in(weakness: str, name: str) -> Path:
     """Return a temporary folder for this process, and warn why it is needed."""
     _warn_once(
-        f"{weakness}, so that others could put compiled code there. Each process compiles again."
-        " Run chmod go-w, or set STICTION_CACHE_DIR to an absolute path of a folder of your own"
+        f"{weakness}, so others could put compiled code there. Each process compiles again."
+        " Run chmod go-w on it, or set STICTION_CACHE_DIR to the absolute path of a private folder"
     )
     folder = _temporary_folder() / name
     folder.mkdir(mode=0o700, exist_ok=True)

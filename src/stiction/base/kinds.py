@@ -35,7 +35,7 @@ def register(kind: T) -> T:
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
     holder = known.setdefault(name, kind)
     if (holder.__module__, holder.__qualname__) != (kind.__module__, kind.__qualname__):
-        raise InputError(f"{kind.__name__}: the type {name!r} belongs to {holder}. Rename it")
+        raise InputError(f"{kind.__name__}: {holder} has the type {name!r}. Choose another")
     known[name] = kind
     return kind
 

@@ -119,9 +119,9 @@ def run(
     again, and adds samples if `samples` was raised. Results do not depend on
     workers, machines or interruptions.
 
-    The exit code is 0 if the run is complete, 1 if samples failed or the run
-    could not continue, 2 if the study or the command has errors, and 130 after an
-    interruption.
+    The exit code is 0 if the run, or with --part the part, is complete, 1 if
+    samples failed or the run could not continue, 2 if the study or the command
+    has errors, and 130 after an interruption.
 
     \b
     Examples:

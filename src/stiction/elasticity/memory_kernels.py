@@ -307,7 +307,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
     absolute, and C(0) = G*/G.
     """
     if not 1e-9 <= tolerance <= 1e-2:
-        raise InputError(f"kernel tolerance: must lie in [1e-09, 0.01], got {tolerance!r}")
+        raise InputError(f"kernel_tolerance: must be between 1e-9 and 0.01, got {tolerance!r}")
     # 1. The long sum, and the times at which
     # short sums are fitted and checked.
     arcs = arc_quadrature(mode, eta)
@@ -329,7 +329,7 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
                 order = np.argsort(-poles.real)
                 return ExponentialSum(poles[order], weights[order], error)
     raise InputError(
-        f"kernel tolerance: {tolerance!r} was not reached with {MAX_PAIRS} pairs of exponentials"
+        f"kernel_tolerance: {tolerance!r} was not reached with {MAX_PAIRS} pairs of exponentials"
         f" (mode {mode}, c_d/c_s = {eta:.6g}). Use a larger tolerance"
     )
 

@@ -57,7 +57,7 @@ def _window_sum(values: Array, mode: Array, width: int, start: int) -> float:
 
 @jit_inside
 def _count_fast(W: Array, threshold: float, length: Array) -> None:
-    """Step 2: write, for each node, how many nodes in a row from there weaken fast enough."""
+    """Step 2: count, from each node on, the consecutive nodes that weaken fast enough."""
     # Twice around the circle from the end, so that runs across the
     # first node are complete.
     n, run = W.shape[0], 0.0

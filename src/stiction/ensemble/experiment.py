@@ -154,7 +154,7 @@ class Experiment:
                 if not field.modes(self.problem.interface).ranks.size:
                     warn_user(
                         f"{name}: its correlation length is so long that each sample is uniform."
-                        " Check its unit. Scatter between specimens is between= of RandomInterface",
+                        " Check its unit. If specimens scatter, pass RandomInterface(between=...)",
                         UnitWarning,
                     )
             # Stresses and slips of a solid lie in known ranges. Others

@@ -87,7 +87,7 @@ class Store:
             names = {name for name in os.listdir(path) if not name.endswith(PART)}
             if names and not names & {STUDY, CHUNKS}:
                 some = ", ".join(sorted(names)[:3])
-                raise StoreError(f"{path}: has other files ({some}). Choose a new folder")
+                raise StoreError(f"{path}: contains other files ({some}). Choose a new folder")
             # Another process may create the folder at the same moment.
             with suppress(FileExistsError):
                 (path / CHUNKS).mkdir()
@@ -111,7 +111,7 @@ class Store:
         return store
 
     def read_into(self, rows: Any) -> None:
-        """Pass on the intact chunks, and record the defects of damaged chunks in `damage`.
+        """Add intact chunks to `rows`, and record the defects of damaged chunks in `damage`.
 
         `rows` accepts tables (`add`), and says why a table does not fit
         (`misfit`). A file that exists but cannot be read may be intact.
@@ -211,7 +211,7 @@ def digest(data: bytes) -> str:
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a link in place of the folder of chunks, because files would go to its target."""
+    """Reject a link as the chunk folder, because files would be written to its target."""
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
         raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
 
@@ -244,7 +244,7 @@ def _table_in(data: bytes) -> tuple[str, Table]:
         and all(field[0].base.kind in "fiub" for field in fields.values())
     )  # fmt: skip
     if not valid:
-        raise ValueError("other values than in a chunk")
+        raise ValueError("values that no chunk can have")
     columns = {name: rows[name] for name in fields}
     return mark, Table(columns, failures, seconds, made_by)
 

@@ -530,7 +530,7 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
 
 
 def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float, float]:
-    """Return the peak without the bias by noise, and its standard error (step 4)."""
+    """Return the peak, corrected for the bias due to noise, and its standard error (step 4)."""
     near = force >= force[top] - threshold
     first = top - int(np.argmin(np.r_[near[: top + 1][::-1], False])) + 1
     last = top + int(np.argmin(np.r_[near[top:], False]))

@@ -20,14 +20,14 @@ Steps:
    there is no bound, choose b so far below the onsets that the
    logarithm is nearly linear.
 2. Standardise v to mean 0 and variance 1. The density of v then hardly
-   changes between nodes.
+   changes between the nodes of the parameter grid.
 3. Replace the sorted sample by the means of at most `GROUPS` groups.
    Groups are smaller in the tails.
 4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres
    multiplied by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the
    logarithm in steps of `STEP`.
-5. Interpolate this logarithm between steps and between nodes. Beyond
-   the table it falls like a parabola.
+5. Interpolate this logarithm between steps and between the nodes
+   of the parameter grid. Beyond the table it falls like a parabola.
 6. Integrate over v with the midpoint rule. It converges faster than any
    power of the step if the step is smaller than the widths of the error
    and the density.

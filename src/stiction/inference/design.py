@@ -185,7 +185,7 @@ def design_of_tests(
     error = load_cell_error * factor_of(unit)
     method = method or getattr(getattr(random, "likelihood", None), "method", None)
     if method is None:
-        raise InputError("method: is needed without a posterior. Give st.Equilibrium()")
+        raise InputError("method: is required without a posterior. Pass st.Equilibrium()")
     with Meter("design of tests", show=progress) as meter:
         simulation = Simulation(method, samples, seed, None, meter)
         if prior is None:
@@ -250,14 +250,14 @@ def _plans(
         )
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             raise InputError(
-                f"designs: {name}: tests: must be whole numbers >= 1, by length (m)"
+                f"designs: {name}: tests: must be a whole number >= 1, or one for each length (m)"
             )
         known = check("known", table.get("known", ()), Names)  # from other measurements
         if unknown := [unknown_name(path, key, names) for key in known if key not in names]:
             raise InputError(unknown)
         free = [place for place, parameter in enumerate(names) if parameter not in known]
         if not free:
-            raise InputError(f"{path}: every parameter would be known")
+            raise InputError(f"{path}: lists all parameters, so tests add nothing. Remove one")
         plans[name] = dict(tests), free
     return plans
 
@@ -307,8 +307,8 @@ def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
         plans[name] = table["tests"], table.get("profiles", 0)
         if not all(is_whole(number, 0) for number in plans[name]) or not any(plans[name]):
             raise InputError(
-                f"designs: {name}: tests and profiles must be whole numbers, at least one of"
-                " them >= 1"
+                f"designs: {name}: tests and profiles must be whole numbers >= 0, at least one"
+                f" >= 1, got {' and '.join(map(str, plans[name]))}"
             )
     return plans
 

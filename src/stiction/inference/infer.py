@@ -293,8 +293,8 @@ def _of_parameters(
     if refused or grid is None or u is None:
         raise InputError(
             refused
-            or "peaks: no point of the prior can produce all of them. Widen it, or give"
-            " load_cell_error="
+            or "peaks: no parameters within the prior produce all peaks. Widen the prior, or"
+            " pass load_cell_error="
         )
     relative_error = math.sqrt(sum(map(np.size, measured.values)) / likelihood.samples)
     return Posterior(
@@ -398,7 +398,7 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
         return random.profiles(LIKELY_FIELDS, seed)._replace(**more)
     if isinstance(random, Posterior):
         raise InputError(
-            "random: is a posterior. Give its fit or interfaces, and all peaks together"
+            "random: must not be a posterior. Pass its fit or interfaces, and all peaks together"
         )
     # A list of interfaces, or draws from any source.
     given = random.interfaces(LIKELY_FIELDS, seed) if isinstance(random, Source) else random

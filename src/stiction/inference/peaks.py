@@ -161,10 +161,10 @@ def title_of(peaks: Peaks) -> str:
 def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peaks, float]:
     """Return the mean peak of each specimen, and the standard deviation of its error, in SI.
 
-    The unit is a specimen: its slip loads do not show how specimens
-    differ. Their pooled coefficient of variation gives the error in a
-    mean. If specimens have different numbers of slip loads, the error
-    is for their harmonic mean.
+    Each specimen counts once, because its slip loads do not show how
+    specimens differ. Their pooled coefficient of variation gives the
+    error of a mean, computed for the harmonic mean of the numbers of
+    slip loads.
     """
     measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
@@ -380,8 +380,8 @@ def _of_table(
             labels = np.array(stems)
         if (count := len({*labels})) < MIN_PEAKS:
             raise InputError(
-                f"holds {count} specimens in {names[0]}, at least {MIN_PEAKS} are needed. Several"
-                " tests of a specimen say nothing about other specimens"
+                f"holds {count} specimens in {names[0]}, but at least {MIN_PEAKS} are needed."
+                " Repeated tests of one specimen say nothing about other specimens"
             )
     elif normal is not None:
         warn_accuracy(
@@ -442,8 +442,8 @@ def _normal_forces(
     forces, _ = column_in_si(replace(column, values=values), "normal force", None, (si,))
     if (missing := np.flatnonzero(~(forces > 0.0))).size:
         raise InputError(
-            f"normal: {column.label!r} holds no force in line {table.lines[missing[0]]}"
-            f" ({missing.size} such tests). Remove these tests, or give their forces"
+            f"normal: {column.label!r} has no positive force in line {table.lines[missing[0]]}"
+            f" ({missing.size} tests affected). Remove these tests, or give their forces"
         )
     return forces
 

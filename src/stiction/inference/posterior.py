@@ -275,7 +275,7 @@ class SpecimenPosterior(Posterior):
     """Posterior of the mean, the scatter between specimens and the field within a specimen.
 
     The draws describe the field within a specimen only if it was
-    measured. A field that was stated is among the `assumptions`.
+    measured. A field that you stated is listed in `assumptions`.
 
     Attributes
     ----------

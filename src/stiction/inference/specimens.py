@@ -537,7 +537,7 @@ class Prediction(NamedTuple):
 
 
 def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
-    """Return family, s, and the places of the draws (draws, 4) with both."""
+    """Group the draws by family and s. Return each family, its s, and the indices of its draws."""
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
     return [
         (profiles.families[int(family)], float(cv), np.flatnonzero(group.ravel() == number))

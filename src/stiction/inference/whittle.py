@@ -10,9 +10,8 @@ Sources. The likelihood is due to Whittle (1953), Arkiv foer Matematik 2, 423. W
 the exact expectation for a finite window it becomes the debiased likelihood of
 Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, and on
 planes of Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
-Statistical Society B 84,
-1526. Correlations of mapped fields follow Grigoriu, Applied Non-Gaussian Processes
-      (1995).
+Statistical Society B 84, 1526. Correlations of mapped fields follow Grigoriu, Applied
+Non-Gaussian Processes (1995).
 
 Steps:
 

@@ -258,11 +258,11 @@ def chosen_row(
     }
     counts = {result.sizes["sample"] for result in by_sample.values()}
     counts |= set() if rows is None else {len(rows)}
-    if len(counts) > 1 or not is_whole(sample, 0) or sample >= min(counts, default=math.inf):
-        raise InputError(
-            f"sample: {sample} of results and strength with {', '.join(map(str, sorted(counts)))}"
-            " samples. They must have the same number"
-        )
+    if len(counts) > 1:
+        raise InputError(f"results and strength differ in number of samples: {sorted(counts)}")
+    last = min(counts, default=math.inf) - 1
+    if not is_whole(sample, 0) or sample > last:
+        raise InputError(f"sample: must be 0 to {last}, got {sample}")
     only = slice(int(sample), int(sample) + 1)
     return {name: result.isel(sample=only) for name, result in by_sample.items()}
 

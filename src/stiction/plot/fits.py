@@ -42,7 +42,8 @@ def fit(result: FieldFit) -> NDArray[Any]:
         fit, (c) correlation, with the effect of the window, and (d)
         spectrum. The bands come from records that were simulated from
         the fitted field. In (a) and (b) they contain 90 % of the fits
-        to such records. In (c) and (d) they contain 90 % of such sets.
+        to such records. In (c) and (d) they contain the curves of 90 %
+        of the simulated sets of records.
     """
     rng = np.random.default_rng(0)
     estimate = result._estimate

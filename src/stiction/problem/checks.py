@@ -144,7 +144,7 @@ def check_resolution(problem: Any, weakening_rate: float) -> None:
     least = MIN_NODES_IN_NUCLEATION
     raise InputError(
         f"interface.nodes: must be {_finer(problem, resolution, least)} or more. The nucleation"
-        f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} of {least} nodes."
+        f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} nodes, not {least}."
         " Check the unit of interface.length (m)"
     )
 

@@ -210,7 +210,7 @@ class Interface(Listed):
         if self.is_free and self.is_plane:
             raise InputError("ends: a plane is periodic. Only lines have free ends")
         if self.size > MOST_NODES:
-            raise InputError(f"nodes: must be at most 2^24 = {MOST_NODES}, got {self.nodes}")
+            raise InputError(f"nodes: must be at most 2^24 in all, got {self.nodes}")
         if min(self.spacings) < SHORTEST:
             raise InputError(
                 f"length: nodes are {min(self.spacings):g} m apart. Check its unit"
@@ -232,13 +232,13 @@ class Interface(Listed):
         for dim, (low, high), length in zip(self.dims, ends or (), self.lengths, strict=False):
             if not -1e-9 * length <= low < high <= (1.0 + 1e-9) * length:
                 return (
-                    f"must rise within the interface, from 0 to {length:g} m along {dim}, got"
+                    f"must be increasing and lie within 0 to {length:g} m along {dim}, got"
                     f" {low:g} to {high:g} m"
                 )
         if (count := np.count_nonzero(self._inside)) < 2:
             return (
-                f"must hold two nodes or more, which are {self.spacing:.3g} m apart, holds"
-                f" {count}: nothing could become unstable. Check its unit (m)"
+                f"contains {count}, but must contain at least two nodes, which are"
+                f" {self.spacing:.3g} m apart. Check its unit (m)"
             )
         return None
 

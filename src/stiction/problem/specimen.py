@@ -1,4 +1,4 @@
-"""Specimens: two equal blocks or a slider on a base, how they are driven and pressed."""
+"""Specimens: two equal blocks or a slider on a base, and how they are driven and pressed."""
 
 from __future__ import annotations
 

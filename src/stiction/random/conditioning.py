@@ -124,8 +124,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
         raise ValueError(
-            "every place must be known, and every value must be finite, or NaN where it was not"
-            " measured"
+            "coordinates must be finite; values must be finite, or NaN if not measured"
         )
     points = points[:, ~np.isnan(points[-1])]
     if points.shape[1] == 0:
@@ -175,8 +174,8 @@ class Conditions:
         names, places = interface.dims, self.places
         if len(places) != len(names):
             raise InputError(
-                f"conditions.profile: must have the {len(names)} coordinates {', '.join(names)} of"
-                f" the interface, got {len(places)}"
+                "conditions.profile: must have one coordinate for each dimension of the interface"
+                f" ({', '.join(names)}), got {len(places)}"
             )
         problems = [
             f"conditions.profile: {name} reaches from {row.min():g} to {row.max():g} m, the"
@@ -256,7 +255,7 @@ class Measured(NamedTuple):
 
 
 class Regression(NamedTuple):
-    """Step 3: the posterior (2) of the draws, given Gaussians for the measured values."""
+    """Step 3: posterior (2) of the draws, given the Gaussian measured values."""
 
     power: Array  # s^2, (directions,)
     right: Array  # V, (dimension, directions)

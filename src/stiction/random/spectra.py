@@ -195,7 +195,7 @@ class ScaledSpectrum(SpectralDensity):
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
     def with_efolding_length(self, length: float) -> Any:
-        """Return the spectrum with the same shape, with `length` (m) as e-folding length of z."""
+        """Return a spectrum of the same shape whose z has the e-folding length `length` (m)."""
         xi = self.correlation_length * length / self.efolding_length
         return dataclasses.replace(self, correlation_length=xi)
 

@@ -113,7 +113,7 @@ def mean_in_stress(problem: Problem, random: RandomInterface, name: str) -> floa
 
 
 def check_residual(problem: Problem, profiles: Mapping[str, Array]) -> None:
-    """Warn if the strength of some nodes in sampled profiles, Pa, is not above the residual one.
+    """Warn if sampled strengths (Pa) do not exceed the residual strength at some nodes.
 
     These nodes do not weaken. If they are more than half of all nodes,
     an `InputError` is raised.

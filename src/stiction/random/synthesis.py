@@ -190,7 +190,7 @@ def make_modes(
     if not (0.0 < total < np.inf and power.min() >= 0.0):
         raise InputError(
             "spectrum: its power in the modes of this interface must be positive and finite,"
-            f" got {total:g} in all and {power.min():g} in a mode"
+            f" got a total of {total:g} and a smallest value of {power.min():g}"
         )
     sigma = np.sqrt(power / total)
     for array in (sigma, numbers, ranks):

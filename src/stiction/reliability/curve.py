@@ -97,8 +97,8 @@ def failure_curve(
         Smallest probability of the curve.
     target_cv : float
         Coefficient of variation to reach at the smallest probability.
-        It is lower at other points. Repetitions are added until it is
-        reached.
+        At other points the coefficient is lower. Repetitions are added
+        until the target is reached.
     problem, random, method, seed, max_evaluations, workers, progress
         As in `design_stress`.
     executor

@@ -315,7 +315,7 @@ def _by_counting(
 
 
 def _by_tail(point: TailPoint, target_cv: float) -> Answer:
-    """Return the answer from a tail."""
+    """Return the answer for a point of an estimated tail."""
     tail, probability = point.tail, point.probability
     interval = lognormal_interval(probability, point.cv)
     doubts = imprecise(point.sampling_cv, target_cv, tail.spent)

@@ -71,7 +71,7 @@ def prepare(
     executor: Executor | None = None,
     spent: int = 0,
 ) -> tuple[LimitState, int]:
-    """Return the limit state and the allowed evaluations, or refuse a method that is too slow."""
+    """Return the limit state and the allowed number of evaluations, unless a method is too slow."""
     threads = workers or usable_cores()
     state = LimitState(experiment, per_pressure, threads, meter, executor)
     problems = []

@@ -291,7 +291,7 @@ class TailPoint:
 
     @cached_property
     def cv(self) -> float:
-        """Coefficient of variation of the probability, due to sampling and the list."""
+        """Coefficient of variation due to sampling and to the finite list of interfaces."""
         return math.hypot(self.sampling_cv, self.members_cv)
 
     @cached_property

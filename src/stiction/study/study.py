@@ -485,7 +485,10 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) -> Study:
-    """Return the study in plain form. Its files are in `folder`, and are added to `files`."""
+    """Build a study from plain dictionaries.
+
+    Its files lie in `folder`, and their paths are appended to `files`.
+    """
     check("study", given, dict)
     if given and not {*keys_of(Study)} & {*given}:
         some = ", ".join(map(describe, [*given][:SHOWN_KEYS]))

@@ -79,7 +79,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
     if np.spacing(time) > 0.01 * step:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
-            f"steps of {step:.2g} s. Load faster (the onset no longer depends on the rate)"
+            f"steps of {step:.2g} s. Load faster (at this rate the onset hardly changes)"
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
@@ -119,14 +119,16 @@ def warn_of_cut_events(cut: Iterable[bool]) -> None:
 
 
 def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
-    """Warn about first instabilities of ruptures that lie above equilibrium.
-    Both have shape (samples,), Pa."""
+    """Warn if the first instabilities of ruptures lie above those of equilibrium.
+
+    Both arrays have the shape (samples,), in Pa.
+    """
     excess = 100.0 * (found / np.array(in_equilibrium) - 1.0)
     warn_of_samples(
         "first_instability is up to {worst:.2g} % above the first instability in equilibrium in"
         " {samples}: a jump that lowers the mean stress by less than 1e-4 of the stress scale was"
-        " not noticed, as of few nodes on a coarse grid, or the load rises too fast. Take more"
-        " nodes, load more slowly, or use st.Equilibrium()",
+        " not noticed, as happens if few nodes jump on a coarse grid, or the load rises too"
+        " fast. Take more nodes, load more slowly, or use st.Equilibrium()",
         excess > MISSED_PERCENT,
         excess,
     )

@@ -169,7 +169,7 @@ def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
 
 @jit_inside
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
-    """Update maximum and instabilities after a step. Return the drop of the mean stress, Pa."""
+    """Update the maximum and the instabilities. Return the drop of the mean stress, Pa."""
     step, maximum, event, results = now.step, now.maximum, now.event, now.results
     # 1. The fall by waves.
     below = maximum.stress - step.whole_stress

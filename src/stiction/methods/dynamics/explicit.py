@@ -96,7 +96,7 @@ def _correct(
 ) -> Any:
     """Step 2: update slip, rate and stress. Write strength and slip increments.
 
-    Return the work (without the cell) and the sum of V.
+    Return the sums over nodes of work per cell area, and of V.
     """
     profile, initial, step = setting.nodes.profile, setting.nodes.initial, tables.step
     slip, slip_rate, stress = state.slip, state.slip_rate, state.stress

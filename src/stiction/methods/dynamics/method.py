@@ -98,8 +98,8 @@ class Rupture(Listed):
         Fraction of tau_p - tau_r that a node has lost when the front
         arrives: 0.5 for the middle of the cohesive zone, 1e-3 for its tip.
     start : {"equilibrium", "rest"}
-        Start of a run: close below the first instability in equilibrium,
-        where this state is known to `start_error` (Pa), or at the first slip.
+        Start of a run: at an equilibrium just below the first instability,
+        known to within `start_error` (Pa), or at first slip.
     stop : {"sliding", "onset", "rest", "time"}
         End of a run. "sliding": every node that can break is at its
         residual strength and, with an extent, at rest. "onset": the
@@ -109,7 +109,7 @@ class Rupture(Listed):
         Number of steps after which a run, or an event on a specimen, is
         abandoned.
     events : int
-        Also return so many events for each sample over 'event', padded
+        Number of events to return for each sample, over 'event', padded
         with NaN, with the variables of `equilibrium_path` and more.
 
     Raises

@@ -52,13 +52,13 @@ of cells and edges that could not start.
    unstable: border all of S again, open edges first and cells in the
    order in which they started, and push each node whose pivot is not
    positive on E.
-4. Return if E was empty and is not, or the other way round, or if the
+4. Return if E has become empty or has ceased to be empty, or if the
    load is at its target. Otherwise go to 1.
 
 A machine of stiffness k' (Pa) lowers the force F = D - k' T'x. It adds
 k' T T' to K.
 
-Example by hand: one cell without edges that couple, K = 3, T = 1, mu_p
+Example by hand: one cell without coupled edges, K = 3, T = 1, mu_p
 N = 2, mu_r N = 1, W = 1. The cell starts at D = 2 with the pivot 3 - 1
 = 2, and slips at the rate 1/2. At d = 1 (D = 4) it meets its corner,
 and slips at the rate 1/3 from then on. With W = 4 the pivot is -1: the

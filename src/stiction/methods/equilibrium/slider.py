@@ -108,9 +108,9 @@ class Pressed(NamedTuple):
 def make_contact(
     K: Array, T: Array, friction: Friction, overstress: Array, moved: Array, relief: float = 0.0
 ) -> Contact:
-    """Return a slider at rest, in which open edges are in S.
+    """Return a slider at rest, in which open edges are in the active set S.
 
-    `overstress` and `moved` are taken over. Where the strength is mu_r
+    The contact holds `overstress` and `moved` without copying them. Where the strength is mu_r
     N, `friction.peak` must equal `friction.residual`. With a machine,
     the force falls by `relief` T'x (Pa).
     """

@@ -351,8 +351,8 @@ class OnsetSolver:
         if self.options.sensitivity:
             unknown = np.isnan(values["sensitivity"]).reshape(rows.samples, -1).any(axis=1)
             warn_of_samples(
-                "the first instability has no known derivative in {samples}, so sensitivity is NaN:"
-                " nodes pass a corner beyond which their law falls more steeply",
+                "sensitivity is NaN in {samples}, because nodes pass a corner beyond which their"
+                " law falls more steeply",
                 np.isfinite(first) & unknown,
             )
 
@@ -383,7 +383,7 @@ def _sensitivity(
 def _quotients(
     problem: Problem, search: EquilibriumSearch, sample: StaticSample, first: EquilibriumState
 ) -> Array:
-    """Return derivatives of a first instability as difference quotients, with a path for each node.
+    """Return derivatives of a first instability as difference quotients, from one path per node.
 
     Between events paths are straight, so a
     small step gives the exact derivative.

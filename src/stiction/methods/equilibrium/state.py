@@ -89,10 +89,10 @@ class Jump(NamedTuple):
 
 
 class EquilibriumSearch(Protocol):
-    """Thread-safe protocol for the search for equilibria: `DenseSearch` or `PlaneSearch`.
+    """Protocol for thread-safe searches for equilibria: `DenseSearch` or `PlaneSearch`.
 
-    `widest_gap` is the largest certificate gap without a warning, as a
-    fraction of the load.
+    `widest_gap` is the largest certificate gap that causes no warning,
+    as a fraction of the load.
     """
 
     pieces: Pieces

@@ -346,9 +346,9 @@ class PiecewiseWeakening(FrictionLaw):
         falls = -np.diff(strength)
         if np.any(falls[1:] <= 0.0) or falls[0] < 0.0 or strength[-1] != 0.0:
             raise InputError(
-                "strength: must fall at every corner to exactly 0, and only the first may be 1,"
-                f" got {self.strength}. Give a later plateau a small fall, and begin at the top of"
-                " a hump"
+                "strength: must decrease at every corner and end at exactly 0; only the first value"
+                f" may be 1, got {self.strength}. Replace a later plateau by a slight fall, and"
+                " start the law at the top of a hump"
             )
         return self
 

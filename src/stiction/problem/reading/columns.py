@@ -229,8 +229,8 @@ def stated_column(columns: Sequence[Column], argument: str, wanted: str | int) -
     if len(fitting) > 1:
         numbers = " and ".join(str(column.number) for column in fitting)
         raise InputError(
-            f"columns {numbers} are all called {wanted!r}. Choose a column by its number,"
-            f" {argument}={fitting[0].number}"
+            f"columns {numbers} are {'both' if len(fitting) == 2 else 'all'} called {wanted!r}."
+            f" Choose one by its number, for example {argument}={fitting[-1].number}"
         )
     if fitting[0].text:
         raise InputError(fitting[0].text)

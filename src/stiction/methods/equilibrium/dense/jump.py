@@ -297,11 +297,12 @@ def _step_with_true_pieces(
 def jump(state: SlipState, load: float, unstoppable: float, true_pieces: Workspace) -> Outcome:
     """Follow an instability at a fixed load to the least equilibrium, or to sliding.
 
-    Slip and K d in the state belong to the instability, perhaps moved
-    along its direction to a corner. On return they belong to the
-    equilibrium, or are a lower bound of the equilibrium. If
-    `unstoppable` nodes in a row are at their residual strength, the
-    interface slides. `true_pieces` is a second workspace.
+    On entry, slip and K d are those at the instability, or those after
+    a move along its direction to a corner of the law. On return they
+    belong to the equilibrium, or are a lower bound of the equilibrium.
+    If `unstoppable` nodes in a row are at their residual strength, the
+    interface slides. `true_pieces` holds the factor of K - diag(W), with
+    the slopes W of the present pieces of the law.
     """
     sample, slip, _, workspace, _, _ = state
     n = slip.shape[0]

@@ -119,7 +119,7 @@ def runs_of(half_spaces: HalfSpaces, nodes: int) -> Runs:
 
 @jit
 def unstoppable_length(sample: StaticSample, load: float, runs: Runs) -> float:
-    """Return the length, in nodes, of a run of residual nodes that no strength around can stop.
+    """Return the length, in nodes, above which no strength around stops a run of residual nodes.
 
     This is Griffith's (1921) length with the smallest stress drop D and
     the largest fracture energy. The fracture energy is (tau_p - tau_r)

@@ -229,7 +229,7 @@ def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> i
 def _stop_unloaded(
     state: SlipState, q: Array, n_slipping: int, v_nodes: Array
 ) -> tuple[int, bool]:
-    """Step 2, for (3): move the rates from `v_nodes` towards v. Stop nodes on the way.
+    """Step 2 with (3): move the rates from `v_nodes` towards v. Stop nodes whose rate reaches zero.
 
     Return the number of slipping nodes, and whether a node stopped.
     `workspace.v` and `v_nodes` then hold the solution of (2) for the

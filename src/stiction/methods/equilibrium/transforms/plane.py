@@ -132,7 +132,7 @@ def halved_strength(fine: Array) -> Array:
 
 
 def _refined(coarse: Array, shape: tuple[int, ...]) -> Array:
-    """Return a flat field on the next finer grid, which has a given shape."""
+    """Return a flattened field on the next finer grid of the given shape."""
     return doubled(coarse.reshape([nodes // 2 for nodes in shape])).flatten()
 
 
