@@ -259,7 +259,9 @@ def chosen_row(
     counts = {result.sizes["sample"] for result in by_sample.values()}
     counts |= set() if rows is None else {len(rows)}
     if len(counts) > 1:
-        raise InputError(f"results and strength differ in number of samples: {sorted(counts)}")
+        raise InputError(
+            f"results: must have as many samples as strength, got {sorted(counts)}"
+        )
     last = min(counts, default=math.inf) - 1
     if not is_whole(sample, 0) or sample > last:
         raise InputError(f"sample: must be 0 to {last}, got {sample}")
