@@ -250,14 +250,14 @@ def _plans(
         )
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             raise InputError(
-                f"designs: {name}: tests: must be a whole number >= 1, or one for each length (m)"
+                f"designs: {name}: tests: must be a whole number >= 1, for each length (m)"
             )
         known = check("known", table.get("known", ()), Names)  # from other measurements
         if unknown := [unknown_name(path, key, names) for key in known if key not in names]:
             raise InputError(unknown)
         free = [place for place, parameter in enumerate(names) if parameter not in known]
         if not free:
-            raise InputError(f"{path}: lists all parameters, so tests add nothing. Remove one")
+            raise InputError(f"{path}: lists all parameters. Leave a parameter to the tests")
         plans[name] = dict(tests), free
     return plans
 

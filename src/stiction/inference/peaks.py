@@ -381,7 +381,7 @@ def _of_table(
         if (count := len({*labels})) < MIN_PEAKS:
             raise InputError(
                 f"holds {count} specimens in {names[0]}, but at least {MIN_PEAKS} are needed."
-                " Repeated tests of one specimen say nothing about other specimens"
+                " Repeated tests of a specimen say nothing about other specimens"
             )
     elif normal is not None:
         warn_accuracy(

@@ -174,7 +174,7 @@ class Conditions:
         names, places = interface.dims, self.places
         if len(places) != len(names):
             raise InputError(
-                "conditions.profile: must have one coordinate for each dimension of the interface"
+                "conditions.profile: must have a coordinate for each dimension of the interface"
                 f" ({', '.join(names)}), got {len(places)}"
             )
         problems = [

@@ -56,7 +56,7 @@ def _axis(given: Any) -> Axis:
     if len({len(values) for values in axis.values()}) > 1:
         named = ", ".join(f"{key} has {len(values)}" for key, values in axis.items())
         raise InputError(
-            "keys of one [[sweep]] table vary together and need the same number of values"
+            "keys of a [[sweep]] table vary together and need the same number of values"
             f" ({named}). To cross them, give each key its own [[sweep]]"
         )
     return axis

@@ -92,7 +92,7 @@ def write_scec(
     numbers = np.atleast_1d(origin)
     if numbers.shape != (len(dims),) or not np.isfinite(numbers).all():
         raise InputError(
-            f"origin: must be one finite number (m) for each of {', '.join(dims)}, got {origin!r}"
+            f"origin: must be a finite number (m) for each of {', '.join(dims)}, got {origin!r}"
         )
     middle = dict(zip(dims, numbers.tolist(), strict=True))
     away = [run[dim].values - middle[dim] for dim in dims] + [np.zeros(1)] * (2 - len(dims))

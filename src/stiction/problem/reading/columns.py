@@ -230,7 +230,7 @@ def stated_column(columns: Sequence[Column], argument: str, wanted: str | int) -
         numbers = " and ".join(str(column.number) for column in fitting)
         raise InputError(
             f"columns {numbers} are {'both' if len(fitting) == 2 else 'all'} called {wanted!r}."
-            f" Choose one by its number, for example {argument}={fitting[-1].number}"
+            f" Choose a column by its number, for example {argument}={fitting[-1].number}"
         )
     if fitting[0].text:
         raise InputError(fitting[0].text)
