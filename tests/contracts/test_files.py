@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from functools import cache
 from pathlib import Path
@@ -107,7 +108,9 @@ def test_a_page_of_a_design_holds_its_numbers(name, tmp_path):
         w.problem, w.random, probability=0.1, method=w.method, target_cv=0.4, **QUIET
     )
     page = design.write_page(tmp_path / "page.html", sources={"load.profile": "drawing 12"})
-    text = re.sub(r"<[^>]+>", " ", Path(page).read_text())
+    text = html.unescape(re.sub(r"<[^>]+>", " ", Path(page).read_text()))
+    for doubt in (*design.warnings, *design.doubts):
+        assert " ".join(doubt.split()) in " ".join(text.split())
     digits = re.findall(r"\d+(?:\.\d+)?", text)
     shown = {f"{float(number):.3g}" for number in digits}
     for value in (design.force, design.probability, design.friction_coefficient):

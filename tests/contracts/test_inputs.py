@@ -172,3 +172,25 @@ def test_a_mean_pressure_of_each_sample_is_distributed_between_glued_blocks():
         sample = problem.sample({"strength": strength, "normal_pressure": pressure})
         expected = means[:, None] * problem.blocks.pressure
         np.testing.assert_allclose(sample.normal_pressure, expected, rtol=1e-14)
+
+
+PLANE = make_problem((32, 32), (0.02, 0.017))
+MAP = np.random.default_rng(2).uniform(0.8e6, 1.2e6, (32, 32))
+ON_PLANES = {
+    "sample": lambda given: PLANE.sample({"strength": given}).strength,
+    "onset": lambda given: st.onset(PLANE, given, method=LOCAL).critical_stress.values,
+    "plot.field": lambda given: st.plot.field(PLANE, given).images[0].get_array(),
+}
+
+
+@pytest.mark.parametrize("call", ON_PLANES)
+@pytest.mark.parametrize("known", [(), ("x",), ("y",), ("x", "y")], ids="".join)
+@pytest.mark.parametrize("dims", [("x", "y"), ("y", "x")], ids="".join)
+def test_a_map_is_read_by_the_names_of_its_directions(call, known, dims):
+    """In either order. Coordinates of one direction alone are refused by their name."""
+    grid = PLANE.interface.coordinates
+    given = xr.DataArray(MAP, {dim: grid[dim] for dim in known}, ("x", "y")).transpose(*dims)
+    if len(known) == 1:
+        refuses("coordinates", lambda: ON_PLANES[call](given))
+    else:
+        np.testing.assert_allclose(ON_PLANES[call](given), ON_PLANES[call](MAP), rtol=1e-12)

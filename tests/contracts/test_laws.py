@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -195,3 +196,20 @@ def test_a_spectrum_agrees_with_itself(name, dimensions):
         np.testing.assert_allclose(
             wide.correlation(lag), spectrum.untruncated_correlation(lag), atol=5e-3
         )
+
+
+@pytest.mark.parametrize("name", FRICTION)
+def test_a_grid_is_refused_alike_for_every_scale_of_slip(name):
+    """A law by its rate, its critical slip or its fracture energy demands the same nodes."""
+    law, drop = FRICTION[name], 1e6
+    slip = law.initial_slope * drop / 1e11
+    scales = {"weakening_rate": 1e11, "critical_slip": slip}
+    scales["fracture_energy"] = law.integral * drop * slip
+    solid, interface = st.Solid(1e9, poisson_ratio=0.33, density=1170.0), st.Interface(0.4, 64)
+    none, demanded = dict.fromkeys(scales), []
+    for key, scale in scales.items():
+        friction = dataclasses.replace(law, **none | {key: scale})
+        with pytest.raises(st.InputError, match="must be") as caught:
+            st.Problem(solid, interface, friction).sample(np.full(64, drop))
+        demanded.append(re.search(r"nodes: must be (\d+) or more", str(caught.value))[1])
+    assert len({*demanded}) == 1

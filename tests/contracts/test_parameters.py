@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import BODIES, FIELD, attempt
+from stand_ins import StandIn
 
 import stiction as st
 
@@ -173,3 +174,32 @@ def test_a_pilot_compares_the_samples_of_its_run():
 @pytest.mark.parametrize("call", ["failure_probability", "design_stress"])
 def test_no_call_takes_more_evaluations_than_it_may(call):
     assert ask(call, max_evaluations=150, target_cv=0.05).evaluations <= 150
+
+
+SOLVED = [0]
+
+
+def counted(rows: Any, stress: Any) -> Any:
+    """Onsets by the local criterion. It counts the samples."""
+    SOLVED[0] += rows.samples
+    return stress
+
+
+SCATTERED = st.RandomInterface(
+    strength=FIELD, between={"strength": st.Lognormal(mean=1.0, cv=0.1)}
+)
+
+
+@pytest.mark.parametrize(
+    "random", [FIELD, [FIELD, WEAKER], SCATTERED], ids=["field", "list", "factor"]
+)
+@pytest.mark.parametrize("stress", [6.6e5, 5.5e5])
+@pytest.mark.parametrize("algorithm", ["auto", "plain", "subset"])
+def test_evaluations_are_the_samples_that_were_solved(random, stress, algorithm):
+    """Also if an algorithm follows a count. Checks of the method solve less than 100 besides."""
+    SOLVED[0] = 0
+    answer = st.failure_probability(
+        LINE, random, stress, method=StandIn(counted), algorithm=algorithm, target_cv=0.4,
+        workers=1, progress=False,
+    )  # fmt: skip
+    assert 0 <= SOLVED[0] - answer.evaluations < 100
