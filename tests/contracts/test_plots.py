@@ -205,3 +205,21 @@ def test_a_figure_refuses_what_it_cannot_draw(name, wrong):
     with pytest.raises(st.InputError):
         getattr(st.plot, name)(wrong, *more.get(name, []))
     assert not plt.get_fignums()
+
+
+def test_the_band_of_a_field_holds_the_fraction_that_its_label_names():
+    """At each node of a field with measured values, by samples."""
+    line = st.Interface(0.05, 64)
+    known = xr.DataArray([0.8e6, 1.1e6], {"x": line.x[[9, 40]]}, ("x",))
+    field = st.RandomField(
+        st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(6e-3), mean_mode=True
+    ).given(known, noise=2e4)
+    axes = st.plot.field(line, field)
+    (band,) = [shape for shape in axes.collections if shape.get_label() == "90 %"]
+    edge = band.get_paths()[0].vertices[:, 1] * 1e6  # Pa
+    samples = field.sample(line, samples=400, seed=1)
+    for node in (0, 9, 25, 63):
+        x = 1e3 * line.x[node]
+        ends = edge[np.isclose(band.get_paths()[0].vertices[:, 0], x)]
+        inside = (samples[:, node] >= ends.min()) & (samples[:, node] <= ends.max())
+        assert inside.mean() == pytest.approx(0.9, abs=4.0 * (0.9 * 0.1 / 400) ** 0.5)

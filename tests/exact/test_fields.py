@@ -164,6 +164,15 @@ def test_a_mode_keeps_its_draws_whatever_the_spectrum():
     assert len(known) > fields[2].modes(plane).ranks.size
 
 
+@pytest.mark.parametrize("anisotropy", [None, 0.3, 8.0])
+def test_the_warning_of_a_missing_mean_states_the_variance_of_the_mean(anisotropy):
+    plane = st.Interface(length=(0.05, 0.05), nodes=(64, 64))
+    field = beta_strength(0.03, anisotropy=anisotropy)
+    share = dataclasses.replace(field, mean_mode=True).modes(plane).sigma[0] ** 2
+    with pytest.warns(st.AccuracyWarning, match=rf"would hold {100.0 * share:.2g} %"):
+        field.sample(plane)
+
+
 @pytest.mark.parametrize("shape", [(8, 48), (48, 8)])
 def test_waves_that_one_direction_does_not_resolve_are_warned_of(shape):
     """The variance beyond half the nodes along x or y, from the density at all waves."""
