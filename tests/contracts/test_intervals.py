@@ -276,3 +276,25 @@ def test_scatter_of_new_joints_alone_lowers_a_design(tests_alone):
     right = np.quantile(np.outer(peaks, factors), 0.01)
     assert both.stress == pytest.approx(right, rel=0.05)
     refuses("strength: is inferred", lambda: tests_alone.with_between({"strength": None}))
+
+
+def test_a_deviation_is_in_the_band_if_its_p_value_is_above_ten_percent():
+    """For campaigns of four tests from the prediction, and shifted more and more from it."""
+    rng, seen = np.random.default_rng(0), set()
+    prediction = st.monte_carlo(
+        make_problem(256),
+        st.RandomField(TRUTHS["beta"], ROUGH),
+        method=LOCAL,
+        samples=400,
+        pilot=False,
+        **QUIET,
+    )
+    known = prediction.critical_stress.values
+    for shift in np.linspace(0.0, 6e4, 16):
+        peaks = rng.choice(known, 4) + shift
+        found = st.statistics.agreement(prediction, peaks, unit="Pa", seed=1)
+        p_value = found.p_values["largest_deviation"]
+        if abs(p_value - 0.1) > 0.02:  # 999 replicates know a p-value of 0.1 to 0.01
+            seen.add(p_value > 0.1)
+            assert (found.largest_deviation <= found.band) == (p_value > 0.1)
+    assert seen == {True, False}
