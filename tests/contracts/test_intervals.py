@@ -298,3 +298,20 @@ def test_a_deviation_is_in_the_band_if_its_p_value_is_above_ten_percent():
             seen.add(p_value > 0.1)
             assert (found.largest_deviation <= found.band) == (p_value > 0.1)
     assert seen == {True, False}
+
+
+def test_the_fit_of_a_mirrored_record_is_the_mirrored_fit():
+    """With a bound known at either end, where the shape may fall below 1."""
+    truth = st.Beta(alpha=0.7, beta=2.6, low=0.6e6, high=1.6e6)
+    line, smooth = st.Interface(0.5, 2048), st.SquaredExponentialSpectrum(3e-3)
+    (values,) = st.RandomField(truth, smooth, mean_mode=True).sample(line, samples=1, seed=3)
+    options = {"spectrum": "squared_exponential", "noise": False, "bootstrap": 20} | QUIET
+    fits = [
+        st.fit_field(record, line, marginal={"type": "beta"} | known, **options).field.marginal
+        for record, known in ((values, {"low": 0.6e6}), (2.2e6 - values, {"high": 1.6e6}))
+    ]
+    pairs = [(one.alpha, one.beta) for one in fits]
+    # Both searches end within 1e-6 of the same maximum.
+    assert pairs[0] == pytest.approx(pairs[1][::-1], rel=1e-4)
+    assert pairs[0][0] < 1.0 < pairs[0][1]
+    assert fits[0].high == pytest.approx(2.2e6 - fits[1].low, rel=1e-4)
