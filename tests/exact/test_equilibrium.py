@@ -140,7 +140,7 @@ def humped():
 
 def test_no_sensitivity_beyond_a_corner_where_a_law_steepens(humped):
     problem, tau_p = humped
-    with pytest.warns(st.AccuracyWarning, match="of 8 samples.*sensitivity is NaN"):
+    with pytest.warns(st.AccuracyWarning, match="sensitivity is NaN in . of 8 samples"):
         found = exact_onset(problem, tau_p, sensitivity=True)
     proved = np.isfinite(found.certificate_gap.values)
     assert (~proved).sum() >= 3

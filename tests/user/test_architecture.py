@@ -128,7 +128,7 @@ def test_what_no_file_can_name_is_refused_before_anything_is_computed(tmp_path):
     class Another(Unregistered):
         pass
 
-    refuses("Another: the type 'unregistered' belongs to", lambda: register(Another))
+    refuses("Another: ... has the type 'unregistered'", lambda: register(Another))
     refuses("needs a field such as type", lambda: register(Marginal))
     Another.__abstractmethods__ = frozenset({"distribution"})
     refuses("Another: lacks distribution", lambda: register(Another))

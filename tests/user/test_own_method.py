@@ -144,7 +144,7 @@ def test_a_class_whose_members_return_the_wrong_thing_is_refused():
             lambda: field_of(scipy.stats.triang(2.0, 1e6, 1e6)),
         ),
         (
-            "positive and finite ... -1 in a mode",
+            "positive and finite ... smallest value of -1",
             lambda: st.RandomField(uniform, spectrum).sample(problem.interface),
         ),
     ):
