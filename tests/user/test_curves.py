@@ -208,7 +208,9 @@ def test_slip_loads_over_clamping_forces(tmp_path):
     swapped = {"value": 2, "normal": "slip load [kN]"}
     refuses("swapped", lambda: st.read_peaks(written(forces=1e3 * forces), **swapped))
     holes = [392e3, "", 390e3, 391e3]
-    refuses("no positive force in line 3", lambda: st.read_peaks(written(forces=holes), **clamping))
+    refuses(
+        "no positive force in line 3", lambda: st.read_peaks(written(forces=holes), **clamping)
+    )
     refuses("2 specimens", lambda: st.read_peaks(written(names=(1, 1, 2, 2))))
     refuses("unit ... normal force", lambda: st.read_peaks(
         written(head="clamping force"), normal="clamping force"))  # fmt: skip
