@@ -115,46 +115,36 @@ def infer(
 ) -> Posterior:
     """Infer parameters of the random strength from peak stresses in repeated tests.
 
-    With a fit, or without a `prior` of other parameters, the mean
-    strength and its scatter between specimens are inferred. Otherwise
-    the parameters in `prior` are.
+    The result is the mean strength and its scatter between specimens, unless `prior`
+    names other parameters.
 
     Parameters
     ----------
     problem : Problem
         One specimen.
     random : RandomInterface, RandomField, a fit, a list of interfaces, or None
-        If None, specimens differ only as a whole, and no field within a
-        specimen is assumed. A joint is then a new specimen. For mean
-        and scatter: a fit, whose records are combined with the peaks,
-        or equally likely fields within a specimen. For other
-        parameters: one interface.
+        If None, specimens differ only as a whole, and a joint is a new specimen. For
+        mean and scatter: a fit, whose records are combined with the peaks, or equally
+        likely fields within a specimen. For other parameters: one interface.
     peaks : array, mapping of arrays, or Peaks
-        Mean shear stress or force at which each specimen slid, in
-        `unit`, or the result of `read_peaks`. Repeated slip loads of
-        one specimen count as their mean. For several lengths (m) of
-        specimens: ``{0.1: [...], 0.2: [...]}``.
+        Mean shear stress or force at which each specimen slid, in `unit`, or the result
+        of `read_peaks`. Repeated slip loads of one specimen count as their mean. For
+        specimens of several lengths (m): ``{0.1: [...], 0.2: [...]}``.
     prior : mapping, optional
-        For mean and scatter: ``"mean"``, by default flat in its
-        logarithm, and ``"between"``, the coefficient of variation
-        between specimens, by default half-Cauchy with scale 0.1. Other
-        parameters by the keys of a sweep, such as
-        ``"correlation_length"``, ``"marginal.low"`` or
-        ``"problem.friction.weakening_rate"``. A prior is a frozen
-        `scipy.stats` distribution, a range, or ``{"low": ..., "high":
-        ..., "spacing": "log"}``.
+        ``"mean"``, by default flat in its logarithm, and ``"between"``, the coefficient
+        of variation between specimens, by default half-Cauchy with scale 0.1. Or other
+        parameters by the keys of a sweep, such as ``"correlation_length"``. A prior is a
+        frozen `scipy.stats` distribution, a range, or ``{"low": ..., "high": ...,
+        "spacing": "log"}``.
     between : str or sequence of str, optional
         Families of the factor between specimens, as in `fit_field`. By
         default of the fit, or all.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. It may be left out if `random`
-        is None: then it has no effect on a joint that is equal to the
-        specimens.
+        Method that computes the onset. It may be left out if `random` is None.
     load_cell_error : float
         Standard error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
-        Unit of peaks and error. Forces need an area, coefficients ("1")
-        a normal pressure.
+        Unit of peaks and error. Forces need an area, coefficients ("1") a pressure.
     samples : int, optional
         Simulated specimens at each point (2000 by the local criterion,
         else 500), or for each field within a specimen (200, else 100).
@@ -199,15 +189,6 @@ def infer(
     >>> posterior = st.infer(problem, strength, peaks, unit="MPa", prior=prior, method=local)
     >>> low, high = posterior.interval["marginal.low"]
     >>> 0.5e6 < low < high < 0.75e6
-    True
-
-    Profiles and peaks from one kind of surface, joined:
-
-    >>> records = strength.sample(problem.interface, samples=3, seed=2)
-    >>> fit = st.fit_field(records, problem.interface, marginal="beta", noise=0.0, bootstrap=20)
-    >>> joined = st.infer(problem, fit, peaks, unit="MPa", method=local, samples=100)
-    >>> low, high = joined.interval["mean"]
-    >>> 0.9e6 < low < high < 1.1e6
     True
     """
     measured, error = peaks_and_error(peaks, unit, load_cell_error)

@@ -58,9 +58,8 @@ class Equilibrium(Listed):
     steps of the load. Weakening rate, residual strength, initial
     stress and load profile may vary along the interface.
 
-    On planes the programme is solved with Fourier transforms. The
-    distance between its bounds is the fraction `tolerance` of the load. Results
-    contain the lower bound, at which there is an equilibrium.
+    On planes the programme is solved with Fourier transforms. Results contain its
+    lower bound, at which there is an equilibrium.
 
     Parameters
     ----------

@@ -177,10 +177,9 @@ def equilibrium_path(
 
     Notes
     -----
-    A patch jumps to the least equilibrium at the same load, where an
-    overdamped interface would stop. An instability that comes to rest
-    is an arrested event. Inertia may carry it further: on equal blocks,
-    pass a `Rupture` as `method`.
+    A patch jumps to the least equilibrium at the same load, where an overdamped
+    interface would stop. Inertia may carry it further: on equal blocks, pass a
+    `Rupture` as `method`.
 
     Examples
     --------
