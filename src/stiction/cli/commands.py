@@ -323,21 +323,20 @@ def _cost(study: Any) -> dict[str, str]:
 def _seconds(point: Any) -> float:
     """Return the processor time of a sample, s, or its estimate if samples are slow or fail.
 
-    The batches double until the last batch takes long enough. Only the
-    last batch counts, because kernels compile in the first batches.
+    Batches double until a batch takes long enough. Each batch runs
+    twice, because kernels compile in its first run.
     """
-    seconds, first, count = point.seconds, 0, 1
+    seconds, count = point.seconds, 1
     with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():
         while point.seconds < SLOW_SECONDS:
+            point.results(0, count)
             begin = time.thread_time()
-            point.results(first, count)
-            seconds = (time.thread_time() - begin) / count
-            first += count
-            # Among single samples, the first compiles.
-            enough = first > 1 if point.seconds > TIMING_SECONDS else count >= point.batch
-            if enough or (count > 2 and seconds * count >= TIMING_SECONDS):
+            point.results(0, count)
+            spent = time.thread_time() - begin
+            seconds = spent / count
+            if max(spent, point.seconds) >= TIMING_SECONDS or count >= point.batch:
                 break
-            count = min(2 * count, point.batch) if point.seconds < TIMING_SECONDS else 1
+            count = min(2 * count, point.batch)
     return max(seconds, 1e-9)
 
 
