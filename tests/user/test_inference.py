@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from refusals import refuses
+from refusals import refuses, warning_texts
 from setups import LOCAL, make_problem
 
 import stiction as st
@@ -126,3 +126,15 @@ def test_peaks_of_whole_specimens_in_a_wrong_unit_are_doubted(unit, force, refus
     doubted = pytest.warns(st.UnitWarning, match="times the normal pressure")
     with raised if refused else doubted:
         st.infer(problem, None, [27.3, 29.1, 25.8, 31.4], **options)
+
+
+def test_forces_on_a_part_that_breaks_are_doubted_once():
+    solid = st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0)
+    problem = st.Problem(
+        solid, st.Interface(0.1, 256, extent=(0.02, 0.09)),
+        st.LinearWeakening(weakening_rate=0.2e12), st.Load(normal_pressure=2e6),
+        specimen=st.Blocks(height=0.05, thickness=0.01),
+    )  # fmt: skip
+    peaks, options = [810.0, 850.0, 790.0], {"unit": "N", "between": "normal"}
+    texts = warning_texts(lambda: st.infer(problem, None, peaks, progress=False, **options))
+    assert sum("force on the part that can break" in text for text in texts) == 1

@@ -549,7 +549,8 @@ def tables_of(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, error: float
 ) -> Tables:
     """Return the likelihood of peaks, from onsets simulated for each specimen type (step 1)."""
-    variable_of(problem, profiles.fields[0], measured.unit)  # checks it
+    if not profiles.whole:  # or else `without_field` has checked it
+        variable_of(problem, profiles.fields[0], measured.unit)
     kinds = range(len(measured.values))
     onsets = [_onsets(problem, profiles, simulation, measured, kind, error) for kind in kinds]
     return Tables(profiles, simulation.method, tuple(onsets), error, measured.values)

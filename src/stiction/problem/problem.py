@@ -169,11 +169,6 @@ class Problem(Listed):
             steepening = self.friction.steepening
             check_resolution(self, float(np.max(rates)) * steepening)
             warn_if_short(self, float(np.median(rates)) * steepening)
-        # Every sample takes these. The rig of a slider takes longer, so
-        # its profile is computed when it is first needed.
-        self.interface.dims, self.interface.first  # noqa: B018
-        if not isinstance(self.specimen, Slider):
-            self.load_profile, self.normal_pressure  # noqa: B018
         return self
 
     def _of_specimen(self) -> list[str]:
