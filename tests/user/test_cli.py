@@ -68,13 +68,15 @@ def test_interrupted_from_outside(runs, study):
     runs("status run", "of 9000000", code=1)
 
 
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize(
     ("where", "done", "number"),
     [("add", "100 of 300", signal.SIGTERM), ("note_pilot", "300 of 300", signal.SIGINT)],
 )
 def test_an_interruption_whose_exception_is_lost(runs, monkeypatch, where, done, number):
-    """As in a finalizer or a callback from C: the run ends at the next table, or at its end."""
+    """As in a finalizer or a callback from C: the run ends at the next table, or at its end.
+
+    Python's report of the lost exception is not printed."""
 
     class Losing:
         def __del__(self):

@@ -75,6 +75,9 @@ def _interrupt(*_: object) -> None:
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
     """Let an interruption end a run as Ctrl-C does, so that stored results are kept."""
+    report = sys.unraisablehook
+    # Python drops an exception in a callback from C and prints it. The run ends all the same.
+    sys.unraisablehook = lambda lost: lost.exc_type is KeyboardInterrupt or report(lost)
     signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
         signal.signal(signal.SIGINT, _interrupt)
@@ -87,6 +90,7 @@ def _resumable(out: Path) -> Iterator[None]:
         raise typer.Exit(130) from None
     finally:
         interrupted.clear()
+        sys.unraisablehook = report
 
 
 @contextmanager
