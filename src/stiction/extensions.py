@@ -1,7 +1,8 @@
 """Names for your own packages that add a method, law, marginal or spectrum.
 
-`docs/guide/extend-and-connect.md` shows an example of each. Import these names from
-this module, because the modules that define them may move.
+`docs/guide/extend-and-connect.md` shows an example of each. Import
+these names from this module, because the modules that define them may
+move.
 """
 
 from stiction.base.kinds import register

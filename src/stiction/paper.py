@@ -31,9 +31,9 @@ def problem(nodes: int = 1024, plane: Literal["stress", "strain"] = "stress") ->
     nodes : int
         Number of nodes on the interface, even.
     plane : {"stress", "strain"}
-        The paper states plane stress, for which G* = G (1 + nu), but prints G* = G/(1
-        - nu), which belongs to plane strain. ``plane="strain"`` gives the printed
-        value.
+        The paper states plane stress, for which G* = G (1 + nu), but
+        prints G* = G/(1 - nu), which belongs to plane strain.
+        ``plane="strain"`` gives the printed value.
     """
     return st.Problem(
         solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane=plane),

@@ -103,7 +103,9 @@ class Density(NamedTuple):
 
 @checked
 def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, None)) -> Density:
-    """Estimate the density of independent values. Smoothing does not cross the bounds.
+    """Estimate the density of independent values.
+
+    Smoothing does not cross the bounds.
 
     Parameters
     ----------

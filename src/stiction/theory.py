@@ -77,11 +77,12 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 
     Notes
     -----
-    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and Var[tau_n] is the double
-    integral of the correlation of tau_p and the weights. On a periodic interface, the
-    integral is a sum over wave vectors of the spectrum of tau_p times the squared transform
-    of the weight. The correlation of tau_p follows from a Hermite expansion (Grigoriu,
-    1995).
+    Albertini et al. (2020, Eqs. B.2 and B.3): E[tau_n] = E[tau_p], and
+    Var[tau_n] is the double integral of the correlation of tau_p and
+    the weights. On a periodic interface, the integral is a sum over
+    wave vectors of the spectrum of tau_p times the squared transform of
+    the weight. The correlation of tau_p follows from a Hermite
+    expansion (Grigoriu, 1995).
 
     On a plane tau_n is the average over the middle ellipse of
     `LocalCriterion`. The method takes the minimum over several

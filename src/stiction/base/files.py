@@ -33,7 +33,8 @@ from stiction.base.errors import InputError, StoreError
 PART = ".part"
 MAX_FILE_BYTES = 2**30
 MAX_HEADER_BYTES = 2**16
-"""Size of the description of an array, which numpy reads with Python's own parser."""
+"""Size of the description of an array, which numpy reads with Python's
+own parser."""
 
 UNREADABLE = (
     OSError, ValueError, EOFError, KeyError, NotImplementedError, RuntimeError,
@@ -115,7 +116,9 @@ def refuse_damage(kind: str) -> Iterator[None]:
 
 
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
-    """Write a temporary file, sync it and rename it. An old file stays until the new is complete.
+    """Write a temporary file, sync it and rename it.
+
+    An old file stays until the new is complete.
 
     From its first byte on, the new file has the
     permissions of the old file. The content is bytes, or a
@@ -165,8 +168,8 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
 def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
     """Return the arrays in an .npz file that `write_arrays` wrote.
 
-    Raise an error of `UNREADABLE` for compressed members, and for members that together are larger
-    than the archive.
+    Raise an error of `UNREADABLE` for compressed members, and for
+    members that together are larger than the archive.
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -200,7 +203,9 @@ def _warn_once(text: str) -> None:
 
 
 def private_folder(folder: Path) -> Path:
-    """Return a folder to which only this user can have written. Make the folder if needed.
+    """Return a folder to which only this user can have written.
+
+    Make the folder if needed.
 
     Compiled kernels are pickles, so whoever can replace a kernel can
     run code as the user who loads it. If the folder is not private, a
@@ -209,7 +214,8 @@ def private_folder(folder: Path) -> Path:
 
     1. Resolve links, because their owners could let them lead elsewhere.
     2. Make all missing folders with mode 0700, for any umask.
-    3. Check the content of the folder, the folder, and all folders above it.
+    3. Check the content of the folder, the folder, and all folders
+       above it.
     """
     if not folder.is_absolute():
         return _stand_in(f"{folder} is not an absolute path", folder.name)

@@ -33,9 +33,11 @@ if TYPE_CHECKING:
 
 MAX_OBJECTS = 1_000
 MAX_VALUES = 2**23
-"""Values of a file of fewer bytes than this. A larger file may hold one value per byte."""
+"""Values of a file of fewer bytes than this. A larger file may hold one
+value per byte."""
 SHUFFLE, DEFLATE, CHECKSUM, VIRTUAL = 2, 1, 3, 3
-"""HDF5's numbers of the accepted filters, and of the layout of virtual datasets."""
+"""HDF5's numbers of the accepted filters, and of the layout of virtual
+datasets."""
 CHECKSUM_BYTES = 4
 
 

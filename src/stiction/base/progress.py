@@ -16,18 +16,22 @@ from contextlib import suppress
 from typing import Any, TypeAlias
 
 Show: TypeAlias = bool | Callable[[int, int], None]
-"""True shows progress once work takes long, False is silent, a callable gets (done, total)."""
+"""True shows progress once work takes long, False is silent, a callable
+gets (done, total)."""
 
 SILENCE = 1.0
 """Seconds without a bar, because short work needs none."""
 PIPE_INTERVAL, NOTEBOOK_INTERVAL = 10.0, 0.5
-"""Seconds between lines in a pipe, at least, and between updates in a notebook."""
+"""Seconds between lines in a pipe, at least, and between updates in a
+notebook."""
 GONE = AttributeError, OSError, ValueError
-"""Errors of a stderr that is None, hung up, a broken pipe or closed. The work goes on."""
+"""Errors of a stderr that is None, hung up, a broken pipe or closed.
+The work goes on."""
 
 interrupted = threading.Event()
-"""Set by a signal that ends a run: the exception of its handler is lost if it comes in a finalizer
-or a callback from C, where Python ignores exceptions."""
+"""Set by a signal that ends a run: the exception of its handler is lost
+if it comes in a finalizer or a callback from C, where Python ignores
+exceptions."""
 
 
 def duration(seconds: float) -> str:

@@ -83,7 +83,8 @@ _MULTIPLES: dict[str, tuple[float, dict[str, float]]] = {
     "Pa": (0.1, {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1.0}),
     "N": (1.0, {"MN": 1e-6, "kN": 1e-3, "N": 1.0}),
 }
-"""Largest value on a scale from which on a unit is used, in that unit; units and their factors."""
+"""Largest value on a scale from which on a unit is used, in that unit;
+units and their factors."""
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴", "-01234")
 _POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
 
@@ -263,7 +264,8 @@ def stated_unit(array: Any) -> str:
 def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[Array, str]:
     """Return the values of a labelled array in SI, and their unit, the first that fits.
 
-    The unit is that of a quantity, of the caller, `given`, or of the source.
+    The unit is that of a quantity, of the caller, `given`, or of the
+    source.
     """
     numbers, stated = array.data, stated_unit(array)
     if type(numbers) is not np.ndarray or numbers.dtype != np.float64:
@@ -295,11 +297,13 @@ POSITIVE = (
 STRENGTHS = ("strength", "residual_strength")
 """Quantities in Pa that may be given as friction coefficients."""
 OVERLOAD = 9.9e37
-"""Smallest number with which an instrument marks an overload or a missing value (SCPI)."""
+"""Smallest number with which an instrument marks an overload or a
+missing value (SCPI)."""
 MARKS = np.array([-99.0, -999.0, -999.25, -9999.0, -99999.0, -32768.0, 1e20, 1e30, 9.96921e36])
 """Further numbers that instruments and formats write for a missing value."""
 TALL = 1e-3
-"""Range of heights without a unit, m, above which they are probably in um or nm."""
+"""Range of heights without a unit, m, above which they are probably in
+um or nm."""
 
 
 def check_measured(

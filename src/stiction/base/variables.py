@@ -37,8 +37,8 @@ PROFILES: dict[str, Variable] = {
     "fracture_energy": Variable("J m-2", "fracture energy"),
     "normal_pressure": Variable("Pa", "normal pressure"),
 }
-"""Profiles that may be given or sampled. Their order numbers the streams of random draws, and never
-changes."""
+"""Profiles that may be given or sampled. Their order numbers the
+streams of random draws, and never changes."""
 FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 QUANTITIES = PROFILES | {
     "residual_ratio": Variable("1", "residual ratio"),
@@ -66,7 +66,8 @@ UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "pressing_force": "N",
     "end_time": "s",
 }
-"""Units of parameters by the ends of their keys. Other parameters are pure numbers."""
+"""Units of parameters by the ends of their keys. Other parameters are
+pure numbers."""
 OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "noise")
 """Parameters of a marginal or a measurement in the unit of their field."""
 
@@ -101,9 +102,11 @@ FORCES: dict[str, tuple[str, str]] = {
     "mean_stress": ("force", "shear force"),
     "machine_stress": ("machine_force", "force of the machine"),
 }  # fmt: skip
-"""Names and texts of the forces that accompany mean stresses if the area is known."""
+"""Names and texts of the forces that accompany mean stresses if the
+area is known."""
 OF_WHOLE_INTERFACE = ("machine_stress",)
-"""Stresses of `FORCES` that the whole interface carries, not only the part that can break."""
+"""Stresses of `FORCES` that the whole interface carries, not only the
+part that can break."""
 
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
@@ -115,7 +118,9 @@ def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
 def forces(
     values: Mapping[str, Any], area: float | None, whole_area: float | None
 ) -> dict[str, Any]:
-    """Return the forces, N, for the stresses among some values. Without an area, it is empty.
+    """Return the forces, N, for the stresses among some values.
+
+    Without an area, it is empty.
 
     `area` can break, and `whole_area` is the whole interface, both in m².
     """

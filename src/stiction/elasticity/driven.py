@@ -148,7 +148,9 @@ def driven(
     glued: bool,
     machine: float,
 ) -> Driven:
-    """Return the response of blocks with a machine. For arguments see `block_response`.
+    """Return the response of blocks with a machine.
+
+    For arguments see `block_response`.
 
     If the blocks are `glued` while they are pressed, the pressure is
     not uniform. `machine` is its stiffness per unit

@@ -2,8 +2,8 @@
 
 Problem
 -------
-On rollers the top has v = 0. With glue, u is also given. This requires a shear
-traction t(s) on the top with
+On rollers the top has v = 0. With glue, u is also given. This requires
+a shear traction t(s) on the top with
 
     int G(x, s) t(s) ds = u(x),   0 < x < L,                         (1)
 

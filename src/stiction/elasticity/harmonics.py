@@ -22,10 +22,10 @@ k² int (d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
-1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a distance r,
-   minus two parts: the single reflection at each clamp, (1 + k (x + s) + 2 k² x s)
-   exp(-k (x + s))/(4 k³) for the left clamp, and a `remainder`, the reflections
-   between the clamps.
+1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a
+   distance r, minus two parts: the single reflection at each clamp,
+   (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the left clamp,
+   and a `remainder`, the reflections between the clamps.
 2. Sum the beam without ends and the single reflections over k in closed
    form (`sums`).
 3. The remainder falls as exp(-k L), so that few harmonics give it to
@@ -105,7 +105,8 @@ class Harmonics:
         # All reflections but the single reflections, which have closed forms.
         self._remainder = single - inverse @ endless
         self.raised = inverse[:, :, 0]
-        """Coefficients of the solution that is 1, without a slope, at the left clamp."""
+        """Coefficients of the solution that is 1, without a slope, at
+        the left clamp."""
 
     def sums(self, z: Array) -> Sums:
         """Step 2: return the sums of k^j exp(-k z) over k, for z with a positive real part."""

@@ -9,11 +9,11 @@ of nodes, the first column
     K_0 = (G*/2)(2 pi/L) n/4,   K_j = -(G*/2)(2 pi/L)/(n sin^2(pi j/n)) for odd j,  (1)
 
 and K_j = 0 for even j > 0. Even nodes act only on odd nodes and vice
-versa, which halves the cost of products. In a window, a run of nodes, the
-smallest eigenvalue of K is at most the weakening rate W. If all other nodes are
-held, the window is unstable. Its eigenvector bounds the load of the first
-instability (`protocol.Windows`), and the narrowest window gives the closest
-bound.
+versa, which halves the cost of products. In a window, a run of nodes,
+the smallest eigenvalue of K is at most the weakening rate W. If all
+other nodes are held, the window is unstable. Its eigenvector bounds the
+load of the first instability (`protocol.Windows`), and the narrowest
+window gives the closest bound.
 
 Algorithm
 ---------

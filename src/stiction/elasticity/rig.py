@@ -23,7 +23,8 @@ Algorithm
    counts from the interface, so that v changes its sign in the base.
 2. Reduce the top of the slider to coordinates: all its points if it is
    free, or a single v if a rigid, frictionless plate lies on it.
-3. Eliminate the top: S_S, and g and S_gg for the push and for the normal force.
+3. Eliminate the top: S_S, and g and S_gg for the push and for the
+   normal force.
 4. Evaluate (1) and (2) with a Cholesky factor of A, and S_B = A - S_S.
    Rigid motions of the slider, for which S_S is zero, then cause no
    force up to round-off.

@@ -56,7 +56,8 @@ def apply(
 ) -> None:
     """Multiply K by a field: `values` at the first `count` of the `nodes`, and zero elsewhere.
 
-    The result is written to `product` (n,). `halves` (2, n/2) is a workspace.
+    The result is written to `product` (n,). `halves` (2, n/2) is a
+    workspace.
     """
     raise NotImplementedError
 

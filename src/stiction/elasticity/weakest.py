@@ -134,7 +134,9 @@ def weakest_window(
 def window_bound(
     excess: Array, profile: Array, W: Array, windows: Windows, allowed: Array, y: Array
 ) -> float:
-    """Return the lowest bound from windows and from sliding as a whole, Pa. Write its multiplier.
+    """Return the lowest bound from windows and from sliding as a whole, Pa.
+
+    Write its multiplier.
 
     The multiplier y (n,) has <p, y> = 1. `allowed` (n,) is a workspace.
     """

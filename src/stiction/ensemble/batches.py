@@ -53,7 +53,8 @@ PIECE_SECONDS = 0.5
 MAX_PIECE_BYTES = 16 * 2**20
 """Largest size of the values of a piece of work."""
 WORKER_COUNT_SECONDS = 1.0
-"""Seconds between counts of the workers. A longer wait cannot be interrupted on Windows."""
+"""Seconds between counts of the workers. A longer wait cannot be
+interrupted on Windows."""
 
 
 class Span(NamedTuple):
@@ -209,7 +210,9 @@ def solve_spans(
     executor: Executor | None = None,
     workers: int = 1,
 ) -> Generator[tuple[Span, Table], None, None]:
-    """Solve spans of samples. Yield their pieces with their tables (steps 1 to 4).
+    """Solve spans of samples.
+
+    Yield their pieces with their tables (steps 1 to 4).
 
     At most two pieces per worker are in progress, so that
     memory stays bounded. Closing the generator cancels the

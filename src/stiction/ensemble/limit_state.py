@@ -34,17 +34,21 @@ from stiction.random.fields import RandomInterface
 from stiction.random.stresses import support_in_stress
 
 MAX_RANKED, RANKINGS, LOW_QUANTILE_SIGMAS = 32, 4_000, 3.0
-"""Most samples of each interface, and about the number of all samples, by which
-interfaces are ordered, and the standard deviations below the mean that are compared."""
+"""Most samples of each interface, and about the number of all samples,
+by which interfaces are ordered, and the standard deviations below the
+mean that are compared."""
 MAX_FACTORS = 8
-"""Most random factors of the strength at a node, which together have a negligible probability."""
+"""Most random factors of the strength at a node, which together have a
+negligible probability."""
 MIN_THREAD_SECONDS = 2e-3
 """Seconds of work that justify a thread."""
 
 
 @dataclass(frozen=True, eq=False)
 class LimitState:
-    """Stress at onset as a function of draws. See `stiction.external.limit_state`.
+    """Stress at onset as a function of draws.
+
+    See `stiction.external.limit_state`.
 
     Stresses may be taken relative to the normal pressure. If the
     pressure is random, each stress is multiplied by the mean pressure

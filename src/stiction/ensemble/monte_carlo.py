@@ -122,7 +122,9 @@ def gather(
     progress: Show = True,
     pilot: bool = True,
 ) -> xr.Dataset:
-    """Compute an ensemble at every sweep point. Stored samples are not computed again.
+    """Compute an ensemble at every sweep point.
+
+    Stored samples are not computed again.
 
     Finished samples go to the `store`. `elsewhere`, with shape (points,
     samples), marks samples that a different job computes. See

@@ -44,9 +44,9 @@ def compare(
 ) -> dict[str, Any]:
     """Return the bias and scatter of an approximate method for the first and weakest samples.
 
-    `onsets` (points, samples) has the critical stresses,
-    or NaN. By default a few samples are solved. The result is empty if there is
-    no exact counterpart, or if no point leaves a doubt.
+    `onsets` (points, samples) has the critical stresses, or NaN. By
+    default a few samples are solved. The result is empty if there is no
+    exact counterpart, or if no point leaves a doubt.
     """
     chosen = np.unique(np.linspace(0, len(points) - 1, MAX_PILOT_POINTS).round().astype(int))
     parts: dict[str, list[Array]] = {}

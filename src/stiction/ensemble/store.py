@@ -4,11 +4,10 @@ Problem. Many processes write samples to a folder, and any process may
 be killed at any moment. A written sample must not be lost, and damage
 must be detected.
 
-Solution. ``study.json`` identifies the study, and
-``chunks/`` holds the samples. A chunk is a table of samples
-with a mark that identifies its study. A digest of its content names a chunk. A
-chunk is written completely or not at all. Chunks never change, and no file
-lists them.
+Solution. ``study.json`` identifies the study, and ``chunks/`` holds the
+samples. A chunk is a table of samples with a mark that identifies its
+study. A digest of its content names a chunk. A chunk is written
+completely or not at all. Chunks never change, and no file lists them.
 
 Limits. A digest reveals damage, but not forgery, because anyone who can
 write to the folder can write other numbers with a new digest. A folder
@@ -64,7 +63,9 @@ class Damaged(StoreError):
 
 
 class Store:
-    """The folder of a run. It holds the samples of a study, which is given in plain form.
+    """The folder of a run.
+
+    It holds the samples of a study, which is given in plain form.
 
     After reading, `damage` holds the defects of damaged chunks by name.
     `seconds` (on one core) and `versions` describe the intact chunks.

@@ -1,4 +1,6 @@
-"""Test whether measured peaks agree with a prediction. The p-values also hold for few peaks.
+"""Test whether measured peaks agree with a prediction.
+
+The p-values also hold for few peaks.
 
 Problem. n peaks have the empirical distribution F_n. The prediction has
 the distribution F, given by a sample or by a posterior. Find the

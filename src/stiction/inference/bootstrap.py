@@ -14,9 +14,9 @@ Steps:
    from the estimate.
 2. Transform each parameter to a scale on which its error is about
    normal (`Scale`).
-3. The error of a repetition is (its estimate - estimate)/width. The width is
-   proportional to the square root of the correlation length, because a record
-   contains only few correlation lengths.
+3. The error of a repetition is (its estimate - estimate)/width. The
+   width is proportional to the square root of the correlation length,
+   because a record contains only few correlation lengths.
 4. Subtract the quantiles of the error, times the width, from the
    estimate: a first interval.
 5. Repeat steps 1 and 3 for fields whose correlation length lies at
@@ -65,10 +65,12 @@ LOCATION_PARAMETERS = ("mean", "marginal.mean", "marginal.loc")
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 MIN_WIDTH = 1e-3
-"""Least width of an interval, over its upper end. A narrower one is replaced by the whole range."""
+"""Least width of an interval, over its upper end. A narrower one is
+replaced by the whole range."""
 
 HELD_RTOL = 1e-6
-"""Distance of a shape from its limit, over the limit, within which it is held there."""
+"""Distance of a shape from its limit, over the limit, within which it
+is held there."""
 
 
 class Refits(NamedTuple):

@@ -30,10 +30,11 @@ Steps:
    peak, from three quarters of the fall to their median on. A final fall
    below half of this median is unloading, and does not count.
 
-Readings that are no friction are named in a warning: a single reading far above
-both neighbours (left out), equal largest readings (a saturated load cell), and a
-force at the start (no tare). A record with several full slides, or with forces of
-both signs, is not one test: `split` cuts it.
+Readings that are no friction are named in a warning: a single reading
+far above both neighbours (left out), equal largest readings (a
+saturated load cell), and a force at the start (no tare). A record with
+several full slides, or with forces of both signs, is not one test:
+`split` cuts it.
 """
 
 from __future__ import annotations
@@ -81,9 +82,11 @@ FORCE_UNITS, TRAVEL_UNITS = ("N", "Pa", "1"), ("m", "s")
 MIN_READINGS = 8
 """Fewest readings of a test."""
 MAX_BACKWARD_SHARE = 0.05
-"""Largest fraction of its range by which travel may go back. A larger one begins another cycle."""
+"""Largest fraction of its range by which travel may go back. A larger
+one begins another cycle."""
 ROUND_OFF = 1e-12
-"""Fraction of the largest force below which differences of readings are round-off."""
+"""Fraction of the largest force below which differences of readings are
+round-off."""
 MIN_DROP_SHARE = 1e-6
 """Fraction of the peak below which a fall is round-off if there is no noise."""
 MAX_SPIKES_SHARE = 0.01
@@ -93,10 +96,11 @@ MIN_FITTED = 12
 TARE = 0.05
 """Fraction of the peak that the first readings may have."""
 HIGH, LOW, MAX_RETURNS = 0.8, 0.7, 3
-"""A test falls below LOW of its peak and returns above HIGH of it fewer times than this. A record
-of stick-slip does so in each cycle."""
+"""A test falls below LOW of its peak and returns above HIGH of it fewer
+times than this. A record of stick-slip does so in each cycle."""
 BOTH_SIGNS = 0.2
-"""Fraction of the largest force that a force of the other sign reaches in a reciprocating test."""
+"""Fraction of the largest force that a force of the other sign reaches
+in a reciprocating test."""
 Split = Literal["cycles", "strokes", "tables"]
 
 

@@ -23,9 +23,9 @@ Steps:
    changes between the nodes of the parameter grid.
 3. Replace the sorted sample by the means of at most `GROUPS` groups.
    Groups are smaller in the tails.
-4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with centres
-   multiplied by sqrt(1 - w^2), so that the sum keeps variance 1. Tabulate the
-   logarithm in steps of `STEP`.
+4. Sum normal kernels of Silverman's width w = 1.06 N^(-1/5), with
+   centres multiplied by sqrt(1 - w^2), so that the sum keeps
+   variance 1. Tabulate the logarithm in steps of `STEP`.
 5. Interpolate this logarithm between steps and between the nodes
    of the parameter grid. Beyond the table it falls like a parabola.
 6. Integrate over v with the midpoint rule. It converges faster than any
@@ -48,9 +48,11 @@ GROUPS = 256
 TABLE_REACH = 10.0
 STEP = 0.05
 BOUND_DEVIATIONS = 1e5
-"""Distance of the bound below the onsets, in standard deviations, if the onsets have no bound."""
+"""Distance of the bound below the onsets, in standard deviations, if
+the onsets have no bound."""
 ERRORS, SPREADS = 4.0, 6.0
-"""Half range of the integration in standard deviations of the load cell, and of v."""
+"""Half range of the integration in standard deviations of the load
+cell, and of v."""
 
 
 class Densities(NamedTuple):

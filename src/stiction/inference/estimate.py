@@ -20,8 +20,8 @@ Steps:
    repeat both steps once with the estimated noise.
 3. Increase the variance of the marginal by the amount that removal of
    the mean and the trend takes from the values on average.
-4. A family's score is its mean log likelihood times the number of independent
-   values (step 5), minus one for each estimated parameter.
+4. A family's score is its mean log likelihood times the number of
+   independent values (step 5), minus one for each estimated parameter.
 5. Families fitted to the same values have the same mean and variance.
    The log ratio of their densities therefore begins with Hermite order
    3 in z. For N values with correlations rho_ij, the sum of the log
@@ -71,13 +71,16 @@ from stiction.random.fields import RandomField
 from stiction.random.mapping import from_normal
 
 NEGLIGIBLE_CHANGE = 1e-4
-"""Change of the noise variance, as a fraction of the variance, that does not change a marginal."""
+"""Change of the noise variance, as a fraction of the variance, that
+does not change a marginal."""
 LAGS = np.concatenate(([0.0], np.geomspace(0.01, 4.0, 400)))
-"""Lags in correlation lengths. The correlation of every spectrum falls to 1/e within them."""
+"""Lags in correlation lengths. The correlation of every spectrum falls
+to 1/e within them."""
 LEAST_LEFT = 0.2
 """Least fraction of the variance that mean and trend are assumed to leave."""
 ROUNDS = 2
-"""Rounds of step 6. Each round reduces the error of the field's variance to this fraction."""
+"""Rounds of step 6. Each round reduces the error of the field's
+variance to this fraction."""
 BANDS_PER_OCTAVE = 3
 """Bands of wavenumbers whose averages measure the roughness."""
 DRAWN = 5.0
@@ -85,7 +88,8 @@ DRAWN = 5.0
 
 
 MOST_SCATTER = math.log(2.0)
-"""Largest variance s of the search, of a log-normal factor with coefficient of variation 1."""
+"""Largest variance s of the search, of a log-normal factor with
+coefficient of variation 1."""
 
 
 @dataclass(frozen=True, eq=False)

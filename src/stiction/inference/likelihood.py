@@ -140,7 +140,9 @@ def experiments_at(
 
 
 def of_length(problem: Problem, length: float | None) -> Problem:
-    """Return the problem for specimens with a given length, m. None means its own length.
+    """Return the problem for specimens with a given length, m.
+
+    None means its own length.
 
     The node spacing is the spacing of the problem.
     """

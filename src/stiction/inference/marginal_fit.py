@@ -56,7 +56,8 @@ LEAST_SHAPE = 1.0
 NEGLIGIBLE_NOISE = 1e-4
 """Fraction of noise in the variance that does not change a marginal."""
 BOUND_MARGIN = 1e-2
-"""Least distance of noisy values from a bound for a first guess, as a fraction of their range."""
+"""Least distance of noisy values from a bound for a first guess, as a
+fraction of their range."""
 MOST_NOISE = 0.95
 LEAST_TOTAL = 0.2
 """Least sum of the shapes of 'beta' that follow from moments."""
@@ -89,8 +90,9 @@ KINDS: dict[str, tuple[Callable[..., Array], Callable[..., Array]]] = {
         lambda u, a, b: (a - 1.0) * np.log(u) + (b - 1.0) * np.log1p(-u) - betaln(a, b),
     ),
 }
-"""Families that are fitted here: distribution function and log density of (value - loc)/scale.
-The functions of scipy check their arguments, which takes longer than the functions themselves."""
+"""Families that are fitted here: distribution function and log density
+of (value - loc)/scale. The functions of scipy check their arguments,
+which takes longer than the functions themselves."""
 
 
 class Search(NamedTuple):

@@ -312,7 +312,9 @@ class SpecimenPosterior(Posterior):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces. They are draws from the posterior.
+        """Return equally likely random interfaces.
+
+        They are draws from the posterior.
 
         Parameters
         ----------

@@ -184,9 +184,10 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
     2. The local criterion is the same minimum with y
        restricted to one weight. It ignores the
        residual strength, so the equation always holds.
-    3. In equilibrium, with slip in units of b, the strength is a + b max(s - W d, (tau_r -
-       a)/b). The problem is the same only if (tau_r - a)/b is the same:
-       if a = 0, and tau_r is zero or proportional to tau_p.
+    3. In equilibrium, with slip in units of b, the strength is
+       a + b max(s - W d, (tau_r - a)/b). The problem is the same only
+       if (tau_r - a)/b is the same: if a = 0, and tau_r is zero or
+       proportional to tau_p.
     4. A rupture also depends on the loading
        rate, which would have to scale with b.
     5. If W follows from a critical slip or a fracture energy, W and the

@@ -44,11 +44,13 @@ UNEVEN = 0.02
 OUTLYING = 8.0
 """Distance of an outlier from the median, in robust standard deviations."""
 CORRELATED = 2.5
-"""Standard deviations by which neighbours must be more correlated than white noise."""
+"""Standard deviations by which neighbours must be more correlated than
+white noise."""
 USUAL_LENGTH = (1e-5, 1e3)
 """Lengths of records, m, beyond which their unit is doubted."""
 JUMPING = 10.0
-"""Difference of a dropout from its neighbours, in robust standard deviations of differences."""
+"""Difference of a dropout from its neighbours, in robust standard
+deviations of differences."""
 
 
 class Record(NamedTuple):

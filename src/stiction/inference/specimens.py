@@ -80,32 +80,39 @@ PRIOR_SCALE = 0.1
 LEAST_CV, MOST_CV = 2e-3, 0.9
 """Smallest and largest s."""
 SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
-"""Values of s and of log m on the grid, and means at which onsets are simulated if T(c)/c
-depends on c."""
+"""Values of s and of log m on the grid, and means at which onsets are
+simulated if T(c)/c depends on c."""
 ONSETS, FEW_ONSETS = {"local_criterion": 200}, 100
-"""Simulated onsets of each field, by the local criterion and by other methods."""
+"""Simulated onsets of each field, by the local criterion and by other
+methods."""
 LOG_STRENGTH_MARGIN = 0.3
-"""Distance in the logarithm of the strength by which simulated means exceed the range of peaks."""
+"""Distance in the logarithm of the strength by which simulated means
+exceed the range of peaks."""
 LOG_MEAN_MARGIN = 1.0
 """Distance by which the first range of log m exceeds the range of x."""
 LOWEST, PREDICTED = 6.0, 2_000
-"""Distance of the lowest x below log m, and points of x, for a predictive distribution."""
+"""Distance of the lowest x below log m, and points of x, for a
+predictive distribution."""
 OUTER_MASS = 1e-6
 """Neglected mass on either side of log m."""
 MAX_MEAN_ZOOMS = 4
 FINE, MAX_X_POINTS = 4.0, 2_000
-"""Points of x for the least standard deviation of a number, and most points in all. Cells
-of x add a twelfth of their square to a variance, which is 0.5 % of the least variance."""
+"""Points of x for the least standard deviation of a number, and most
+points in all. Cells of x add a twelfth of their square to a variance,
+which is 0.5 % of the least variance."""
 LOWEST_FACTOR, TABULATED = 6.0, 2_401
-"""Range of log b on either side of zero, and number of values in the table of its distribution."""
+"""Range of log b on either side of zero, and number of values in the
+table of its distribution."""
 TABULATED_DEVIATIONS = 6.0
 """Standard deviations up to which the likelihood of a number is tabulated."""
 FEW_FIELDS = 10
-"""Fields within a specimen for what moves a design, of which only ratios are used."""
+"""Fields within a specimen for what moves a design, of which only
+ratios are used."""
 UNIFORM = 1e-8
 """Coefficient of variation of a field that counts as uniform."""
 LEAST_DEVIATION = 1e-3
-"""Least standard deviation of the logarithm of a level or a peak that the grid resolves."""
+"""Least standard deviation of the logarithm of a level or a peak that
+the grid resolves."""
 
 
 @lru_cache(maxsize=1024)

@@ -6,26 +6,28 @@ Find the parameters with the greatest likelihood
 
     L = -sum_k w_k (log E_k + I_k/E_k).
 
-Sources. The likelihood is due to Whittle (1953), Arkiv foer Matematik 2, 423. With
-the exact expectation for a finite window it becomes the debiased likelihood of
-Sykulski, Olhede, Guillaumin, Lilly and Early (2019), Biometrika 106, 251, and on
-planes of Guillaumin, Sykulski, Olhede and Simons (2022), Journal of the Royal
-Statistical Society B 84, 1526. Correlations of mapped fields follow Grigoriu, Applied
+Sources. The likelihood is due to Whittle (1953), Arkiv foer Matematik
+2, 423. With the exact expectation for a finite window it becomes the
+debiased likelihood of Sykulski, Olhede, Guillaumin, Lilly and Early
+(2019), Biometrika 106, 251, and on planes of Guillaumin, Sykulski,
+Olhede and Simons (2022), Journal of the Royal Statistical Society B
+84, 1526. Correlations of mapped fields follow Grigoriu, Applied
 Non-Gaussian Processes (1995).
 
 Steps:
 
-1. Average the periodograms of all records with the same geometry (`window`).
-2. The correlation of the values is a power series in the correlation of z. Its
-   coefficients are the map's squared Hermite coefficients. White noise adds its
-   variance at zero lag.
+1. Average the periodograms of all records with the same geometry
+   (`window`).
+2. The correlation of the values is a power series in the correlation of
+   z. Its coefficients are the map's squared Hermite coefficients. White
+   noise adds its variance at zero lag.
 3. E_k follows exactly from this correlation and the window. The
    variance is a free parameter, so that its error in a short record
    does not disturb the shape of the spectrum.
-4. Add a thousandth of the highest power to I_k and E_k. A truncated spectrum
-   has almost no power at high wavenumbers, and without a floor, rounding and
-   higher orders of the map would matter there. The score stays unbiased, and
-   power below the floor has no effect.
+4. Add a thousandth of the highest power to I_k and E_k. A truncated
+   spectrum has almost no power at high wavenumbers, and without a
+   floor, rounding and higher orders of the map would matter there. The
+   score stays unbiased, and power below the floor has no effect.
 5. Start at the best point of a coarse parameter grid, and climb by
    scoring (`marginal_fit.climb`). Fisher's information is sum w d d^T
    with d = d log E/d theta.
@@ -60,7 +62,8 @@ RANGES = {
     # small noises could not be estimated.
     "noise_share": (-0.5, 0.95),
 }
-"""Ends of the searched range of each parameter. The noise is a fraction of the variance."""
+"""Ends of the searched range of each parameter. The noise is a fraction
+of the variance."""
 TRIED = {
     "variance": [1.0],
     "exponent": [1.0, 2.0, 4.0],
@@ -69,17 +72,21 @@ TRIED = {
 }
 """Values of the coarse grid of step 5."""
 FLOOR = 1e-3
-"""Floor as a fraction of the highest power, which is averaged over records and neighbours."""
+"""Floor as a fraction of the highest power, which is averaged over
+records and neighbours."""
 NEIGHBOURS = 5
 ORDERS, COARSE = 10, 0.1
-"""Hermite orders of the map of a marginal, and steps of z that give them to 1e-4."""
+"""Hermite orders of the map of a marginal, and steps of z that give
+them to 1e-4."""
 NAMES = ("correlation_length", "exponent", "anisotropy")
 """Parameters of a spectrum, by their keys."""
 AT_END = 1e-3
-"""Largest distance of an estimate at an end of a range, as a fraction of the range."""
+"""Largest distance of an estimate at an end of a range, as a fraction
+of the range."""
 LOG_STEP = 1e-4
 SETTLED = 1e-3
-"""Gain of log likelihood below which scoring ends. A standard error is worth one half."""
+"""Gain of log likelihood below which scoring ends. A standard error is
+worth one half."""
 LONGEST = 1.5
 """Longest step of scoring, on the scale of the search."""
 

@@ -46,18 +46,22 @@ from stiction.base.arrays import Array
 TAPERED = 0.5
 """Fraction of a record over which the cosine taper rises and falls."""
 EXACT = {1: 16, 2: 2}
-"""Wavenumbers, as numbers of modes, up to which the expectation contains the trend."""
+"""Wavenumbers, as numbers of modes, up to which the expectation
+contains the trend."""
 ROOM = {1: 4, 2: 2}
-"""Period of the grid on which a correlation is computed, in lengths of the record."""
+"""Period of the grid on which a correlation is computed, in lengths of
+the record."""
 EDGE = 2.0
-"""Modes over which a spectrum fades out at its end. The likelihood would move in steps
-with the correlation length if the end were sharper."""
+"""Modes over which a spectrum fades out at its end. The likelihood
+would move in steps with the correlation length if the end were
+sharper."""
 LEFT_OUT = 1e-4
 """Fraction of the variance above the end of a spectrum without truncation."""
 FOLDS = 6
 """Multiples of the sampling wavenumber whose aliases are added one by one."""
 NEAR, FEW = 1, {1: 65, 2: 33}
-"""Multiples that need all wavenumbers, and number of wavenumbers per direction for the others."""
+"""Multiples that need all wavenumbers, and number of wavenumbers per
+direction for the others."""
 
 
 Density = Callable[[Array], Array]
@@ -151,7 +155,9 @@ class RecordWindow:
         return result
 
     def power(self, spectrum: Any, anisotropy: float = 1.0) -> Array:
-        """Return the variance of z in each mode on a periodic grid. The sum is 1 (step 4).
+        """Return the variance of z in each mode on a periodic grid.
+
+        The sum is 1 (step 4).
 
         Power above `FOLDS` sampling wavenumbers is spread evenly. The
         spectrum is not truncated, because the missing power of a rough

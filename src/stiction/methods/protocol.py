@@ -122,7 +122,8 @@ class OptionalMembers:
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether to compare the onsets of samples (Pa) with the onsets by `exact_method`.
 
-        Return False if a quick test finds that they differ by less than 1 %.
+        Return False if a quick test finds that they differ by less than
+        1 %.
         """
         return True
 

@@ -116,7 +116,8 @@ def named(results: Any) -> dict[str, xr.Dataset]:
 def shown_quantity(result: xr.Dataset, quantity: str | None = None) -> str:
     """Return the variable of an onset to draw: force, or else coefficient, or else stress.
 
-    On a plane the area is always known, but forces are drawn only on request.
+    On a plane the area is always known, but forces are drawn only on
+    request.
     """
     if quantity is None:
         names = ["critical_force"] * (DIRECTION not in result.dims) + ["friction_coefficient"]

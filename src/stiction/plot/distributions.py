@@ -32,7 +32,8 @@ from stiction.statistics import quantiles as estimate_quantiles
 
 MAX_CURVES = 6
 FEWEST = 20
-"""Values above which a density is estimated. Fewer values are marked separately."""
+"""Values above which a density is estimated. Fewer values are marked
+separately."""
 DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
 """Probability in place of zero on a logarithmic scale."""
@@ -162,7 +163,8 @@ def quantiles(
     Raises
     ------
     InputError
-        If the result has no sweep, or a sweep over more than two parameters.
+        If the result has no sweep, or a sweep over more than two
+        parameters.
     """
     need(result)
     variable = result[shown_quantity(result, quantity)]

@@ -70,7 +70,8 @@ def field(
     Raises
     ------
     InputError
-        If the profile does not fit the interface, or the quantity is unknown.
+        If the profile does not fit the interface, or the quantity is
+        unknown.
 
     Examples
     --------

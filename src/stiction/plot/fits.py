@@ -18,7 +18,8 @@ from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style
 
 SHOWN = 100
-"""Repetitions, or simulated records, from which a band is drawn that contains 90 % of them."""
+"""Repetitions, or simulated records, from which a band is drawn that
+contains 90 % of them."""
 LAGS = 2.5
 """Correlation lengths that the panel of the correlation shows."""
 PER_OCTAVE = 4
@@ -104,7 +105,9 @@ def _powers(observed: list[Observed]) -> list[Array]:
 
 
 def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array]) -> Array:
-    """Return the correlation in the windows at lags (m). Records are weighted by their size.
+    """Return the correlation in the windows at lags (m).
+
+    Records are weighted by their size.
 
     A record counts at lags up to half its length, because its period
     repeats lags beyond.

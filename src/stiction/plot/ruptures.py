@@ -25,7 +25,8 @@ from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, SLIP_RATE, paper
 from stiction.problem.problem import Problem
 
 Moving = list[tuple[Any, str, Any]]
-"""Moving parts of a figure: an artist, the name of its data, and the data by frame."""
+"""Moving parts of a figure: an artist, the name of its data, and the
+data by frame."""
 
 FRAME_TIME = 50
 """Milliseconds that a film shows each frame."""
@@ -36,7 +37,8 @@ BEFORE = 0.11
 FILMED_RATE = 1e-3
 """Slip rate, over the largest of a run, from which its frames are in a film."""
 FRONT_SHARE = 0.9
-"""Fraction of the nodes that the front has reached at the last of its contours."""
+"""Fraction of the nodes that the front has reached at the last of its
+contours."""
 STRENGTH = LinearSegmentedColormap.from_list("strength", ["0.85", "0.25"])
 """Greys of strength. White is where nothing breaks."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"

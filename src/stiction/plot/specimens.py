@@ -214,9 +214,9 @@ def precursors(
     Returns
     -------
     (2,) array of matplotlib.axes.Axes
-        The upper panel shows force over travel of the drives, or mean stress if
-        the blocks have no thickness. The lower panel shows the extent of each
-        event at its travel.
+        The upper panel shows force over travel of the drives, or mean
+        stress if the blocks have no thickness. The lower panel shows
+        the extent of each event at its travel.
 
     Examples
     --------

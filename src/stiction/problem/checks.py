@@ -24,27 +24,34 @@ from stiction.problem.interface import Interface
 from stiction.problem.specimen import Blocks
 
 MAX_STRENGTH_RATIO = 1e8
-"""Strength of a node over the median beyond which others are lost in round-off."""
+"""Strength of a node over the median beyond which others are lost in
+round-off."""
 BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its lower quartile, by rank, of
-nodes that weaken."""
+"""A node is a barrier where tau_p - tau_r is above so many times its
+lower quartile, by rank, of nodes that weaken."""
 MIN_NODES_IN_NUCLEATION = 4
 """Nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
-"""Nodes in a nucleation length below which a unit is doubted. Hundred times more are needed."""
+"""Nodes in a nucleation length below which a unit is doubted. Hundred
+times more are needed."""
 MIN_LENGTHS_IN_LINE = 4.0
-"""Nucleation lengths: on shorter lines free ends change the mean onset by more than about 1 %."""
+"""Nucleation lengths: on shorter lines free ends change the mean onset
+by more than about 1 %."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
-"""Nucleation length at a free end of two equal blocks over the length in the middle."""
+"""Nucleation length at a free end of two equal blocks over the length
+in the middle."""
 FRICTION = (1e-3, 10.0), (1e-4, 100.0)
-"""Usual and possible mean strengths over normal pressure, from superlubricity to adhesive gels."""
+"""Usual and possible mean strengths over normal pressure, from
+superlubricity to adhesive gels."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
-"""Usual and possible ratios of strength and shear modulus. Steel (8e10 Pa) under 10 kPa at a
-coefficient of 0.1 has 1e-8."""
+"""Usual and possible ratios of strength and shear modulus. Steel (8e10
+Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
 INITIAL = (1e-5, math.inf), (0.0, math.inf)
-"""Usual and possible sizes of an initial stress, if there is any, over the strength."""
+"""Usual and possible sizes of an initial stress, if there is any, over
+the strength."""
 SLIP = (1e-8, math.inf), (1e-10, math.inf)
-"""Usual and possible slips over which strength falls, m. An atom measures 1e-10 m."""
+"""Usual and possible slips over which strength falls, m. An atom
+measures 1e-10 m."""
 
 
 # -- profiles that fit together -----------------------------------------------------------------

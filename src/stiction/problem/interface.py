@@ -29,7 +29,8 @@ Mask = NDArray[np.bool_]
 FEWEST_NODES, MOST_NODES = 8, 2**24
 """Nodes in each direction, and in all."""
 SHORTEST = 1e-30
-"""Spacing of nodes, m, below which squares and ratios leave the range of numbers."""
+"""Spacing of nodes, m, below which squares and ratios leave the range
+of numbers."""
 
 
 def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:

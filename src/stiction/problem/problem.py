@@ -38,9 +38,11 @@ if TYPE_CHECKING:
     from stiction.elasticity.rig import Rig
 
 MIN_MACHINE_RATIO = 1e-4
-"""Stiffness of a machine over that of its blocks below which it is probably in another unit."""
+"""Stiffness of a machine over that of its blocks below which it is
+probably in another unit."""
 MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
-"""Height of blocks over their length between which their response takes seconds and below 1 GB."""
+"""Height of blocks over their length between which their response takes
+seconds and below 1 GB."""
 NO_AREA = (
     "a force needs the area of the interface: give the thickness of the specimen, or"
     " interface.width of a line (m)"

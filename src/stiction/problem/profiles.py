@@ -141,7 +141,9 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
 
 
 def at_nodes(key: str, value: Any, interface: Interface, *, missing: bool = False) -> Any:
-    """Return a profile in SI at the nodes (steps 1 to 3). With `missing`, some may be NaN.
+    """Return a profile in SI at the nodes (steps 1 to 3).
+
+    With `missing`, some may be NaN.
 
     `key` may be dotted. Arrays with a different shape are returned
     unchanged, because the caller checks them.

@@ -48,7 +48,8 @@ REPLACED = {
     "normal_pressure": ("load.normal_pressure", "load.pressing_force"),
     **dict.fromkeys(SCALES, tuple(f"friction.{name}" for name in SCALES)),
 }
-"""Parameters that a profile, or a random property, of each name would replace."""
+"""Parameters that a profile, or a random property, of each name would
+replace."""
 
 
 class _Profiles(NamedTuple):
@@ -333,8 +334,8 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
 def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     """Return messages about values that profiles or random properties would replace.
 
-    There are also messages about values that are missing in both places. In the
-    messages, `owner` precedes the names.
+    There are also messages about values that are missing in both
+    places. In the messages, `owner` precedes the names.
     """
     twice = [
         f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"
@@ -375,7 +376,9 @@ def constants_of(problem: Any, strength: Any) -> dict[str, Any]:
 def own_sample(
     problem: Any, profiles: Mapping[str, Array], accept: Collection[str] = ()
 ) -> Sample:
-    """Return a sample from arrays by name that the package made. They are in SI units.
+    """Return a sample from arrays by name that the package made.
+
+    They are in SI units.
 
     Only values are checked here, because some samples may not fit
     the problem. The caller checks the resolution, and the nodes

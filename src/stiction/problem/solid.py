@@ -16,8 +16,9 @@ from stiction.base.units import Doubt, doubt_units
 POSSIBLE_SPEED = (0.3, 2e4)
 """Shear wave speed, m/s: 1 m/s in the softest gels, and 12 km/s in diamond."""
 SOFT_DENSITY, SLOWEST_STIFF = 2000.0, 50.0
-"""Density of gels and filled rubbers, kg/m3, above which solids are stiff, and their least shear
-wave speed, m/s. Lead has 700 m/s, and moduli in MPa make 3 m/s of rock."""
+"""Density of gels and filled rubbers, kg/m3, above which solids are
+stiff, and their least shear wave speed, m/s. Lead has 700 m/s, and
+moduli in MPa make 3 m/s of rock."""
 
 
 @model

@@ -35,12 +35,15 @@ Stiffness = Annotated[
 ]
 Quality = Annotated[Stiffness, Field(ge=0.01)]
 MAX_SIZE_RATIO = 20.0
-"""Sizes of a slider and its base over its length above which their unit is probably wrong."""
+"""Sizes of a slider and its base over its length above which their unit
+is probably wrong."""
 MIN_PRESSURE = 1e-6
-"""Smallest local pressure over its mean with which a critical slip gives a weakening rate."""
+"""Smallest local pressure over its mean with which a critical slip
+gives a weakening rate."""
 MAX_POSITIVE = 1e-2
-"""Largest positive entry of K_uu + mu Q K_wu of the cells, over its diagonal, for which a path is
-defined. It counts how much the slip of a cell loads another cell forwards."""
+"""Largest positive entry of K_uu + mu Q K_wu of the cells, over its
+diagonal, for which a path is defined. It counts how much the slip of a
+cell loads another cell forwards."""
 
 
 _COEFFICIENTS = (
@@ -54,7 +57,8 @@ UNFIT_FOR_SLIDER = {
     "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
     "extent": "all of a slider can slip. Leave it out",
 }
-"""What a slider does not take, by the last part of a key: as stresses, profiles or at all."""
+"""What a slider does not take, by the last part of a key: as stresses,
+profiles or at all."""
 
 
 @model(kw_only=True)

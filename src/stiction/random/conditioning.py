@@ -2,10 +2,11 @@
 
 Problem
 -------
-A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with standard
-normal a. The property is v(x) = F^-1(Phi(z(x))) with the marginal F. Values v_k
-were measured at places x_k, with normal errors of standard deviation `noise`.
-With phi_k = phi(x_k), the posterior for the draws has a density proportional to
+A Gaussian field is a linear function of its draws, z(x) = phi(x)'a with
+standard normal a. The property is v(x) = F^-1(Phi(z(x))) with the
+marginal F. Values v_k were measured at places x_k, with normal errors
+of standard deviation `noise`. With phi_k = phi(x_k), the posterior for
+the draws has a density proportional to
 
     N(a) prod_k l_k(phi_k'a),   log l_k(z) = -(v_k - F^-1(Phi(z)))^2 / (2 noise^2).           (1)
 
@@ -22,19 +23,21 @@ The caller only replaces the draws.
 
 Algorithm (`conditioned`)
 -------------------------
-The method is expectation propagation (T. P. Minka, Uncertainty in Artificial
-Intelligence 17, 2001), followed by an estimate of the skewness that Gaussians miss:
+The method is expectation propagation (T. P. Minka, Uncertainty in
+Artificial Intelligence 17, 2001), followed by an estimate of the
+skewness that Gaussians miss:
 
 1. Begin with z ~ N(0, 1) at every place,
    as if no other value had been measured.
 2. Replace each l_k by a Gaussian. Choose it so that the product with
    the normal distribution of z_k given all other values keeps its mean
    and variance (`Measured.gaussian`, by quadrature).
-3. Find the regression (2) from a singular value decomposition (`_regression`).
-   With the rows |p_k|^(1/2) phi_k' = U s V' and positive p_k, P^(1/2) = 1 + V ((1
-   + s^2)^(-1/2) - 1) V' is well conditioned even if a smooth field was measured
-   densely. If some p_k are negative, V is turned so that P is diagonal in it, and
-   s^2 are the eigenvalues of P^-1 - 1, which may be negative.
+3. Find the regression (2) from a singular value decomposition
+   (`_regression`). With the rows |p_k|^(1/2) phi_k' = U s V' and
+   positive p_k, P^(1/2) = 1 + V ((1 + s^2)^(-1/2) - 1) V' is well
+   conditioned even if a smooth field was measured densely. If some p_k
+   are negative, V is turned so that P is diagonal in it, and s^2 are
+   the eigenvalues of P^-1 - 1, which may be negative.
 4. Remove the Gaussian of each place from the posterior. The result,
    called the cavity, is the mean and variance of z_k given all other
    values (`_from_others`).

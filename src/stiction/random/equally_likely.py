@@ -129,16 +129,17 @@ AnyRandom: TypeAlias = Annotated[
     RandomInterface | RandomField | Source | Sequence[RandomInterface | RandomField],
     SkipValidation, BeforeValidator(_known), "RandomInterface | RandomField | list",
 ]  # fmt: skip
-"""A random interface or field, a list of equally likely interfaces, or their source."""
+"""A random interface or field, a list of equally likely interfaces, or
+their source."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquallyLikely:
     """One random interface, or several that are equally likely: the random input of every method.
 
-    If there are several, the first draw of a sample selects the member. The
-    other draws are the same for all members: a property and a mode have one draw.
-    If a sample changes its member, its profiles keep
+    If there are several, the first draw of a sample selects the member.
+    The other draws are the same for all members: a property and a mode
+    have one draw. If a sample changes its member, its profiles keep
     their form. A single member has no such draw, and its draws are
     those of the interface.
     """

@@ -2,8 +2,8 @@
 
 Problem
 -------
-A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995) is v(x) =
-g(z(x)) with
+A translation field (M. Grigoriu, Applied Non-Gaussian Processes, 1995)
+is v(x) = g(z(x)) with
 
     g(z) = F^-1(Phi(z)),                                                                      (1)
 
@@ -31,8 +31,8 @@ deviations.
 
 Algorithm of the correlation (`hermite_coefficients`)
 -----------------------------------------------------
-4. Compute c_m of (2) with the trapezoidal rule on [-8, 8], and the polynomials with
-   their recursion.
+4. Compute c_m of (2) with the trapezoidal rule on [-8, 8], and the
+   polynomials with their recursion.
 5. Stop after at least `MIN_TERMS` terms, when the remaining fraction of
    the variance is small.
 6. Append a coefficient for the remaining variance, so that the
@@ -83,7 +83,9 @@ def quantile_of_normal(distribution: Any, z: Array) -> Array:
 
 @jit
 def interpolate(z: Array, table: Array, out: Array) -> int:
-    """Step 3: write the tabulated mapping of `z` to `out` (flat arrays). Return the number of NaN.
+    """Step 3: write the tabulated mapping of `z` to `out` (flat arrays).
+
+    Return the number of NaN.
 
     Values are NaN outside the table and on marked pieces.
     """

@@ -315,7 +315,8 @@ FACTOR_FAMILIES: dict[str, Any] = {
     "normal": TruncatedNormal,  # above zero
     "weibull": Weibull,
 }
-"""Distributions of the factor between specimens, by the names in `infer` and in answers."""
+"""Distributions of the factor between specimens, by the names in
+`infer` and in answers."""
 
 
 def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
@@ -336,13 +337,15 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
 
 
 MARGINALS = Kinds("marginals")
-"""Families by their names in study files. 'beta' and 'gamma' also take parameters of scipy."""
+"""Families by their names in study files. 'beta' and 'gamma' also take
+parameters of scipy."""
 
 
 def marginal_of(value: Any) -> Marginal:
     """Return a marginal, given as a marginal, a table {type, ...} or a frozen distribution.
 
-    Raises an `InputError` for any other value, or if a moment is not finite.
+    Raises an `InputError` for any other value, or if a moment is not
+    finite.
     """
     if isinstance(value, Marginal):
         # Families of this package have finite moments by construction.
@@ -397,4 +400,5 @@ AnyMarginal: TypeAlias = Converted[MarginalObject, Marginal | FrozenDistribution
 AnyMarginals: TypeAlias = Converted[
     dict[str, MarginalObject] | None, Mapping[str, Marginal | FrozenDistribution] | None
 ]
-"""A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats` distribution."""
+"""A `Beta`, `Lognormal`, ..., or any frozen continuous `scipy.stats`
+distribution."""

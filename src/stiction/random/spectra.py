@@ -47,7 +47,8 @@ LARGEST_CUTOFF = 1e4
 
 Share: TypeAlias = Annotated[Real, Field(gt=0, lt=1)]
 Magnitude: TypeAlias = Annotated[Positive, Field(gt=1e-15, lt=1e15)]
-"""Length, wavenumber, or ratio of two, whose powers do not underflow or overflow."""
+"""Length, wavenumber, or ratio of two, whose powers do not underflow or
+overflow."""
 Kept: TypeAlias = Annotated[Share, Field(gt=1e-6)]
 INTEGRAL_RTOL, MAX_INTEGRAL_ERROR = 1e-12, 1e-6  # requested and accepted errors of integrals
 

@@ -2,24 +2,26 @@
 
 Problem
 -------
-On a periodic interface a field consists of waves with k = 2 pi (jx/Lx, jy/Ly). Compute the
-spectral representation (M. Shinozuka and G. Deodatis, Applied Mechanics Reviews 44, 1991)
+On a periodic interface a field consists of waves with k = 2 pi (jx/Lx,
+jy/Ly). Compute the spectral representation (M. Shinozuka and G.
+Deodatis, Applied Mechanics Reviews 44, 1991)
 
     z(x) = sigma_0 A_0 + sum_j sigma_j (A_j cos k_j.x + B_j sin k_j.x),                       (1)
 
-with standard normal A_j and B_j. With the spectral density g(k) and the truncation K, the
-amplitudes have the variances
+with standard normal A_j and B_j. With the spectral density g(k) and the
+truncation K, the amplitudes have the variances
 
     sigma_j^2 = g(k_j) / sum_i g(k_i),   |k_j| <= K.                                          (2)
 
-Sample i must depend only on the seed and i. Within a sample, a draw must depend only on its
-property and mode, not on the batch, the number of workers, the spectrum or the grid.
+Sample i must depend only on the seed and i. Within a sample, a draw
+must depend only on its property and mode, not on the batch, the number
+of workers, the spectrum or the grid.
 
 Modes (`make_modes`)
 --------------------
-1. List candidate wave vectors, either k or -k, in an order that depends only on the
-   proportions of the interface. The position of a mode in this order
-   selects its draws (`_numbers`).
+1. List candidate wave vectors, either k or -k, in an order that depends
+   only on the proportions of the interface. The position of a mode in
+   this order selects its draws (`_numbers`).
 2. Keep the wave vectors up to the truncation.
 3. Compute (2). The mean mode k = 0 is a single wave
    vector, and every other mode represents k and -k.
@@ -27,20 +29,21 @@ Modes (`make_modes`)
 
 Draws (`Stream.draw`)
 ---------------------
-4. On a line, 256 samples form a block with one generator, because a generator
-   for each sample would cost more than the sample. On a plane, a sample
-   has so many modes that it forms a block by itself. The generator
-   depends on the seed, the property and the number of the block.
+4. On a line, 256 samples form a block with one generator, because a
+   generator for each sample would cost more than the sample. On a
+   plane, a sample has so many modes that it forms a block by itself.
+   The generator depends on the seed, the property and the number of the
+   block.
 5. Inside a block the draws follow mode after mode, with A_j before B_j,
    so that a spectrum with more modes extends the same field. Draws of
    modes outside the spectrum are dropped.
 
 Field (`synthesise`)
 --------------------
-6. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate at -k,
-   into the half of the wave vectors that a real transform holds. Fold
-   unresolved modes onto resolved modes, so that values at the nodes are
-   exact on any grid.
+6. Put mode (jx, jy) with amplitude (A - i B)/2 at k, and its conjugate
+   at -k, into the half of the wave vectors that a real transform holds.
+   Fold unresolved modes onto resolved modes, so that values at the
+   nodes are exact on any grid.
 7. Transform back, sample by sample, so that the numbers do not depend
    on the batch.
 
@@ -156,7 +159,9 @@ class Modes:
 def make_modes(
     spectrum: Any, mean_mode: bool, anisotropy: float, interface: Interface
 ) -> Modes:
-    """Return the modes of a spectrum. Raise an `InputError` if there are too many or no modes.
+    """Return the modes of a spectrum.
+
+    Raise an `InputError` if there are too many or no modes.
 
     A field on a specimen is half of a periodic field that is twice as
     long. With this period, the correlation at lags along the specimen

@@ -89,9 +89,9 @@ class Answer(Result):
         the largest first. `low` and `high` are the settings at both
         ends. `force_at_low` and `force_at_high`, N, and `stress_at_low`
         and `stress_at_high`, Pa, are the designs there. Attributes
-        ``stress by ...`` hold the stress for each distribution between specimens
-        between specimens. ``sensitivities.to_dataframe().to_csv(path)``
-        writes a file, and `stiction.plot.sensitivities` draws it.
+        ``stress by ...`` hold the stress for each distribution between
+        specimens. ``sensitivities.to_dataframe().to_csv(path)`` writes
+        a file, and `stiction.plot.sensitivities` draws it.
     characteristic_stress, confidence : float
         Given by `design_stress` if specimens were counted: stress, Pa,
         below which 5 % of the specimens slide, with this confidence (EN
@@ -244,12 +244,13 @@ class Answer(Result):
         path : path
             HTML file.
         evidence : sequence
-            Further results that are printed on the page, such as an agreement, with their
-            doubts. The fit or posterior of the design, its peaks and its agreement are
-            printed in any case.
+            Further results that are printed on the page, such as an
+            agreement, with their doubts. The fit or posterior of the
+            design, its peaks and its agreement are printed in any case.
         sources : mapping, optional
-            The sources of inputs by dotted key, such as ``{"load.pressing_force":
-            "drawing 12"}``. An input without a source is called 'assumed'.
+            The sources of inputs by dotted key, such as
+            ``{"load.pressing_force": "drawing 12"}``. An input without
+            a source is called 'assumed'.
         title : str
 
         Returns

@@ -79,7 +79,8 @@ CONSTANTS = (
     "load.pressing_force", "solid.shear_modulus", "specimen.height", "specimen.drive.stiffness",
     "specimen.drive.height",
 )  # fmt: skip
-"""Dotted keys of the constants that may be assumed, if they are numbers in a problem."""
+"""Dotted keys of the constants that may be assumed, if they are numbers
+in a problem."""
 FAMILY = "distribution between specimens"
 
 

@@ -10,7 +10,8 @@ Sources. Each algorithm has its own file: `counting`, `subset`,
 Steps:
 
 1. Answer at once if the stress lies outside the bounds of the onset.
-2. Count many specimens for each solved field, if this costs less (`counting`).
+2. Count many specimens for each solved field, if this costs less
+   (`counting`).
 3. Otherwise solve a pilot of plain samples. Count if failures are
    frequent, or if the method is too slow for chains (`counting`).
    Sample the tail if they are rare (`tail`).
@@ -71,9 +72,11 @@ PILOT_SAMPLES = 1_000
 NEGLIGIBLE_PROBABILITY = 1e-15
 """Probability of failing, or of holding, below which no sample is drawn."""
 DOUBTFUL = 0.02
-"""Fraction of the mean strength below which a stress is probably in another unit."""
+"""Fraction of the mean strength below which a stress is probably in
+another unit."""
 THOUSAND = 1e3
-"""Ratio to the mean strength that means another unit, such as kN for N or MPa for Pa."""
+"""Ratio to the mean strength that means another unit, such as kN for N
+or MPa for Pa."""
 SHOWN_PROFILES = 20
 """Number of failing profiles in an answer."""
 COVERED = 0.8

@@ -35,26 +35,32 @@ from stiction.reliability.answer import Answer
 from stiction.reliability.tail import Tail, TailPoint
 
 TargetCv: TypeAlias = Annotated[Real, Field(ge=1e-6, le=1)]
-"""A smaller one would take more than 1e12 failures. A larger one is not an estimate."""
+"""A smaller one would take more than 1e12 failures. A larger one is not
+an estimate."""
 Probability: TypeAlias = Annotated[Real, Field(ge=1e-30, lt=1)]
 Budget: TypeAlias = Annotated[Count, Field(ge=100)]
 
 COUNTING_SECONDS, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 100.0, 1_000, 2_000_000
-"""Computing time of counting by a slow method, and fewest and most evaluations by default."""
+"""Computing time of counting by a slow method, and fewest and most
+evaluations by default."""
 CHAIN_EVALUATIONS, PATIENCE_SECONDS = 20_000, 900.0
-"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1, and longest time of
-evaluations on one core, s, unless `max_evaluations` allows more."""
+"""Evaluations of subset simulation for about P = 1e-4 with a cv of 0.1,
+and longest time of evaluations on one core, s, unless `max_evaluations`
+allows more."""
 LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
-"""Parts of the target for the errors by the list of interfaces and by sampling. Squares add up."""
+"""Parts of the target for the errors by the list of interfaces and by
+sampling. Squares add up."""
 REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
-"""Margin on the wanted number of members, and fraction of the mean that a warning reports."""
+"""Margin on the wanted number of members, and fraction of the mean that
+a warning reports."""
 FRESH = 1.5
 """Least ratio of different members that makes a longer list worthwhile."""
 UNDETERMINED, ODDS = 1.5, 20.0
-"""Ratio of the stresses by family from which tests do not determine a rare failure, and odds
-that tell families apart."""
+"""Ratio of the stresses by family from which tests do not determine a
+rare failure, and odds that tell families apart."""
 EXACT_CHECKS = (8, 64)
-"""Fewest and most samples of an approximate method that are solved exactly as a check."""
+"""Fewest and most samples of an approximate method that are solved
+exactly as a check."""
 CHECK_SECONDS = 10.0
 """Seconds of one core for this check."""
 F = TypeVar("F", "Answer", TailPoint)
@@ -118,8 +124,9 @@ def exact_tail(state: LimitState) -> Tail:
 def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
     """Return a doubt if the distributions between specimens lead to very different stresses.
 
-    The number of specimens is that for which the likelihoods of the two families differ by
-    `ODDS` on average, by the divergence of one family from the other.
+    The number of specimens is that for which the likelihoods of the two
+    families differ by `ODDS` on average, by the divergence of one
+    family from the other.
     """
     stresses = {name: law.quantile(probability, name) for name in law.families}
     low, high = (pick(stresses, key=stresses.__getitem__) for pick in (min, max))
@@ -278,7 +285,9 @@ def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np
 
 
 def exact_doubts(point: TailPoint) -> list[str]:
-    """Solve some samples exactly if the method is approximate. Warn if more or fewer samples fail.
+    """Solve some samples exactly if the method is approximate.
+
+    Warn if more or fewer samples fail.
 
     These are low samples on both sides of the stress.
     Failures are counted, because in a tail a small change of stress may

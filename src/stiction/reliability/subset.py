@@ -60,7 +60,8 @@ Label = Callable[[Array], NDArray[np.int64]]
 LEVEL_PROBABILITY = 0.1
 """Fraction of a level's samples that continue to the next."""
 ACCEPTANCE = 0.37
-"""Target fraction of accepted steps; from 0.25 to 0.44 efficiency differs by 10 % at most."""
+"""Target fraction of accepted steps; from 0.25 to 0.44 efficiency
+differs by 10 % at most."""
 FIRST_STEP = 0.7
 MOST_LEVELS = 40
 KEPT_POPULATIONS = 3
@@ -82,8 +83,8 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
     2. If all samples fail, v is zero. Use at least (2/N)^2, as if two
        more samples had not failed. This bounds the error as the
        binomial distribution does.
-    3. With k families of equal size, v is 1/k, but the variance of a mean over
-       k values needs 1/(k - 1). Therefore return v/(1 - v).
+    3. With k families of equal size, v is 1/k, but the variance of a
+       mean over k values needs 1/(k - 1). Therefore return v/(1 - v).
     """
     if ancestors.size == 0:
         return math.inf

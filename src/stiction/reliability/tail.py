@@ -50,17 +50,21 @@ from stiction.reliability.two_level import bridge
 CONFIDENCE = 0.9
 """Confidence level of every interval."""
 FREQUENT = 0.01
-"""Probability above which counting needs no more evaluations than subset simulation."""
+"""Probability above which counting needs no more evaluations than
+subset simulation."""
 SIZE_MARGIN = 1.1
-"""Factor on the sample size, because the variance so far is itself an estimate."""
+"""Factor on the sample size, because the variance so far is itself an
+estimate."""
 DEEPER = 0.3
-"""Fraction of a probability to which repetitions go on for the lower end of the interval."""
+"""Fraction of a probability to which repetitions go on for the lower
+end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
 """Number of plain samples by which a guide is judged."""
 LEAST_SHARE_PICKED = 0.9
 """Fraction of the weakest of them that a guide must pick."""
 RESOLVED = 3
-"""Fewest samples that determine the probability of one of the equally likely interfaces."""
+"""Fewest samples that determine the probability of one of the equally
+likely interfaces."""
 POOR = 0.02
 """Least fraction of failures among the samples of a guide."""
 
@@ -417,9 +421,9 @@ def _repetitions(
 ) -> list[Descent]:
     """Repeat subset simulation until the tail is precise enough.
 
-    With a `guide`, each repetition uses two levels. Stop after
-    the first repetition if fewer than a fraction `poor` of the samples that the
-    guide selects fail.
+    With a `guide`, each repetition uses two levels. Stop after the
+    first repetition if fewer than a fraction `poor` of the samples that
+    the guide selects fail.
     """
     sizes = TWO_LEVELS if guide else sizes
 

@@ -47,12 +47,15 @@ from stiction.reliability.subset import Descent, Function, Label, Population, de
 GUIDING = 5
 """Samples of the guide per level for each exact sample of the middle factor."""
 LAST_FACTOR = 0.95
-"""Smallest last factor. Below it the walk must first find failures that the guide misses."""
+"""Smallest last factor. Below it the walk must first find failures that
+the guide misses."""
 WALK_STEPS = 10
 FORGOTTEN_STEPS = 5
-"""Exact steps of each walk in the failure set, and number of discarded steps."""
+"""Exact steps of each walk in the failure set, and number of discarded
+steps."""
 LEVEL_RATIO = 2.5
-"""Least ratio of the probability of the guide's level to the requested probability."""
+"""Least ratio of the probability of the guide's level to the requested
+probability."""
 
 
 def _covered(

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 OVERHEAD = 2**16
 """Bytes of a NetCDF file apart from its arrays."""
 FEWEST_BLOCKS = 8
-"""Blocks in a part, if there are enough, so that parts take about the same time."""
+"""Blocks in a part, if there are enough, so that parts take about the
+same time."""
 
 
 def _part(value: Any) -> tuple[int, int]:
@@ -235,9 +236,9 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
 
     Notes
     -----
-    Moment, fracture energy, and the stress drops by slip and by energy refer to all
-    slip that an event adds. Length or area, mean slip and the area stress drop refer
-    to the patch around the largest slip.
+    Moment, fracture energy, and the stress drops by slip and by energy
+    refer to all slip that an event adds. Length or area, mean slip and
+    the area stress drop refer to the patch around the largest slip.
 
     The event of a `Rupture` ends when shear waves have crossed the
     part that can break since the last fast slip, so that later creep,

@@ -66,13 +66,15 @@ if TYPE_CHECKING:
 TABLES = "problem", "random", "method"
 """Tables that a study file must have."""
 MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
-"""Bytes of a study file, bytes apart from lists of numbers, and dots in a line of those bytes."""
+"""Bytes of a study file, bytes apart from lists of numbers, and dots in
+a line of those bytes."""
 SHOWN_KEYS = 10
 """Keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 """A line that holds numbers, or a key and numbers."""
 MOST_WRITTEN = 8
-"""Random interfaces that a study file holds itself; more of them are in a file next to it."""
+"""Random interfaces that a study file holds itself; more of them are in
+a file next to it."""
 MethodOfStudy: Any = Annotated[
     Any,
     OneOf(
@@ -100,7 +102,8 @@ RandomOfStudy: Any = Annotated[
     BeforeValidator(_interfaces),
     "RandomInterface | list",
 ]
-"""A random interface, or several equally likely interfaces. A field becomes an interface."""
+"""A random interface, or several equally likely interfaces. A field
+becomes an interface."""
 
 
 def _profiles_of(given: Any, info: pydantic.ValidationInfo) -> Any:
@@ -131,7 +134,8 @@ def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
 
 
 PeaksOfStudy: Any = Annotated[Any, BeforeValidator(_peaks_of), PlainSerializer(_plain_peaks)]
-"""Measured peaks; in a study file the name of a file next to it, as `read_peaks` reads."""
+"""Measured peaks; in a study file the name of a file next to it, as
+`read_peaks` reads."""
 
 
 @model(kw_only=True)

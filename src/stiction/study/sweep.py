@@ -21,7 +21,8 @@ SWEPT = "problem", "random", "method", "seed"
 """Keys of a study that a sweep, or the keys below them, may change."""
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
-"""Keywords of xarray's `sel` and `isel`, by which no dimension of that name can be selected."""
+"""Keywords of xarray's `sel` and `isel`, by which no dimension of that
+name can be selected."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
@@ -115,7 +116,8 @@ def _plain_axes(axes: Sequence[Axis]) -> list[Axis]:
 
 
 Sweep: TypeAlias = Annotated[Any, BeforeValidator(read_axes), PlainSerializer(_plain_axes)]
-"""Axes that are crossed: tables of dotted keys that vary together, with lists of values."""
+"""Axes that are crossed: tables of dotted keys that vary together, with
+lists of values."""
 
 
 def _text(value: Any) -> str:

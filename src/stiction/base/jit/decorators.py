@@ -25,7 +25,8 @@ with contextlib.suppress(Exception):  # it was deleted, or numba is not one that
 logger = logging.getLogger("stiction")
 
 ZERO: Any = np.int64(0)
-"""A zero that is not a literal: numba compiles a kernel again for each literal it is given."""
+"""A zero that is not a literal: numba compiles a kernel again for each
+literal it is given."""
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 

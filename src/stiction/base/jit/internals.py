@@ -76,7 +76,8 @@ class _Format(CompileResultCacheImpl):
 class Cache(FunctionCache):
     """Compiled forms of a function on disk, with the environments of the drafts it calls.
 
-    Forms for a user's friction law have a folder for each state of that law.
+    Forms for a user's friction law have a folder for each state of that
+    law.
     """
 
     _impl_class = _Format
@@ -148,7 +149,8 @@ class _InsideCompiler(_Compiler):
 
 OPTIONS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "pipeline_class": _Compiler}
 ALLOCATING: dict[str, Any] = OPTIONS | {"_nrt": True}
-"""For kernels that make arrays: others count no references, and so compile faster."""
+"""For kernels that make arrays: others count no references, and so
+compile faster."""
 INSIDE: dict[str, Any] = OPTIONS | {
     "no_cpython_wrapper": True,
     "pipeline_class": _InsideCompiler,

@@ -12,8 +12,8 @@ the discrete problem, and only the position is interpolated.
 Algorithm
 ---------
 1. Compute the averages at all nodes by Fourier transform (`averages`).
-2. On a plane, take the lowest node. A parabola through its neighbours gives the
-   position.
+2. On a plane, take the lowest node. A parabola through its neighbours
+   gives the position.
 3. On a line, fit a parabola at each node that is a local minimum.
    Estimate how low the function falls there, and the error of the
    parabola (`_estimates`).

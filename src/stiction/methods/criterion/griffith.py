@@ -16,9 +16,9 @@ exceeds the fracture energy (A. Griffith, Phil. Trans. A 221, 1921).
 
 Algorithm
 ---------
-1. Evaluate (1) with Gauss and Chebyshev's rule, with D linear between the nodes
-   (`_intensity_factors`). K is linear in
-   D, so one evaluation serves all loads.
+1. Evaluate (1) with Gauss and Chebyshev's rule, with D linear between
+   the nodes (`_intensity_factors`). K is linear in D, so one evaluation
+   serves all loads.
 2. Bracket the lengths at which G crosses the fracture energy. Test
    lengths are one node apart, and closer near zero. Bisect the brackets
    (`griffith_length`).

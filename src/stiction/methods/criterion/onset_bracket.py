@@ -108,7 +108,9 @@ def _least_difference(
 def slides(
     column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> bool | None:
-    """Return whether a line slides under a load because it has no equilibrium. `None` if undecided.
+    """Return whether a line slides under a load because it has no equilibrium.
+
+    `None` if undecided.
 
     Parameters
     ----------
@@ -169,7 +171,9 @@ def slides(
 def _unstoppable_nodes(
     column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> float:
-    """Return the length, in nodes, of an unstoppable crack. Infinite without a stress drop.
+    """Return the length, in nodes, of an unstoppable crack.
+
+    Infinite without a stress drop.
 
     Griffith's length is 4 G* E/(pi D^2), with the largest fracture
     energy E and the smallest stress drop D. Between half-spaces, K_0 is

@@ -21,13 +21,14 @@ ellipse. For each of five aspects:
 1. Start with a small box of nodes, made periodic with the stiffness
    between its own nodes. A block of a Toeplitz matrix is a block of a
    circulant matrix, so the problem on an ellipse of at most half the
-   length of the box stays the same. The cost depends on the ellipse, not on the
-   plane.
+   length of the box stays the same. The cost depends on the ellipse,
+   not on the plane.
 2. Find by bisection the smallest ellipse in the box whose lowest
    eigenvalue is at most W (`_smallest_unstable`), with LOBPCG
    (`elasticity.operator`).
-3. If every ellipse in the box is stable, double the box and repeat step 2. If the
-   box is already the whole plane, the window does not fit.
+3. If every ellipse in the box is stable, double the box and repeat
+   step 2. If the box is already the whole plane, the window does not
+   fit.
 
 For nu = 0 the critical disc has radius 2.0061 G/(2W).
 
@@ -45,9 +46,9 @@ the least and the greatest strength. The steps are:
 
 1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
 2. The midpoint rule gives the transform of g (`multiplier`).
-3. Nodes inside the patch have samples of g as weights. The weights at the ends
-   of the patch are fitted to the transform, by least squares among
-   weights that are not negative (`grid_weights`).
+3. Nodes inside the patch have samples of g as weights. The weights at
+   the ends of the patch are fitted to the transform, by least squares
+   among weights that are not negative (`grid_weights`).
 """
 
 from collections.abc import Sequence

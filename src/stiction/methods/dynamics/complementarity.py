@@ -101,7 +101,9 @@ def _solve(problem: SlipProblem, accuracy: float) -> Any:
 def solve_increment(
     problem: SlipProblem, setting: Setting, slip: Array, accuracy: float, line_accuracy: float
 ) -> Any:
-    """Find the slip increments of an implicit step. Return whether they were found.
+    """Find the slip increments of an implicit step.
+
+    Return whether they were found.
 
     `problem.increment` and `problem.slipping` hold the first guess, and
     then the solution. The stress is accurate to `accuracy` (Pa). The

@@ -2,16 +2,17 @@
 
 Problem
 -------
-Waves carry away the unbalanced stress, so the mean stress on the interface is
+Waves carry away the unbalanced stress, so the mean stress on the
+interface is
 
     <tau> = tau_0 <p> + <tau_i> - Z <V>.                             (1)
 
-<p> and <tau_i> are means over the nodes that can break. Nodes beyond an extent
-have no effect. If the interface has an extent, the nodes beyond take over
-stress without any waves. Then (1) includes the stress that they take over
-(`whole_stress`), and results do not (`mean_stress`). <V> and the mean strength
-refer to a period of two extents (`Thresholds.period_nodes`), or to the true
-period if it is shorter.
+<p> and <tau_i> are means over the nodes that can break. Nodes beyond an
+extent have no effect. If the interface has an extent, the nodes beyond
+take over stress without any waves. Then (1) includes the stress that
+they take over (`whole_stress`), and results do not (`mean_stress`).
+<V> and the mean strength refer to a period of two extents
+(`Thresholds.period_nodes`), or to the true period if it is shorter.
 
 An instability is slip that the load does not drive: after a maximum of
 <tau>, waves lower <tau> by `EVENT_DROP` of the stress scale
@@ -55,10 +56,11 @@ Algorithm, after each step of a run (`observe`)
    state. If they do, the interface slid in the previous
    instability, which then does not count as arrested.
 6. Slip is fast while a node slips at `Thresholds.unstable_slip_rate`
-   and the mean slip rate is above `PULSE_SHARE` of its largest. An event
-   of the table ends when `Thresholds.settling_time` has passed since its
-   last fast slip, and its instability ends with it. The size of a step, creep
-   under the load and an echo of a periodic image do not move this end.
+   and the mean slip rate is above `PULSE_SHARE` of its largest. An
+   event of the table ends when `Thresholds.settling_time` has passed
+   since its last fast slip, and its instability ends with it. The size
+   of a step, creep under the load and an echo of a periodic image do
+   not move this end.
 
 This has two consequences. A maximum without such a fall, for example
 the largest load or the stress that returns when slip ends, is not an
@@ -202,7 +204,9 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 def finish_step(
     state: RuptureState, setting: Setting, taken: TakenStep, record: StepRecord, row: int
 ) -> Any:
-    """Update diagnostics, arrivals and the record. Return the drop of the mean stress, Pa.
+    """Update diagnostics, arrivals and the record.
+
+    Return the drop of the mean stress, Pa.
 
     If the record has no rows, it stays empty.
     """

@@ -17,8 +17,8 @@ and its strength s(d):
 
 Algorithm (Heun's method: K. Heun, Zeitschrift fuer Mathematik und Physik 45, 1900)
 ----------------------------------------------------------------------------------
-1. Predict: the present rate V_0 acts for the whole step (`_transfer`), and (2)
-   gives the rate V* at the end (`_predict`).
+1. Predict: the present rate V_0 acts for the whole step (`_transfer`),
+   and (2) gives the rate V* at the end (`_predict`).
 2. Correct: the mean (V_0 + V*)/2 acts for the step (`_transfer`). The
    slip grows by h times this mean, and (2) gives the rate and the
    stress at the end (`_correct`).
@@ -94,7 +94,9 @@ def _predict(
 def _correct(
     state: RuptureState, setting: Setting, tables: ExplicitTables, load: float, impedance: float
 ) -> Any:
-    """Step 2: update slip, rate and stress. Write strength and slip increments.
+    """Step 2: update slip, rate and stress.
+
+    Write strength and slip increments.
 
     Return the sums over nodes of work per cell area, and of V.
     """
@@ -118,7 +120,9 @@ def _correct(
 
 @jit_inside
 def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise: float) -> Any:
-    """Step 4: count successive calm steps. Return whether they suffice for implicit steps.
+    """Step 4: count successive calm steps.
+
+    Return whether they suffice for implicit steps.
 
     Slip rates due to waves come and go. Creep is slow, or as fast as
     when the count began.

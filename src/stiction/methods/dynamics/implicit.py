@@ -27,7 +27,8 @@ Algorithm
 1. Choose a size: as proposed, but smaller if the load would rise too
    much. The step is cut short at a turning point of the load or at the
    end time (`_choose_size`).
-2. Assemble the matrix and the stress without slip in this step (`_assemble`).
+2. Assemble the matrix and the stress without slip in this step
+   (`_assemble`).
 3. Solve for u (`complementarity.solve_increment`).
 4. Go to step 1 with half the size if no u is found (a patch is unstable
    at this size), if a node weakens too much (`_effect`), or if the
@@ -252,7 +253,9 @@ def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
 def implicit_steps(
     n: int, state: RuptureState, setting: Setting, tables: ImplicitTables, record: StepRecord
 ) -> Any:
-    """Take up to `n` accepted implicit steps in place. Return (steps taken, reason).
+    """Take up to `n` accepted implicit steps in place.
+
+    Return (steps taken, reason).
 
     The parameters are described in `explicit_steps`. `stepping.phase`
     is IMPLICIT.

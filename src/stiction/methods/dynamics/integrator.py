@@ -202,7 +202,9 @@ class Run:
         return "rest" if self.stop != "time" and level and rests else None
 
     def run_to_end(self, state: RuptureState, max_steps: int) -> tuple[str | None, int]:
-        """Continue to the run's end, or to `max_steps` in total. Return (ending, `Reason`).
+        """Continue to the run's end, or to `max_steps` in total.
+
+        Return (ending, `Reason`).
 
         The ending is `None` if the run has not ended. The reason is
         then NOT_FINITE or DONE.
@@ -245,7 +247,9 @@ class Run:
         return taken, Reason.DONE
 
     def _follow_event(self, state: RuptureState, rests: bool) -> None:
-        """Keep the open event if it has ended. Open the event that has just begun.
+        """Keep the open event if it has ended.
+
+        Open the event that has just begun.
 
         An event ends when its fast slip has settled (`rests`). If the
         next event begins before, the open event ends at the maximum of

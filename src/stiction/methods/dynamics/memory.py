@@ -216,8 +216,8 @@ def advance_memory(
 ) -> None:
     """Step 1: set y <- E y + V and memory_sum = Re sum w E B y, for all modes and pairs in a pass.
 
-    `e` has four rows for each pair: the real and imaginary parts of E and w E
-    B.
+    `e` has four rows for each pair: the real and imaginary parts of E
+    and w E B.
     """
     size = pairs * FOUR_ROWS
     for table_block in range(table.size // size):

@@ -2,16 +2,17 @@
 
 Problem
 -------
-Discretise the elasticity of a block for waves (`waves`), on rows of nodes above
-the interface. The static response must agree with the closed form of
-`elasticity.blocks`.
+Discretise the elasticity of a block for waves (`waves`), on rows of
+nodes above the interface. The static response must agree with the
+closed form of `elasticity.blocks`.
 
 Grid
 ----
-Columns lie at the nodes x = (i + 1/2) dx, so that each column has a cell of the
-interface. Beyond the outer columns half a cell remains, in which s_xx and s_xy
-vanish: a strip that only resists stretching along y. Rows are dx apart at the
-interface and up to five times as much above.
+Columns lie at the nodes x = (i + 1/2) dx, so that each column has a
+cell of the interface. Beyond the outer columns half a cell remains, in
+which s_xx and s_xy vanish: a strip that only resists stretching along
+y. Rows are dx apart at the interface and up to five times as much
+above.
 
 Elements (`_elements`)
 ----------------------
@@ -25,7 +26,8 @@ there is only u. Then c_11 is G, and the other coefficients are zero.
 
 Algorithm (`make_mesh`)
 -----------------------
-1. Place the rows. Compute elements, masses and the stencils that move nodes.
+1. Place the rows. Compute elements, masses and the stencils that move
+   nodes.
 2. Condense the static response: eliminate the rows from the top downwards
    (`condensed`; R. J. Guyan, AIAA Journal 3, 1965).
 3. Correct the static response: the K of the closed form minus the K of
@@ -275,7 +277,9 @@ def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
 
 
 def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
-    """Return K of the mesh at a given force (Pa/m), q, and C (Pa). See `elasticity.blocks`.
+    """Return K of the mesh at a given force (Pa/m), q, and C (Pa).
+
+    See `elasticity.blocks`.
 
     Motions that are even and odd about the middle of the block are
     independent, which halves the matrices.

@@ -277,7 +277,9 @@ class Recorder:
         return to_dataset(data, self.variables, coordinates, self.attributes)
 
     def begin(self, state: RuptureState) -> bool:
-        """Open the folder. Return whether it holds the same run in its finished state.
+        """Open the folder.
+
+        Return whether it holds the same run in its finished state.
 
         If it holds a part of the same run, the state takes the values
         that were written last.
@@ -306,7 +308,9 @@ class Recorder:
         return False
 
     def flush(self, state: RuptureState, *, at_once: bool = False, last: bool = False) -> None:
-        """Write frames and steps if there are enough, or `at_once`. Also write the checkpoint.
+        """Write frames and steps if there are enough, or `at_once`.
+
+        Also write the checkpoint.
 
         With `last` there is no checkpoint: a run that
         resumes with more steps may have no frame at

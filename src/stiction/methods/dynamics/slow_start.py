@@ -107,7 +107,9 @@ def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> Rupt
 def _state_at(
     search: DenseSearch, run: Run, static: StaticSample, onset: float, distance: float
 ) -> RuptureState | None:
-    """Steps 2 to 5: return the state at a distance (Pa) below the onset. `None` if unknown.
+    """Steps 2 to 5: return the state at a distance (Pa) below the onset.
+
+    `None` if unknown.
 
     It is unknown if a node is beyond the first piece of its law, where
     the linear programme does not hold, or if a front has arrived, since

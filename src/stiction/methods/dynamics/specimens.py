@@ -3,15 +3,15 @@
 Problem
 -------
 A specimen is loaded slowly. Its slip follows the equilibria of
-`methods.equilibrium` up to an instability. From there waves run through the
-blocks (`waves`), until all is at rest or the whole interface slides. Then the
-path continues from the final state of the waves.
+`methods.equilibrium` up to an instability. From there waves run through
+the blocks (`waves`), until all is at rest or the whole interface
+slides. Then the path continues from the final state of the waves.
 
 Algorithm of an event: our own
 ------------------------------
-1. Begin at the static state that becomes unstable. Raise the drive slightly,
-   because it continues to rise, and let slip grow slightly along the
-   unstable direction (`begin`).
+1. Begin at the static state that becomes unstable. Raise the drive
+   slightly, because it continues to rise, and let slip grow slightly
+   along the unstable direction (`begin`).
 2. Follow the waves. The block is at rest when no node slips while shear
    waves cross the block and return (`DynamicEvent.run`).
 3. Let slip that is still under way come to rest in a static state
@@ -103,7 +103,8 @@ class DynamicEvent:
     before : EquilibriumState
         The equilibrium that became unstable.
     start : (n,) array
-        Stress in the static state at the start, minus the initial stress, Pa.
+        Stress in the static state at the start, minus the initial
+        stress, Pa.
     front : (n,) array
         Slip, m, at which the front arrives at a node. The front does
         not arrive again at a node that has already slipped so far.
@@ -123,7 +124,9 @@ class DynamicEvent:
     steps: int = 0
 
     def take_steps(self, count: int, ends: bool = True) -> bool:
-        """Take `count` steps. With `ends`, stop earlier if all nodes have slipped.
+        """Take `count` steps.
+
+        With `ends`, stop earlier if all nodes have slipped.
 
         Return whether a node has not slipped yet.
         """

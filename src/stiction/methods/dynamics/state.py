@@ -355,7 +355,8 @@ class ExplicitTables(NamedTuple):
 class SlipProblem(NamedTuple):
     """Problem (1) of `complementarity` for the slip in a step, with its solution and work arrays.
 
-    Arrays have the shape (nodes,), and `symbol`, `inverse` and `work` (modes,).
+    Arrays have the shape (nodes,), and `symbol`, `inverse` and `work`
+    (modes,).
     """
 
     transform: Transform

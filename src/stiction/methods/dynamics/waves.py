@@ -232,7 +232,9 @@ def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
 
 @jit_inside
 def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
-    """Step 4: move the pusher with its spring, or hold the pusher. Apply its force to the block.
+    """Step 4: move the pusher with its spring, or hold the pusher.
+
+    Apply its force to the block.
 
     The force F changes the speed of the pusher from v to v + g F, with
     the mobility g of the pushed nodes.

@@ -127,7 +127,9 @@ class Kink(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A slider on its path. Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
+    """A slider on its path.
+
+    Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
 
     `columns` is M transposed. `difference` is mu_p - mu_r, and
     `weakening` is W. Both are 0 from the corner on. `loads` holds the

@@ -178,7 +178,9 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 
 
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
-    """Return the patch that becomes unstable, from the multiplier y >= 0. NaN if y is zero.
+    """Return the patch that becomes unstable, from the multiplier y >= 0.
+
+    NaN if y is zero.
 
     On a line, the patch is the run with the largest y. On a
     plane, it is the connected area around the largest y in

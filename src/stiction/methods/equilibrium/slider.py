@@ -110,9 +110,10 @@ def make_contact(
 ) -> Contact:
     """Return a slider at rest, in which open edges are in the active set S.
 
-    The contact holds `overstress` and `moved` without copying them. Where the strength is mu_r
-    N, `friction.peak` must equal `friction.residual`. With a machine,
-    the force falls by `relief` T'x (Pa).
+    The contact holds `overstress` and `moved` without copying them.
+    Where the strength is mu_r N, `friction.peak` must equal
+    `friction.residual`. With a machine, the force falls by `relief` T'x
+    (Pa).
     """
     n, m = len(friction.peak), len(moved)
     if relief > 0.0:
@@ -201,7 +202,9 @@ class PushState(NamedTuple):
 
 
 class Push(NamedTuple):
-    """The push of a sample until it slides. Without an instability, `first` is None.
+    """The push of a sample until it slides.
+
+    Without an instability, `first` is None.
 
     `last` is the last equilibrium, and `peak` the largest force (N/m).
     `events` holds the states before and after each. `known` is false if

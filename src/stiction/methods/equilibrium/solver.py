@@ -20,7 +20,8 @@ supplies the two searches:
 
 1. Start from rest and raise the load to the next instability
    (`EquilibriumSearch.next`).
-2. If the path ends without an instability, the interface slides stably: stop.
+2. If the path ends without an instability, the interface slides stably:
+   stop.
 3. Let the unstable patch jump at constant load
    (`EquilibriumSearch.jump`). If no equilibrium stops it, the interface
    slides: stop.

@@ -28,7 +28,9 @@ of K d: an instability of such nodes adds no slip and never ends."""
 
 
 class Pieces(NamedTuple):
-    """Falling, piecewise linear function f of u = slip/d_c. It is the same at every node.
+    """Falling, piecewise linear function f of u = slip/d_c.
+
+    It is the same at every node.
 
     At a node, W is the weakening rate of the first piece that falls.
     The relative slope of this piece is therefore 1.
@@ -62,7 +64,9 @@ def pieces_of(law: FrictionLaw) -> Pieces:
 
 
 class StaticSample(NamedTuple):
-    """Strength profile, as arrays (nodes,). Rate and d_c are 0 at nodes with constant strength.
+    """Strength profile, as arrays (nodes,).
+
+    Rate and d_c are 0 at nodes with constant strength.
 
     Beyond the interface extent, excess and d_c are infinite.
     """

@@ -32,13 +32,17 @@ from stiction.problem.friction.parameters import Exponential, Linear, Parameters
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
 """Each of them alone sets how fast a law weakens."""
 NEARLY_RESIDUAL = 0.01
-"""Remaining fraction of tau_p - tau_r at which a law that never ends counts as residual."""
+"""Remaining fraction of tau_p - tau_r at which a law that never ends
+counts as residual."""
 MIN_STEEPENING = 1.001
-"""Ratio of slopes up to which a law of the user counts as falling most steeply at first."""
+"""Ratio of slopes up to which a law of the user counts as falling most
+steeply at first."""
 MAX_REACH = 1e9
-"""Largest slip u at which a law of the user may reach a fraction of its strength."""
+"""Largest slip u at which a law of the user may reach a fraction of its
+strength."""
 SLIPS = 4097
-"""Number of slips up to `FrictionLaw.reach` at which a law of the user is examined."""
+"""Number of slips up to `FrictionLaw.reach` at which a law of the user
+is examined."""
 LAWS = Kinds("laws")
 """The laws of study files by their `type`."""
 _VALID = {

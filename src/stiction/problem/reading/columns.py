@@ -62,8 +62,9 @@ _WORDS: dict[Role, str] = {
     " éprouvette muestra ensayo probeta cycle step",
 }
 ROLES = {role: tuple(words.split()) for role, words in _WORDS.items()}
-"""Beginnings of words in headings, by the roles that they state. A 'shear displacement' is a
-travel, because roles are tried in this order."""
+"""Beginnings of words in headings, by the roles that they state. A
+'shear displacement' is a travel, because roles are tried in this
+order."""
 _COEFFICIENT = (
     r"\bcof\b|\bmu\b|^[\N{MICRO SIGN}\N{GREEK SMALL LETTER MU}]|coefficient|coeff\b|slip factor"
     r"|reib\w*(?:zahl|wert|koeffizient)|coeficiente"

@@ -1,4 +1,6 @@
-"""Read files of measured data, chosen by their endings. A file may come from a stranger.
+"""Read files of measured data, chosen by their endings.
+
+A file may come from a stranger.
 
 Each reader takes these steps:
 
@@ -55,29 +57,35 @@ LARGE = 2**19
 HEAD = 2**16
 """Bytes at the start of a large text that show its dialect."""
 MAX_UNEVEN_CELLS = 2**19
-"""Cells of a text that pandas cannot read. Each cell takes hundreds of bytes and microseconds."""
+"""Cells of a text that pandas cannot read. Each cell takes hundreds of
+bytes and microseconds."""
 SEPARATORS = (";", "\t", " ", ",", "")
 """Separators of columns. A single column has none."""
 END, MAX_LINES_COMPARED, HEADING = 40, 150, 2
-"""Lines at the start of a text, and in the rest of it, that show the separator, and the number of
-lines for which a heading counts."""
+"""Lines at the start of a text, and in the rest of it, that show the
+separator, and the number of lines for which a heading counts."""
 _CELL = re.compile(
     rf"(?!.*,$)(?:$|{NUMBER.pattern}|{GROUPS.pattern}(?:[.,]\d*)?$|[\W_]+$|[^\W\d][^;,\t]*$"
     r"|\d+[^\W\d_]\w*$|\d+[-/]\d+$"
     r"|\d{1,4}[-./]\d{1,2}[-./]\d{1,4}(?:[ T]\s*\d[\d:.,]*)?$|\d{1,2}:\d{2}[\d:.,]*$)"
 )
-"""Cells of rows with data: nothing, numbers, marks, words, names such as 1a, dates and times."""
+"""Cells of rows with data: nothing, numbers, marks, words, names such
+as 1a, dates and times."""
 MAX_COLUMNS = 2_000
-"""Columns of a table. A file with more columns holds its values in a single line."""
+"""Columns of a table. A file with more columns holds its values in a
+single line."""
 MAX_LETTERS = 1_000
-"""Letters of a cell or of a comment, because Python converts long numbers slowly."""
+"""Letters of a cell or of a comment, because Python converts long
+numbers slowly."""
 MAX_CELLS, CELLS_OF_SMALL, CELLS_A_BYTE = 2**23, 2**18, 4
-"""Cells of a sheet: in any case, in a small file, and per byte of a larger file. Empty cells take
-memory too."""
+"""Cells of a sheet: in any case, in a small file, and per byte of a
+larger file. Empty cells take memory too."""
 UNPACKED_BYTES, UNPACKED_TIMES = 2**23, 20
-"""Unpacked size of a workbook: bytes of a small one, and multiples of the size of a larger one."""
+"""Unpacked size of a workbook: bytes of a small one, and multiples of
+the size of a larger one."""
 ABOUT_BYTES = 2**20
-"""Unpacked size of the parts apart from sheets, texts and images, such as styles."""
+"""Unpacked size of the parts apart from sheets, texts and images, such
+as styles."""
 SHEETS, PICTURES = ("xl/worksheets/", "xl/sharedStrings"), ("xl/media/", "docProps/thumb")
 
 NETCDF = (".nc", ".nc4")

@@ -48,7 +48,8 @@ _STATISTICS = (
 )
 STATISTICS = {*_STATISTICS.split()}
 SHORT_STATISTICS = {"x", "x\N{COMBINING MACRON}", "s", "n", "r", "v", "\N{MICRO SIGN}"}
-"""First words in rows of statistics. Short ones count if another row of statistics follows."""
+"""First words in rows of statistics. Short ones count if another row of
+statistics follows."""
 # Patterns never return to letters that they have passed: time grows
 # linearly with the file.
 WORDS = re.compile(r"[^\s(\[{]+(?:\s*[(\[{][^)\]}]*[)\]}]?)?|[(\[{][^)\]}]*[)\]}]?")
@@ -62,7 +63,8 @@ _THOUSANDS = {
     mark: re.compile(rf"[+-]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+(?!\d)")
     for mark in ".,"
 }
-"""Numbers whose mark may separate thousands, such as 1.020 and 1.020.000, not 0.020 or 1.02."""
+"""Numbers whose mark may separate thousands, such as 1.020 and
+1.020.000, not 0.020 or 1.02."""
 _OTHER = {".": ",", ",": "."}
 
 
@@ -458,4 +460,5 @@ _SHORT = {
     "N": ("force", "friction"), "m": ("travel", "length"), "s": ("time",), "h": ("time",),
     "min": ("time",), "mil": ("travel", "length"), "g": (), "J": (), "1": (), "-": (), "%": (),
 }  # fmt: skip
-"""Units that may be a part of a name, and the roles of names behind which they are units."""
+"""Units that may be a part of a name, and the roles of names behind
+which they are units."""

@@ -14,9 +14,9 @@ The equilibrium is then unstable.
 
 Algorithm
 ---------
-L is updated rather than computed again (P. Gill, G. Golub, W. Murray and M.
-Saunders, Mathematics of Computation 28, 1974; G. Golub and C. Van Loan, Matrix
-Computations, 2013, section 6.5).
+L is updated rather than computed again (P. Gill, G. Golub, W. Murray
+and M. Saunders, Mathematics of Computation 28, 1974; G. Golub and C.
+Van Loan, Matrix Computations, 2013, section 6.5).
 
 1. Append a node j (`append`). Its row l solves L l = A_Sj. Its pivot is
    (A_jj - l'l)^1/2. If A_jj - l'l is not positive, the vector z =

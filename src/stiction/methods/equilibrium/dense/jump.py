@@ -202,7 +202,9 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 
 @jit_inside
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
-    """Step 2: unmark the nodes whose solution is below zero. Return how many.
+    """Step 2: unmark the nodes whose solution is below zero.
+
+    Return how many.
 
     A solution counts as below zero if K_ii times the solution is below
     -`atol` (Pa), and the solution is also below -`rtol` times the
@@ -225,7 +227,9 @@ def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol
 def _write_direction(
     state: SlipState, true_pieces: Workspace, n_marked: int, drive: Array, tolerance: float
 ) -> float:
-    """Step 2: write the direction of the step. Return the longest step along the direction.
+    """Step 2: write the direction of the step.
+
+    Return the longest step along the direction.
 
     The longest step is 1 if the direction leads to the solution of the
     linear problem, and otherwise infinite.
@@ -255,7 +259,9 @@ def _write_direction(
 def _step_with_true_pieces(
     state: SlipState, load: float, true_pieces: Workspace, n_slipping: int, tolerance: float
 ) -> StepEnd:
-    """Steps 2 and 3: move slip with the true pieces. The nodes that this overstresses join.
+    """Steps 2 and 3: move slip with the true pieces.
+
+    The nodes that this overstresses join.
 
     `true_pieces` is the workspace with the factor of A = K - diag(W).
     """

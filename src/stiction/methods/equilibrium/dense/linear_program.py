@@ -2,9 +2,9 @@
 
 Problem
 -------
-As long as strength falls linearly with slip, s_i = excess_i - W_i d_i, the
-largest load (Pa) with an equilibrium is, with A = K - diag(W), slip d >= 0 (m)
-and load profile p > 0,
+As long as strength falls linearly with slip, s_i = excess_i - W_i d_i,
+the largest load (Pa) with an equilibrium is, with A = K - diag(W), slip
+d >= 0 (m) and load profile p > 0,
 
     max {load : d >= 0, A d + excess - load p >= 0}                  (1)
       = min {<excess, y>/<p, y> : y >= 0, A y <= 0}.                 (2)
@@ -103,7 +103,9 @@ def sort_by(keys: Array, nodes: NDArray[np.int64], count: int) -> None:
 
 @jit_inside
 def queue_overstressed(state: SlipState, load: float, tolerance: float) -> int:
-    """Write the resting nodes above their strength to `workspace.queue`. Return their number.
+    """Write the resting nodes above their strength to `workspace.queue`.
+
+    Return their number.
 
     The most overstressed node comes first. Overstress within the
     tolerance (Pa) does not count.

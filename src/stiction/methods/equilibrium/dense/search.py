@@ -290,7 +290,9 @@ class DenseSearch:
     def _test_sliding(
         self, sample: StaticSample, instability: EquilibriumState, slip: Array, to_rest: bool
     ) -> tuple[int, float]:
-        """Test for sliding (step 5). Return the outcome and an unstoppable length.
+        """Test for sliding (step 5).
+
+        Return the outcome and an unstoppable length.
 
         The length is a number of residual nodes. Slip moves to a lower
         bound of the next equilibrium.
@@ -313,7 +315,9 @@ class DenseSearch:
         )  # fmt: skip
 
     def gradient(self, sample: StaticSample, state: EquilibriumState) -> Array:
-        """Return the multiplier y. If slip lowers the mean stress, return its derivative.
+        """Return the multiplier y.
+
+        If slip lowers the mean stress, return its derivative.
 
         With a relief of r (Pa/m) the mean stress is D - r <p, d>/n at a
         drive D, and y is the derivative of the largest D by the

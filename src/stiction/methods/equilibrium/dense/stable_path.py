@@ -229,7 +229,9 @@ def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> i
 def _stop_unloaded(
     state: SlipState, q: Array, n_slipping: int, v_nodes: Array
 ) -> tuple[int, bool]:
-    """Step 2 with (3): move the rates from `v_nodes` towards v. Stop nodes whose rate reaches zero.
+    """Step 2 with (3): move the rates from `v_nodes` towards v.
+
+    Stop nodes whose rate reaches zero.
 
     Return the number of slipping nodes, and whether a node stopped.
     `workspace.v` and `v_nodes` then hold the solution of (2) for the
@@ -341,7 +343,8 @@ def _pass_corner(
 ) -> int:
     """Step 4 at a corner: move the node to its next piece, and update L.
 
-    Returns how many nodes are factored: fewer than before if a pivot failed.
+    Returns how many nodes are factored: fewer than before if a pivot
+    failed.
     """
     sample, slip, _, workspace, _, _ = state
     pieces, i = sample.pieces, workspace.slipping[corner]

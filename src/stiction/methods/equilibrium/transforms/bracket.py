@@ -175,7 +175,9 @@ class Bracket:
             self.lower, self.slip = load, trial
 
     def raise_multiplier(self, y: Array) -> float:
-        """Accept a multiplier if it proves a lower upper bound. Return its bound.
+        """Accept a multiplier if it proves a lower upper bound.
+
+        Return its bound.
 
         The least multiple of z that makes A y <= 0 is added. If there
         is no such multiple, the bound is infinite.
@@ -199,7 +201,9 @@ class Bracket:
 
 
 def bisect(bracket: Bracket, gap: float, accuracy: float) -> Array:
-    """Narrow a bracket to a relative gap. Return the last unstable direction, with unit norm.
+    """Narrow a bracket to a relative gap.
+
+    Return the last unstable direction, with unit norm.
 
     The accuracy is the largest residual
     stress as a fraction of the mean strength.

@@ -12,8 +12,8 @@ direction y in which slip jumps.
 
 Algorithm
 ---------
-The algorithm is the same as in `dense.stable_path`, but conjugate gradients
-(`solve_inside`) replace the factor.
+The algorithm is the same as in `dense.stable_path`, but conjugate
+gradients (`solve_inside`) replace the factor.
 
 1. Solve for the slip at the first load, revising the pieces of the
    nodes, and for the rates v.
@@ -24,9 +24,10 @@ The algorithm is the same as in `dense.stable_path`, but conjugate gradients
    after), which adds c to one diagonal entry. A_SS remains
    positive definite if 1 + c y_j > 0. Then v becomes v - c
    v_j/(1 + c y_j) y (the formula of Sherman and Morrison).
-4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the other
-   slipping nodes. A remains positive definite if y'Ay = (A y)_j > 0. With c_j = p_j
-   - (K v)_j, v becomes v + c_j/(y'Ay) y.
+4. If node j starts, solve for y with y_j = 1 and (A y)_S = 0 on the
+   other slipping nodes. A remains positive definite if
+   y'Ay = (A y)_j > 0. With c_j = p_j - (K v)_j, v becomes
+   v + c_j/(y'Ay) y.
 5. If A does not remain positive definite, the path turns in the
    direction y. Otherwise go to step 2.
 """

@@ -1,10 +1,12 @@
-"""Find an equilibrium at a fixed load by conjugate gradients. A spring may hold a patch.
+"""Find an equilibrium at a fixed load by conjugate gradients.
+
+A spring may hold a patch.
 
 Problem
 -------
-Let A = K - diag(W) (`elasticity.operator`). d >= 0 is the slip (m), s is the
-strength minus initial stress at zero slip (Pa), p is the load profile, and phi
-(|phi| = 1) is the shape of a patch. Find
+Let A = K - diag(W) (`elasticity.operator`). d >= 0 is the slip (m), s
+is the strength minus initial stress at zero slip (Pa), p is the load
+profile, and phi (|phi| = 1) is the shape of a patch. Find
 
     d >= 0,  r = load p - s + mu phi - A d <= 0,  with r = 0 where d > 0,  (1)
     mu = spring (alpha - <phi, d>),
@@ -75,7 +77,9 @@ def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tup
 def equilibrate(
     operator: Operator, right: Array, inside: Mask, slip: Array, tolerance: float
 ) -> int:
-    """Solve (1) for right = load p - s + spring alpha phi. Return the status.
+    """Solve (1) for right = load p - s + spring alpha phi.
+
+    Return the status.
 
     On entry, the nodes `inside` and their slip are a guess. On return,
     they are the solution. If (1) is solved, the residual r does not

@@ -16,9 +16,9 @@ also for long lines:
    the nucleation length.
 2. On the coarsest grid, bisect the trivial bounds until Newton's method
    on the turning point succeeds (`_narrow`).
-3. On each finer grid, start Newton's method (`turning_point.close_by_newton`)
-   from the slip and the multiplier on the previous grid. If it fails,
-   continue as in step 2.
+3. On each finer grid, start Newton's method
+   (`turning_point.close_by_newton`) from the slip and the multiplier on
+   the previous grid. If it fails, continue as in step 2.
 
 `PlaneSearch` follows a sample from instability to instability:
 
@@ -168,14 +168,15 @@ def plane_onset(
 ) -> Bracket:
     """Bracket the largest load with an equilibrium before a node reaches a corner in its law.
 
-    All fields have shape (nx, ny), or (nodes,) on a line.
-    `excess` is the peak strength minus the initial stress (Pa).
-    `profile` is the load profile p > 0. `W` is the weakening rate
-    (Pa/m, zero at residual nodes). `slip` (m) belongs to an
-    equilibrium at a lower load, from which the search starts in place of coarse
-    grids. `corner` is the slip at the next corner (m, 0 without a corner). The
-    search stops when the bounds agree to a relative `gap`. If a node of a
-    coarse grid slips beyond its corner, the bracket of this grid is returned.
+    All fields have shape (nx, ny), or (nodes,) on a line. `excess` is
+    the peak strength minus the initial stress (Pa). `profile` is the
+    load profile p > 0. `W` is the weakening rate (Pa/m, zero at
+    residual nodes). `slip` (m) belongs to an equilibrium at a lower
+    load, from which the search starts in place of coarse grids.
+    `corner` is the slip at the next corner (m, 0 without a corner). The
+    search stops when the bounds agree to a relative `gap`. If a node of
+    a coarse grid slips beyond its corner, the bracket of this grid is
+    returned.
     """
     # 1.
     corners = np.zeros_like(excess) if corner is None else corner

@@ -23,9 +23,9 @@ equilibrium at a lower load to an equilibrium
 
 Algorithm for (a): Newton's method
 ----------------------------------
-1. Solve (1) for the pieces at the present slip. Repeat with the pieces at the
-   solution until they do not change. Until
-   then, solve only to a rough residual.
+1. Solve (1) for the pieces at the present slip. Repeat with the pieces
+   at the solution until they do not change. Until then, solve only to a
+   rough residual.
 2. On the nodes that slip at the end, look for negative curvature of K
    minus the steepest weakening of each node on the way. If there is no
    negative curvature, A is positive definite in every state on the way.
@@ -43,8 +43,8 @@ Algorithm for (b): our own, steps that do not pass the least equilibrium
 3. If the fraction is 1 and all nodes are on the assumed pieces, the
    solution is the least equilibrium, and the interface is arrested.
 4. If the step has a solution, slip moves to it. If hardly any node
-   moves, the next step has the fraction 1, because only this fraction can end
-   at the equilibrium.
+   moves, the next step has the fraction 1, because only this fraction
+   can end at the equilibrium.
 5. If a step has negative curvature with the fraction 1, or if the slip is
    at an instability, move with the true pieces to the first corner
    (`_step_to_corner`). Otherwise omit twice as much of the weakening. A
@@ -113,7 +113,8 @@ CREEP = 0.02
 def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> float:
     """Return the largest residual stress, Pa, for an accuracy relative to the strength or load.
 
-    Strength above the load, such as the strength of barriers, does not count.
+    Strength above the load, such as the strength of barriers, does not
+    count.
     """
     can_break = np.isfinite(sample.excess)
     applied = abs(load) * sample.profile[can_break]

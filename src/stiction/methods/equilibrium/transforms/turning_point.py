@@ -22,8 +22,8 @@ turning point, so the error of this bound is of second order.
 
 Algorithm
 ---------
-The algorithm is our own: Newton's method for two equations. As nodes join, mu'
-falls in steps.
+The algorithm is our own: Newton's method for two equations. As nodes
+join, mu' falls in steps.
 
 1. Hold the patch at the guess (load, a), solve (1) for d and d'
    (`_hold`), and compute both bounds.
@@ -104,7 +104,9 @@ class Held(NamedTuple):
 
 
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
-    """Step 1: return the equilibrium with a held patch phi. `None` if another patch is unstable.
+    """Step 1: return the equilibrium with a held patch phi.
+
+    `None` if another patch is unstable.
 
     The guess gives the amplitude at which the
     spring has no force. The accuracy is the largest
