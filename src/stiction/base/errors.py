@@ -126,7 +126,10 @@ class Warned(NamedTuple):
         return self.text.format(samples=shown, worst=self.worst)
 
     def after(self, first: int) -> Warned:
-        """Return the warning with the numbers of its samples. `first` is the first number."""
+        """Return the warning with the numbers of its samples.
+
+        `first` is the first number.
+        """
         return self._replace(numbers=tuple(first + number for number in self.numbers))
 
     def unnumbered(self) -> Warned:

@@ -157,7 +157,10 @@ def cannot(what: str, path: Path, error: BaseException) -> StoreError:
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    """Write an .npz archive, completely or not at all. Errors are the same as in `write_whole`."""
+    """Write an .npz archive, completely or not at all.
+
+    Errors are the same as in `write_whole`.
+    """
     archive = io.BytesIO()
     np.savez(archive, **arrays)
     with suppress(OSError):

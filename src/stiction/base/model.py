@@ -78,7 +78,10 @@ def _real(value: Any, info: pydantic.ValidationInfo) -> float:
 
 
 def in_si(value: Any, name: str) -> Any:
-    """Return a quantity as a number in the argument's SI unit. Return other values unchanged."""
+    """Return a quantity as a number in the argument's SI unit.
+
+    Return other values unchanged.
+    """
     return magnitude_in_one_of(value, units_of_argument(name))[0]
 
 
@@ -286,7 +289,10 @@ def explain(
 
 
 def _steps_into(given: Any, steps: Sequence[int | str], missing: bool) -> Iterator[str]:
-    """Yield the steps that lead into a value. Other steps of pydantic are members of unions."""
+    """Yield the steps that lead into a value.
+
+    Other steps of pydantic are members of unions.
+    """
     for step in steps:
         given = given.tolist() if isinstance(given, np.ndarray) else given
         keys = range(len(given)) if isinstance(given, list | tuple) else given

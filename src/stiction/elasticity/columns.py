@@ -144,7 +144,10 @@ def elements(height: float, first: float, push: Interval | None = None) -> Eleme
 
 
 def merge(pieces: list[Piece], keep: Keep) -> Piece:
-    """Step 3: add pieces, and eliminate the unknowns that are not kept. No load acts on them."""
+    """Step 3: add pieces, and eliminate the unknowns that are not kept.
+
+    No load acts on them.
+    """
     labels = np.unique(np.concatenate([piece.labels for piece in pieces]))
     total = np.zeros((labels.size, labels.size))
     for piece in pieces:

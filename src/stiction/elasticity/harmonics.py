@@ -138,7 +138,10 @@ class Harmonics:
         return Sums(*((turn * values).real for values in self.sums(x + 1j * self.height)))
 
     def solutions(self, operator: Polynomial, x: Array) -> Array:
-        """Apply an operator to the four solutions. Return an array (harmonics, points, 4)."""
+        """Apply an operator to the four solutions.
+
+        Return an array (harmonics, points, 4).
+        """
         value, slope = operator(-1.0), operator.deriv()(-1.0)
         parity = operator(1.0) / value  # -1 for odd derivatives: towards the right end x falls
         parts = []

@@ -76,7 +76,10 @@ Mask = NDArray[np.bool_]
 
 
 class Transform(NamedTuple):
-    """Shapes and axes for the transform on an interface. It is read-only and shared by threads."""
+    """Shapes and axes for the transform on an interface.
+
+    It is read-only and shared by threads.
+    """
 
     shape: tuple[int, int]  # of a profile; (1, nodes) on a line, so that a kernel serves both
     half: tuple[int, int]  # of its real transform
@@ -118,7 +121,10 @@ def backward(transform: Transform, spectrum: Array, field: Array) -> None:
 def convolve(
     transform: Transform, multiplier: Array, field: Array, spectrum: Array, out: Array
 ) -> None:
-    """Multiply the Fourier modes of a field and write it to `out`. `spectrum` is a workspace."""
+    """Multiply the Fourier modes of a field and write it to `out`.
+
+    `spectrum` is a workspace.
+    """
     forward(transform, field, spectrum)
     for i in range(spectrum.size):
         spectrum[i] *= multiplier[i]
@@ -126,7 +132,10 @@ def convolve(
 
 
 class Operator(NamedTuple):
-    """K - W on an interface, with workspaces for solvers. Only one thread may use it at a time."""
+    """K - W on an interface, with workspaces for solvers.
+
+    Only one thread may use it at a time.
+    """
 
     transform: Transform
     symbol: Array  # (modes,): K(k), Pa/m

@@ -114,7 +114,10 @@ def usable_cores() -> int:
 
 
 def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int) -> list[Any]:
-    """Return the results of all jobs. Each warning is issued once, at the line of the caller."""
+    """Return the results of all jobs.
+
+    Each warning is issued once, at the line of the caller.
+    """
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
         results = list(pool.map(Context.run, contexts, repeat(function), jobs))

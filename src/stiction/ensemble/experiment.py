@@ -206,7 +206,10 @@ class Experiment:
 
     @property
     def batch(self) -> int:
-        """Number of samples to solve at once. The method sets it. On planes, memory limits it."""
+        """Number of samples to solve at once.
+
+        The method sets it. On planes, memory limits it.
+        """
         interface, size = self.problem.interface, batch_size(self.problem, self.method)
         if not interface.is_plane:  # a part of a block of draws costs as much as the block
             return size
@@ -223,7 +226,10 @@ class Experiment:
 
 
 class Measured(Experiment):
-    """An experiment with given profiles in place of random properties. It has a single sample."""
+    """An experiment with given profiles in place of random properties.
+
+    It has a single sample.
+    """
 
     def __post_init__(self) -> None:
         problems = refusals(self.problem, self.method)

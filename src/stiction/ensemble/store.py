@@ -59,7 +59,10 @@ MAX_JSON_BYTES = 64 * 2**20
 
 
 class Damaged(StoreError):
-    """Error for a stored file that is missing or damaged. The message describes the damage."""
+    """Error for a stored file that is missing or damaged.
+
+    The message describes the damage.
+    """
 
 
 class Store:
@@ -227,7 +230,10 @@ def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
 
 
 def _table_in(data: bytes) -> tuple[str, Table]:
-    """Return the mark and the table of a chunk. Raise one of several errors for other content."""
+    """Return the mark and the table of a chunk.
+
+    Raise one of several errors for other content.
+    """
     arrays = arrays_in(data)
     mark, made_by, seconds, failed = json.loads(arrays["about"].tobytes())
     failures = tuple(Failure(*one) for one in failed)

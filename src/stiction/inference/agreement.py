@@ -369,7 +369,10 @@ def _p_values(distances: Array) -> list[float]:
 
 
 def _agreement(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
-    """Return the agreement from distances (1 + replicates, 2). Measured distances come first."""
+    """Return the agreement from distances (1 + replicates, 2).
+
+    Measured distances come first.
+    """
     observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")
     return Agreement(

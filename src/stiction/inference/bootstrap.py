@@ -197,7 +197,10 @@ def scale_of(name: str, repeated: Sequence[Refits]) -> Scale:
 
 
 def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[float, float]]:
-    """Return the interval of each parameter (steps 2 to 6). `values` are measured, with noise."""
+    """Return the interval of each parameter (steps 2 to 6).
+
+    `values` are measured, with noise.
+    """
     around, *moved = repeated
     fitted, estimated = around.truth, around.truth.parameters
     shapes = fitted.setting.marginal.limited_shapes

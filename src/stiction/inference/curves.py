@@ -400,7 +400,10 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
 
 
 def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
-    """Yield the label of each test in a table, and a mask of its rows. A single test has none."""
+    """Yield the label of each test in a table, and a mask of its rows.
+
+    A single test has none.
+    """
     numbers = [c for c in named(table.columns, TESTS) if role_of(c) == "specimen"]
     if len(numbers) == 1 and np.isfinite(numbers[0].values).all():
         for label in dict.fromkeys(numbers[0].values.tolist()):

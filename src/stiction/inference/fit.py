@@ -512,7 +512,10 @@ def _judged(
     count: int,
     families: tuple[str, ...],
 ) -> dict[str, Any]:
-    """Return parameters, intervals, p-values and doubts. Each field has `count` repetitions."""
+    """Return parameters, intervals, p-values and doubts.
+
+    Each field has `count` repetitions.
+    """
     fitted, fits = repeated[0]
     parameters = dict(fitted.parameters)
     ends = intervals(repeated, np.concatenate(fitted.as_of_one(rows)))

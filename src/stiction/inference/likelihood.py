@@ -74,7 +74,10 @@ of reach."""
 
 
 class Axis(NamedTuple):
-    """Nodes of one simulated parameter. Interpolation is linear in `scale` of the parameter."""
+    """Nodes of one simulated parameter.
+
+    Interpolation is linear in `scale` of the parameter.
+    """
 
     parameter: int  # place in the prior
     values: Array  # rising
@@ -240,7 +243,10 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Simulated onsets and the likelihood of measured peaks. A force is an onset times an area."""
+    """Simulated onsets and the likelihood of measured peaks.
+
+    A force is an onset times an area.
+    """
 
     prior: Prior
     method: Any
@@ -449,7 +455,10 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
 def bounds_of(
     experiment: Experiment, variable: str, negligible: float = 0.0
 ) -> tuple[float, float]:
-    """Return the least and the greatest possible peak. A `negligible` fraction may lie outside."""
+    """Return the least and the greatest possible peak.
+
+    A `negligible` fraction may lie outside.
+    """
     low, high = LimitState(experiment).likely_bounds(negligible)
     if variable == "critical_force":
         area = experiment.problem.area or math.nan

@@ -217,7 +217,10 @@ class Family:
 
 
 def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
-    """Return the beta distribution with these moments. The bounds limit its standard deviation."""
+    """Return the beta distribution with these moments.
+
+    The bounds limit its standard deviation.
+    """
     u, extent = (mean - low) / (high - low), high - low
     total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
     return Beta(alpha=total * u, beta=total * (1.0 - u), low=low, high=high)

@@ -54,7 +54,10 @@ deviations of differences."""
 
 
 class Record(NamedTuple):
-    """Values (SI) with shape (n,) or (nx, ny), at points `spacings` (m) apart. Gaps are NaN."""
+    """Values (SI) with shape (n,) or (nx, ny), at points `spacings` (m) apart.
+
+    Gaps are NaN.
+    """
 
     values: Array
     spacings: tuple[float, ...]

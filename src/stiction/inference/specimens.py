@@ -133,7 +133,10 @@ def families_of(given: Any) -> tuple[str, ...]:
 
 
 class FactorPrior(NamedTuple):
-    """Priors for the scatter s and the mean. None means a mean that is flat in its logarithm."""
+    """Priors for the scatter s and the mean.
+
+    None means a mean that is flat in its logarithm.
+    """
 
     scatter: Any = scipy.stats.halfcauchy(scale=PRIOR_SCALE)
     mean: Any = None
@@ -544,7 +547,10 @@ class Prediction(NamedTuple):
 
 
 def _factor_groups(profiles: Profiles, u: Array) -> list[tuple[str, float, Any]]:
-    """Group the draws by family and s. Return each family, its s, and the indices of its draws."""
+    """Group the draws by family and s.
+
+    Return each family, its s, and the indices of its draws.
+    """
     pairs, group = np.unique(u[:, 1:3], axis=0, return_inverse=True)
     return [
         (profiles.families[int(family)], float(cv), np.flatnonzero(group.ravel() == number))
@@ -567,7 +573,10 @@ def _onsets(
     problem: Problem, profiles: Profiles, simulation: Simulation, measured: Peaks, kind: int,
     error: float,
 ) -> Onsets:  # fmt: skip
-    """Return the onsets of all fields for a specimen type. Its peaks need not be measured."""
+    """Return the onsets of all fields for a specimen type.
+
+    Its peaks need not be measured.
+    """
     problem, peaks = of_length(problem, measured.lengths[kind]), measured.values[kind]
     method, workers, of = simulation.method, simulation.workers, measured.variable
     samples = simulation.samples or ONSETS.get(method.type, FEW_ONSETS)

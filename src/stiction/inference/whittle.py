@@ -178,7 +178,10 @@ def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
 
 @dataclass(frozen=True, eq=False)
 class SpectrumFamily:
-    """A family of spectra with fixed parameters. Parameters with the value None are estimated."""
+    """A family of spectra with fixed parameters.
+
+    Parameters with the value None are estimated.
+    """
 
     name: str
     fixed: dict[str, float]

@@ -221,7 +221,10 @@ def batch_size(problem: Problem, method: Method) -> int:
 def variables_of(
     problem: Problem, method: Method, pressure: bool = False
 ) -> dict[str, Variable]:
-    """Return the variables of a prepared solver. `pressure` is true if pressures vary by sample."""
+    """Return the variables of a prepared solver.
+
+    `pressure` is true if pressures vary by sample.
+    """
     variables = dict(method.variables(problem))
     if pressure or problem.given_pressure is not None:
         variables["friction_coefficient"] = FRICTION_COEFFICIENT

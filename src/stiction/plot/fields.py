@@ -242,7 +242,10 @@ def onset(
 
 
 def strength_of(problem: Problem, strength: Any) -> Array:
-    """Return profiles (samples, *shape), Pa. Coefficients are multiplied by the pressure."""
+    """Return profiles (samples, *shape), Pa.
+
+    Coefficients are multiplied by the pressure.
+    """
     if is_coefficient(strength) and problem.given_pressure is not None:
         coefficient = rows_of(problem.interface, strength, "friction_coefficient")
         return np.asarray(coefficient * problem.normal_pressure)

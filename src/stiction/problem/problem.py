@@ -427,7 +427,10 @@ class Problem(Listed):
 
 
 def stress_of(problem: Problem, name: str, force: float) -> float:
-    """Return force (N) over area that can break, Pa. An error message begins with `name`."""
+    """Return force (N) over area that can break, Pa.
+
+    An error message begins with `name`.
+    """
     if problem.area is None:
         raise InputError(f"{name}: {NO_AREA}")
     warn_of_weld(problem, name)

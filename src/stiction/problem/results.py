@@ -41,7 +41,10 @@ def position(interface: Interface, variable: Variable) -> Variable:
 
 
 def per_area(interface: Interface, variable: Variable) -> Variable:
-    """Return the variable on this interface. On a plane, a quantity per length becomes a total."""
+    """Return the variable on this interface.
+
+    On a plane, a quantity per length becomes a total.
+    """
     if not interface.is_plane:
         return variable
     units = {"N": "N m", "N/s": "N m/s", "J/m": "J"}.get(variable.units, variable.units)

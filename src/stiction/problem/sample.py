@@ -241,7 +241,10 @@ def _offset(dim: str, x: Array, interface: Interface) -> float:
 def _check_repeats(
     values: Array, places: dict[str, Array], twins: NDArray[np.int64], interface: Interface
 ) -> None:
-    """Refuse two different values at a place. `twins` are the first points at each place."""
+    """Refuse two different values at a place.
+
+    `twins` are the first points at each place.
+    """
     rows = values.reshape(-1, twins.size)
     same = (rows == rows[:, twins]) | np.isnan(rows) & np.isnan(rows[:, twins])
     for i in np.flatnonzero(~same.all(axis=0))[:1]:

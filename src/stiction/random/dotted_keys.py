@@ -68,7 +68,10 @@ def value_at(owner: Any, key: str) -> Any:
 
 
 def full_key(key: str) -> str:
-    """Return the full key, as in a sweep. Keys that belong to the strength may omit the prefix."""
+    """Return the full key, as in a sweep.
+
+    Keys that belong to the strength may omit the prefix.
+    """
     first = key.split(".")[0]
     if first in ("problem", "random"):
         return key

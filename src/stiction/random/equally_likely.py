@@ -181,7 +181,10 @@ class EquallyLikely:
 
     @cached_property
     def kinds(self) -> NDArray[np.int64]:
-        """Kind of each member, as a number. Members with equal fields are of the same kind."""
+        """Kind of each member, as a number.
+
+        Members with equal fields are of the same kind.
+        """
         return _numbered([tuple(member.properties.items()) for member in self.members])[1]
 
     @cached_property

@@ -141,7 +141,10 @@ class _ByMoments(Marginal):
         return self
 
     def _shape(self, ratio: float) -> tuple[float, float]:
-        """Return the shape, and mean divided by scale. `cv` belongs to the values minus `low`."""
+        """Return the shape, and mean divided by scale.
+
+        `cv` belongs to the values minus `low`.
+        """
         raise NotImplementedError  # a family without a shape overrides `distribution`
 
     @cached_property
@@ -372,7 +375,10 @@ def marginal_of(value: Any) -> Marginal:
 
 
 def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) -> Marginal:
-    """Return the marginal from a scipy family, by name and parameters. `first` are in order."""
+    """Return the marginal from a scipy family, by name and parameters.
+
+    `first` are in order.
+    """
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):
         valid = [*MARGINALS, "lognorm", "weibull_min", "truncnorm", "uniform", "norm", "..."]

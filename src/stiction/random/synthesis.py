@@ -303,7 +303,10 @@ def layout(random: Any, interface: Any) -> list[Stream]:
 def synthesise(
     draws: Array, sigma: Array, numbers: NDArray[np.int64], has_mean: bool, out: Array
 ) -> None:
-    """Fill `out`, with shape (samples, rows, columns), with fields (1). A line has a single row."""
+    """Fill `out`, with shape (samples, rows, columns), with fields (1).
+
+    A line has a single row.
+    """
     samples, rows, columns = out.shape
     half = columns // 2
     scale = 0.5 * rows * columns

@@ -371,7 +371,10 @@ def unseen_batch(specimens: int) -> list[str]:
 
 
 def band_of(members: Array) -> tuple[float, float]:
-    """Return the 90 % band over equally likely interfaces. An end is NaN if its value is NaN."""
+    """Return the 90 % band over equally likely interfaces.
+
+    An end is NaN if its value is NaN.
+    """
     if not members.size:
         return math.nan, math.nan
     # Unknown probabilities are small, but above those that are exactly zero.

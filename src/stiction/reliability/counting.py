@@ -123,7 +123,10 @@ class Counted(NamedTuple):
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Draws of plain samples that begin with `first`. They are drawn again to save memory."""
+    """Draws of plain samples that begin with `first`.
+
+    They are drawn again to save memory.
+    """
 
     state: LimitState
     seed: int

@@ -202,7 +202,10 @@ def failure_probability(
 
 
 def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
-    """Warn about a stress far from the mean strength. Refuse it if the ratio is a thousand."""
+    """Warn about a stress far from the mean strength.
+
+    Refuse it if the ratio is a thousand.
+    """
     ratio = stress / state.experiment.mean_strength
     if not ratio > 0.0:
         return

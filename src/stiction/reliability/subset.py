@@ -152,7 +152,10 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest finite value. If there is no finite value, plus and minus infinity."""
+        """Lowest and highest finite value.
+
+        If there is no finite value, plus and minus infinity.
+        """
         lowest, plain = self.populations[-1].values, self.populations[0].values
         low = float(lowest.min(initial=math.inf))
         return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
@@ -171,7 +174,10 @@ class Descent(NamedTuple):
         return [level for level in self.populations if level.ceiling >= value]
 
     def probability(self, value: float) -> float:
-        """Return the estimate of P(function < value) (step 6). Zero without a sample below."""
+        """Return the estimate of P(function < value) (step 6).
+
+        Zero without a sample below.
+        """
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * _share(rarest.values < value) / self.last
 

@@ -52,7 +52,10 @@ PartOfRun: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return a mask (points, samples) of the samples in a part. Parts take blocks in turn."""
+    """Return a mask (points, samples) of the samples in a part.
+
+    Parts take blocks in turn.
+    """
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine = np.arange(total) // block % of == number - 1

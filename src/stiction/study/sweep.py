@@ -64,7 +64,10 @@ def _axis(given: Any) -> Axis:
 
 
 def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return a table with dotted keys. TOML reads an unquoted ``a.b = 1`` as nested tables."""
+    """Return a table with dotted keys.
+
+    TOML reads an unquoted ``a.b = 1`` as nested tables.
+    """
     result: dict[str, Any] = {}
     for key, value in given.items():
         inner = value.values() if isinstance(value, Mapping) else ()

@@ -99,7 +99,10 @@ class _Guard:
         return getattr(self._cache, name)
 
     def _cache_of(self, signature: Any) -> Any:
-        """Return the cache for types of arguments. None if compiled code must not be kept."""
+        """Return the cache for types of arguments.
+
+        None if compiled code must not be kept.
+        """
         foreign = _foreign_classes(signature)
         if not foreign:
             return self._cache

@@ -296,7 +296,10 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
 
 
 def _values(sample: Sample, load: Array, relieved: Array, place: Array) -> dict[str, Array]:
-    """Return the variables of all methods. `relieved` is the load less the relief by slip, Pa."""
+    """Return the variables of all methods.
+
+    `relieved` is the load less the relief by slip, Pa.
+    """
     # Arrested events are not known, so the first instability is the onset.
     stress = sample.mean_stress(relieved)
     variables = ("critical_load", "critical_stress", "first_instability", "critical_position")

@@ -251,7 +251,10 @@ def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
 
 @lru_cache(maxsize=64)
 def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
-    """Return the weights around node 0, and their transform. `half_width` is h_n/2 in nodes."""
+    """Return the weights around node 0, and their transform.
+
+    `half_width` is h_n/2 in nodes.
+    """
     weights = around(grid_weights(half_width), nodes)
     spectrum = np.fft.rfft(weights).real
     for array in (weights, spectrum):

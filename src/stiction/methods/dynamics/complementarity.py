@@ -51,7 +51,10 @@ _JOINING = 10.0  # stress above the strength with which a node joins, in units o
 
 @jit_inside
 def _solve(problem: SlipProblem, accuracy: float) -> Any:
-    """Step 2: improve u in place to a residual of `accuracy` (Pa). Return whether that succeeds."""
+    """Step 2: improve u in place to a residual of `accuracy` (Pa).
+
+    Return whether that succeeds.
+    """
     transform, work, product = problem.transform, problem.work, problem.product
     u, slipping = problem.increment, problem.slipping
     driving, falling, n = problem.driving, problem.falling, u.size

@@ -118,7 +118,10 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 def _assemble(
     state: RuptureState, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Step 2: write matrix, stress without slip and first guess. Return the accuracy of u, Pa."""
+    """Step 2: write matrix, stress without slip and first guess.
+
+    Return the accuracy of u, Pa.
+    """
     grid, problem = setting.grid, tables.problem
     stiffness, entry, symbol = grid.stiffness, grid.entry, problem.symbol
     response, ramp, past_hat = tables.response, tables.ramp_response, tables.past_hat
@@ -203,7 +206,10 @@ def _accelerates(
 def _accept(
     state: RuptureState, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Step 5: take the step in place. Write the strength after it, and return the work, J/m."""
+    """Step 5: take the step in place.
+
+    Write the strength after it, and return the work, J/m.
+    """
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
     grid, u = setting.grid, tables.problem.increment
     transfer, transfer_hat = tables.transfer, tables.problem.work

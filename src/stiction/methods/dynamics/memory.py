@@ -257,7 +257,10 @@ def advance_memory(
 def to_explicit(
     grid: Grid, state: RuptureState, step: float, table: Floats, memory_sum: Floats
 ) -> None:
-    """Step 3: divide psi by B for explicit steps h. Write Re sum w E psi to `memory_sum`."""
+    """Step 3: divide psi by B for explicit steps h.
+
+    Write Re sum w E psi to `memory_sum`.
+    """
     _scale_memory(grid, state.memory, step, divide=True)
     count, pairs = blocks(grid.frequency.size), grid.poles.size
     rows = table.reshape(count, pairs, 4, ENTRIES)

@@ -62,7 +62,10 @@ def static_search(problem: Problem) -> DenseSearch | None:
 
 
 def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
-    """Return the mean stress of the first instability in equilibrium, Pa. NaN without it."""
+    """Return the mean stress of the first instability in equilibrium, Pa.
+
+    NaN without it.
+    """
     if np.any(rows.strength[number] <= rows.initial_stress[number]):  # overstressed
         return np.nan
     state = search.next(sample_of(rows, search.pieces, number))

@@ -64,7 +64,10 @@ Reason = IntEnum(
 
 
 class Phase(IntEnum):
-    """Type of the next step, explicit or implicit. `RuptureState.memory` depends on the type."""
+    """Type of the next step, explicit or implicit.
+
+    `RuptureState.memory` depends on the type.
+    """
 
     IMPLICIT = 0  # psi, the memory variables themselves
     EXPLICIT = 1  # psi/B, divided by their response B to a unit slip rate
@@ -205,7 +208,10 @@ STATION = record("slip slip_rate shear_stress")
 
 
 def event_type(nodes: int) -> np.dtype[Any]:
-    """Return the data type for the record of an event. Pairs are values before and after."""
+    """Return the data type for the record of an event.
+
+    Pairs are values before and after.
+    """
     return np.dtype(
         [
             ("time", "f8"),  # when it began, s
@@ -277,7 +283,10 @@ class Nodes(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Elasticity, load, friction and stepping for an interface. They do not change in a run."""
+    """Elasticity, load, friction and stepping for an interface.
+
+    They do not change in a run.
+    """
 
     grid: Grid
     law: Any  # ``friction.parameters``

@@ -174,7 +174,10 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
 
 
 def _critical_load(run: Run, now: Any) -> float:
-    """Return the load, Pa, that carries the critical stress. NaN if the start was overstressed."""
+    """Return the load, Pa, that carries the critical stress.
+
+    NaN if the start was overstressed.
+    """
     nodes, margin = run.setting.nodes, 1e-6 * now["run"]["scale"]
     stress = float(now["results"]["onset_stress"])
     # Without slip the mean stress is tau_0 <p> + <tau_i>.

@@ -69,7 +69,10 @@ fraction of the largest."""
 
 
 def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Variable]:
-    """Return the variables of events. `inertia` adds the variables that a rupture provides."""
+    """Return the variables of events.
+
+    `inertia` adds the variables that a rupture provides.
+    """
 
     # On a plane, positions have two components, and an area replaces
     # the length. `per_area` changes the units of energies and moments.
@@ -254,7 +257,10 @@ def place_of(interface: Interface, node: int) -> list[float]:
 
 
 def moment_of(problem: Problem, slip: Array) -> float:
-    """Return the moment of a slip (m), N, or the rate from a slip rate, N/s. N m on a plane."""
+    """Return the moment of a slip (m), N, or the rate from a slip rate, N/s.
+
+    N m on a plane.
+    """
     return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
 
 

@@ -182,7 +182,10 @@ def forces_of(state: Contact, friction: Friction) -> Array:
 
 
 def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Contact:
-    """Step 3: return the slider before the push. Its slip adds to the slip of the pressing."""
+    """Step 3: return the slider before the push.
+
+    Its slip adds to the slip of the pressing.
+    """
     peak, residual, weakening = start.friction
     moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
     overstress[:n] -= peak * on_cells(-start.forces[n:])
@@ -265,7 +268,10 @@ def push_variables(interface: Interface) -> dict[str, Variable]:
 
 
 class SliderSolver:
-    """Solver for samples of a slider by `Equilibrium` with given options. It is thread-safe."""
+    """Solver for samples of a slider by `Equilibrium` with given options.
+
+    It is thread-safe.
+    """
 
     def __init__(self, problem: Problem, options: Any = None) -> None:
         if reasons := refused(problem):
@@ -276,7 +282,10 @@ class SliderSolver:
         self.length = problem.interface.measure
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
+        """Return the variables of `Equilibrium`.
+
+        The first dimension of each is the sample.
+        """
         warn_if_coarse(self.problem, rows.steepest_weakening_rate, MIN_NODES, COARSE)
         pushes = [self.path(rows, row).follow() for row in range(rows.samples)]
         table = [self._values(rows, row, push) for row, push in enumerate(pushes)]

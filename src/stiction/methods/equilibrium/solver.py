@@ -206,7 +206,10 @@ class OnsetSolver:
         self.problem, self.options, self.search = problem, options, search
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the variables of `Equilibrium`. The first dimension of each is the sample."""
+        """Return the variables of `Equilibrium`.
+
+        The first dimension of each is the sample.
+        """
         warn_of_signs(self.problem)
         errors = ERRORS_OF_COARSE_GRIDS[len(self.problem.interface.shape)]
         warn_if_coarse(self.problem, rows.steepest_weakening_rate, MIN_NODES, errors)
@@ -296,7 +299,10 @@ class OnsetSolver:
         return max(state.load - self.problem.relief(state.slip) for state in states)
 
     def _warn(self, rows: Sample, values: dict[str, Array], flags: Mask) -> None:
-        """Warn about exceptional samples. `values` holds all samples, with stresses in Pa."""
+        """Warn about exceptional samples.
+
+        `values` holds all samples, with stresses in Pa.
+        """
         known, certified, stopped = flags.T
         first, unproved = values["first_instability"], ~certified
         # Gaps are compared with the load. A stress of zero must not

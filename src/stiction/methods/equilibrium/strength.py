@@ -101,7 +101,10 @@ def make_sample(
 
 
 def row_of(samples: StaticSample, row: int) -> StaticSample:
-    """Return a sample from a batch that `sample_of` made. This saves a tenth of the time."""
+    """Return a sample from a batch that `sample_of` made.
+
+    This saves a tenth of the time.
+    """
     excess, residual, profile, W, critical, pieces = samples
     return StaticSample(excess[row], residual[row], profile, W[row], critical[row], pieces)
 

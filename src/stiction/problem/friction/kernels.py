@@ -31,7 +31,10 @@ from stiction.problem.friction.parameters import Linear
 
 
 def _line(law: Any, *numbers: float) -> tuple[float, float]:
-    """Represent the `line_at` of a law. The type of its parameters selects the compiled version."""
+    """Represent the `line_at` of a law.
+
+    The type of its parameters selects the compiled version.
+    """
     raise NotImplementedError
 
 
@@ -93,13 +96,19 @@ def line_at(
 
 @jit
 def strength_at(law: Any, peak: float, residual: float, W: float, slip: float) -> float:
-    """Return the strength tau_f, Pa, at a slip. The parameters are the same as in `line_at`."""
+    """Return the strength tau_f, Pa, at a slip.
+
+    The parameters are the same as in `line_at`.
+    """
     return _line(law, peak, residual, W, slip, 0.0)[0]
 
 
 @jit_allocating
 def strengths(law: Any, peak: Array, residual: Array, W: Array, slip: Array) -> Array:
-    """Return the strength tau_f, Pa, at every node. Parameters of `line_at` are (nodes,) arrays."""
+    """Return the strength tau_f, Pa, at every node.
+
+    Parameters of `line_at` are (nodes,) arrays.
+    """
     result = np.empty(slip.size)
     for i in range(slip.size):
         result[i] = strength_at(law, peak[i], residual[i], W[i], slip[i])

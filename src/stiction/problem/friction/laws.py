@@ -147,7 +147,10 @@ class FrictionLaw(Listed):
 
     @cached_property
     def steepening(self) -> float:
-        """Ratio of the steepest slope to the initial slope, at least 1. It governs stability."""
+        """Ratio of the steepest slope to the initial slope, at least 1.
+
+        It governs stability.
+        """
         if isinstance(self.parameters, Linear | Exponential):
             return 1.0
         # The examined slopes of a law of the user have some error.

@@ -7,7 +7,10 @@ from stiction.base.arrays import Array
 
 
 class Parameters(Protocol):
-    """Parameters of a law in kernels. Each law has its own NamedTuple with these members."""
+    """Parameters of a law in kernels.
+
+    Each law has its own NamedTuple with these members.
+    """
 
     @property
     def initial_slope(self) -> float:

@@ -80,7 +80,10 @@ OF_A_PLANE = (
 def column_in_si(
     column: Column, quantity: str, given: str | None, units: Iterable[str], option: str = ""
 ) -> tuple[Array, str]:
-    """Return a column in SI and its SI unit. The source or the caller states the original unit."""
+    """Return a column in SI and its SI unit.
+
+    The source or the caller states the original unit.
+    """
     name = given or column.unit or "1" * is_coefficient_name(column)
     if not name:
         way = f", or pass {option}=" * bool(option)
@@ -297,7 +300,10 @@ def _chosen(
 
 
 def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
-    """Return the column of a quantity by the rule. Other names than its own exclude a column."""
+    """Return the column of a quantity by the rule.
+
+    Other names than its own exclude a column.
+    """
     words, si = (quantity, *NAMES.get(quantity, ())), QUANTITIES[quantity].units
     others = {name: key for key in NAMES for name in NAMES[key] if name not in words}
     named = {c: others[name] for c in columns if (name := _plain(c.name)) in others}
@@ -344,7 +350,10 @@ def _plain(name: Any) -> str:
 
 
 def _directed(array: Any, dims: tuple[str, ...]) -> Any:
-    """Return the array over 'x' (or 'x' and 'y', or 'row'). A dimension of samples comes first."""
+    """Return the array over 'x' (or 'x' and 'y', or 'row').
+
+    A dimension of samples comes first.
+    """
     if len(dims) == 1 and "x" in array.coords:
         array = array.swap_dims({array["x"].dims[0]: "x"})
     names = [str(dim) for dim in array.dims]

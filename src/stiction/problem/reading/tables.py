@@ -285,7 +285,10 @@ def _statistics(rows: Sequence[Row]) -> set[int]:
 
 
 def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[Row]:
-    """Leave out a last row that is cut. Refuse any other row with too few cells (step 2)."""
+    """Leave out a last row that is cut.
+
+    Refuse any other row with too few cells (step 2).
+    """
     if len(rows[-1].cells) < width and len(rows) > 1:
         left_out.append(f"{rows[-1].text} (cut: {len(rows[-1].cells)} of {width} cells)")
         rows = rows[:-1]

@@ -99,7 +99,10 @@ def row_slice(row: int, length: int) -> slice:
 
 @jit
 def forward_substitute(factor: Array, first: int, last: int, values: Array) -> None:
-    """Solve L x = values in place for the rows first..last-1. Rows before them are solved."""
+    """Solve L x = values in place for the rows first..last-1.
+
+    Rows before them are solved.
+    """
     for r in range(first, last):
         row = factor[row_slice(r, r + 1)]
         values[r] = (values[r] - dot(row, values, r)) / row[r]
@@ -337,7 +340,10 @@ def raise_diagonal(workspace: Workspace, n_rows: int, position: int, amount: flo
 
 @jit
 def factor_slipping(workspace: Workspace) -> int:
-    """Step 4: factor A on the nodes marked by `is_slipping`. The result is as in `append`."""
+    """Step 4: factor A on the nodes marked by `is_slipping`.
+
+    The result is as in `append`.
+    """
     stiffness, diagonal = workspace.stiffness, workspace.diagonal
     slipping, queue, is_slipping = workspace.slipping, workspace.queue, workspace.is_slipping
     factored_diagonal, n_factored = workspace.factored_diagonal, workspace.n_factored[0]

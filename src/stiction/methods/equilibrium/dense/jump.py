@@ -155,7 +155,10 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
 
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
-    """Step 1: unmark the nodes that an elastic step would move back. Return how many remain."""
+    """Step 1: unmark the nodes that an elastic step would move back.
+
+    Return how many remain.
+    """
     workspace, n_stay = state.workspace, n_slipping
     for t in range(n_slipping):
         i = workspace.slipping[t]

@@ -194,7 +194,10 @@ def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
 
 @jit_inside
 def _cut(state: SlipState, n_factored: int, bound: float, best: Array) -> tuple[float, float]:
-    """Step 3: return the load of the cut and the new bound. Write its multiplier to `best`."""
+    """Step 3: return the load of the cut and the new bound.
+
+    Write its multiplier to `best`.
+    """
     sample, _, _, workspace, _, _ = state
     y = workspace.direction
     cholesky.singular_direction(workspace, n_factored, y)

@@ -160,7 +160,10 @@ class DenseSearch:
     def _by_transforms(
         self, sample: StaticSample, state: EquilibriumState | None
     ) -> EquilibriumState | None:
-        """Solve a programme in which many nodes slip. Return `None` if its bounds stay apart."""
+        """Solve a programme in which many nodes slip.
+
+        Return `None` if its bounds stay apart.
+        """
         half_spaces = self.elastic.half_spaces
         if half_spaces is None:
             return None

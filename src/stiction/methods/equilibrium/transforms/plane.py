@@ -225,7 +225,10 @@ def plane_onset(
 
 
 class PlaneSearch:
-    """Search for equilibria of a plane, to a relative gap between bounds. It is thread-safe."""
+    """Search for equilibria of a plane, to a relative gap between bounds.
+
+    It is thread-safe.
+    """
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces

@@ -125,7 +125,10 @@ def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> fl
 def solve_pieces(
     operator: Operator, drive: Array, weakening_rate: Array, guess: Array, tolerance: float
 ) -> tuple[int, Array]:
-    """Solve (1) for given pieces, with drive = load p - q. Return the status and the slip."""
+    """Solve (1) for given pieces, with drive = load p - q.
+
+    Return the status and the slip.
+    """
     # Nodes that the load alone would overload begin inside; the others
     # join if they must.
     slip = guess.copy()
