@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -122,6 +123,23 @@ def test_each_parameter_counts_or_is_refused_by_its_name(call, name):
         assert name in refusal
     else:
         assert numbers(result) != numbers(example(call)), f"{name} has no effect"
+
+
+@pytest.mark.parametrize("call", BASE)
+def test_arguments_in_the_wrong_place_are_refused_by_their_names(call):
+    """Each two that follow each other; and a method by its name is led to its class."""
+    parameters = inspect.signature(getattr(st, call)).parameters.values()
+    names = [
+        p.name for p in parameters if p.kind is not p.KEYWORD_ONLY and p.name in BASE[call]
+    ]
+    for first, second in pairwise(names):
+        given = {first: BASE[call][second], second: BASE[call][first]}
+        _, refusal = attempt(lambda given=given: ask(call, **given))
+        assert f"{first}: " in refusal or f"{second}: " in refusal or f"{second}=" in refusal
+        assert (first, second) != ("random", "peaks") or "peaks=" in refusal
+    if "method" in BASE[call]:
+        _, refusal = attempt(lambda: ask(call, method="equilibrium"))
+        assert "Write st.Equilibrium(" in refusal or "must be a Rupture" in refusal
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,8 @@ def test_interrupted_from_outside(runs, study):
         err = process.communicate(timeout=60.0)[1]
     assert process.returncode == 130
     assert "interrupted:" in err
-    assert "results are in run. Rerun the command to resume" in err
+    stored = "results are" if any(Path("run/chunks").iterdir()) else "no sample is stored"
+    assert f"{stored} in run. Rerun the command to resume" in err
     assert "Traceback" not in err
     runs("status run", "of 9000000", code=1)
 
@@ -94,6 +95,11 @@ def test_an_interruption_whose_exception_is_lost(runs, monkeypatch, where, done,
         runs("run study.toml --out run --workers 1", words, code=130)
     runs("status run", done, code=int(not done.startswith("300")))
     runs("run study.toml --out run", "300 of 300")
+
+
+def test_an_interruption_before_the_first_sample_promises_no_results(runs, monkeypatch):
+    monkeypatch.setattr(Store, "resume", lambda *_: signal.raise_signal(signal.SIGTERM))
+    runs("run study.toml --out run", "interrupted: no sample is stored in run", code=130)
 
 
 MISTAKES = {

@@ -41,6 +41,8 @@ STUDIES = {  # what is wrong, and the exit code of a run
     "a law without scale": (text(problem__friction={}), 2),
     "a force without an area": (text(reliability={"force": 40e3}), 2),
     "a coefficient without a pressure": (text(reliability={"friction_coefficient": 0.4}), 2),
+    "a demand in MPa": (text(reliability={"stress": 3.2}), 2),
+    "a demand far above": (text(reliability={"stress": 60e6}), 0),
     "a station off the interface": (text(save={"stations": {"far": 3.0}}), 2),
 }
 

@@ -82,9 +82,10 @@ def unknown(given: str, valid: Iterable[str]) -> str:
 
 
 def nearest(given: str, valid: Sequence[str]) -> str:
-    """Return the valid name that is most similar to a given name, ignoring case, or ''."""
+    """Return the valid name that is similar to a given name, or has it as a word, or ''."""
     by_case = {name.lower(): name for name in reversed(valid)}
-    near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.5)
+    near = get_close_matches(given.lower(), by_case, n=1, cutoff=0.7)
+    near = near or [name for name in by_case if given.lower() in name.split("_")]
     return by_case[near[0]] if near else _SYMBOLS.get(given, "")
 
 

@@ -86,7 +86,8 @@ def _resumable(out: Path) -> Iterator[None]:
         if interrupted.is_set():
             raise KeyboardInterrupt
     except KeyboardInterrupt:
-        echo(f"interrupted: results are in {out}. Rerun the command to resume", err=True)
+        stored = "results are" if any(out.glob("chunks/*.npz")) else "no sample is stored"
+        echo(f"interrupted: {stored} in {out}. Rerun the command to resume", err=True)
         raise typer.Exit(130) from None
     finally:
         interrupted.clear()

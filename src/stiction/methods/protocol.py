@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, SkipValidation
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError
+from stiction.base.errors import InputError, nearest
 from stiction.base.kinds import Kinds
 from stiction.base.model import is_finite
 from stiction.base.variables import (
@@ -139,8 +139,11 @@ MEMBERS = [name for name in vars(Method) if not name.startswith("_")]
 
 def as_method(value: Any) -> Any:
     """Return a method, or raise a ValueError that lists its missing members."""
-    if isinstance(value, type):  # parentheses were forgotten
-        raise ValueError(f"must be an object. Write st.{value.__name__}(...)")
+    name = nearest(value, [*METHODS]) if isinstance(value, str) else ""
+    kind = METHODS[name] if name else value
+    if isinstance(kind, type):  # or parentheses were forgotten
+        table = f", or in a study file a table with type = {name!r}" * bool(name)
+        raise ValueError(f"must be an object. Write st.{kind.__name__}(...){table}")
     missing = [name for name in MEMBERS if not hasattr(value, name)]
     if missing:
         raise ValueError(

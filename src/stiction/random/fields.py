@@ -499,6 +499,7 @@ def as_random_interface(given: Any) -> RandomInterface:
     if not isinstance(given, RandomInterface):
         raise InputError(
             f"must be a RandomInterface or a RandomField, got {describe(given)}. For a measured"
-            " profile, use st.onset, or fit a field to it with st.fit_field"
+            " profile, use st.onset, or fit a field to it with st.fit_field. For peaks, pass peaks="
+            " to st.infer"
         )
     return given

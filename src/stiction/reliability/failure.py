@@ -30,7 +30,7 @@ import numpy as np
 import xarray as xr
 
 from stiction.base.errors import InputError
-from stiction.base.model import Count, Number, Positive, Progress, Real, checked
+from stiction.base.model import Count, Number, Positive, Progress, checked
 from stiction.base.progress import Meter
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES
@@ -39,6 +39,7 @@ from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem, stress_of
 from stiction.problem.results import along, study_attributes
+from stiction.problem.sample import GIVE_PRESSURE
 from stiction.random.equally_likely import AnyRandom, as_random
 from stiction.reliability.answer import Answer
 from stiction.reliability.counting import binomial_interval, count_failures, count_tail
@@ -89,7 +90,7 @@ QUANTITIES = {"stress": "Pa", "force": "N", "friction_coefficient": "1"}
 def failure_probability(
     problem: Problem,
     random: AnyRandom,
-    stress: Real | None = None,
+    stress: Positive | None = None,
     *,
     method: MethodObject | None = None,
     friction_coefficient: Positive | None = None,
@@ -115,7 +116,7 @@ def failure_probability(
         from 1,000 to 8,000. The answer is then their mean, the
         predictive probability, and has a `band`.
     stress : float, optional
-        Mean shear stress to carry, Pa. Failure is an onset strictly below it.
+        Mean shear stress to carry, Pa, above zero. Failure is an onset strictly below it.
     method : LocalCriterion, Equilibrium or Rupture
         By default the method of a posterior. `Rupture` and other methods
         that are too slow for subset simulation use plain Monte Carlo, unless `max_evaluations` is
@@ -179,18 +180,13 @@ def failure_probability(
             f" {' and '.join(asked) or 'no value'}"
         )
     [name] = asked
-    if force is not None:
-        stress = stress_of(problem, "force", force)
 
     def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
         state, budget = prepare(
             experiment, workers, meter, max_evaluations,
-            algorithm=algorithm, per_pressure=stress is None, spent=spent,
+            algorithm=algorithm, per_pressure=name == "friction_coefficient", spent=spent,
         )  # fmt: skip
-        wanted = stress
-        if wanted is None:
-            wanted = (friction_coefficient or 0.0) * experiment.pressure
-        _check_unit(state, name, given[name] or 0.0, wanted)
+        wanted = demanded(state, name, given[name] or 0.0)
         answer = _probability(state, wanted, algorithm, target_cv, budget, max_evaluations)
         return replace(answer, quantity=name)
 
@@ -201,22 +197,29 @@ def failure_probability(
     )
 
 
-def _check_unit(state: LimitState, name: str, given: float, stress: float) -> None:
-    """Warn about a stress far from the mean strength.
+def demanded(state: LimitState, name: str, given: float) -> float:
+    """Return a demand as a mean stress, Pa.
 
-    Refuse it if the ratio is a thousand.
+    Warn about a demand far from the mean strength. Refuse it if the
+    ratio is a thousand.
     """
-    ratio = stress / state.experiment.mean_strength
-    if not ratio > 0.0:
-        return
-    unit = QUANTITIES[name]
+    experiment, stress = state.experiment, given
+    if name == "force":
+        stress = stress_of(experiment.problem, name, given)
+    elif name == "friction_coefficient":
+        stress = given * experiment.pressure
+        if not stress > 0.0:
+            raise InputError(f"friction_coefficient: needs a normal pressure. {GIVE_PRESSURE}")
+    ratio, unit = stress / experiment.mean_strength, QUANTITIES[name]
     possible = 1.0 / THOUSAND, THOUSAND
-    least = possible[0] if stress <= state.bounds[0] else DOUBTFUL
+    certain = ratio < DOUBTFUL and stress <= state.bounds[0]
+    usual = possible if certain else (DOUBTFUL, 1.0 / DOUBTFUL)
     text = (
         f"{name}: {f'{given:g} {unit}'.removesuffix(' 1')} is {ratio:.2g} times the mean strength,"
         f" {in_words(unit, given / ratio)}. Check the unit (Pa, N or none)"
     )
-    doubt_units([Doubt(text, ratio, (least, 1.0 / DOUBTFUL), possible)])
+    doubt_units([Doubt(text, ratio, usual, possible)])
+    return stress
 
 
 def _probability(

@@ -81,8 +81,6 @@ def prepare(
     threads = workers or usable_cores()
     state = LimitState(experiment, per_pressure, threads, meter, executor)
     problems = []
-    if per_pressure and not experiment.pressure > 0.0:
-        problems.append("friction_coefficient: needs load.normal_pressure or pressing_force")
     if algorithm in ("subset", "two_level") and (slow := too_slow(experiment, max_evaluations)):
         problems.append(f"method: {slow}")
     elif algorithm == "two_level" and isinstance(reason := state.guide, str):

@@ -18,7 +18,7 @@ import pydantic
 import tomli_w
 from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag
 
-from stiction.base.errors import InputError, StoreError, prefixed
+from stiction.base.errors import InputError, StoreError, merge_warnings, prefixed
 from stiction.base.files import content_of, write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
@@ -31,7 +31,6 @@ from stiction.base.model import (
     Number,
     Positive,
     Progress,
-    Real,
     Text,
     check,
     checked,
@@ -43,19 +42,20 @@ from stiction.base.model import (
 )
 from stiction.ensemble.dataset import GridAxes, distinct, variables_in
 from stiction.ensemble.experiment import Experiment, Measured
+from stiction.ensemble.limit_state import LimitState
 from stiction.ensemble.monte_carlo import Samples, gather
 from stiction.ensemble.store import Store, read_study
 from stiction.inference.peaks import Peaks, make_peaks, read_peaks
 from stiction.methods.protocol import METHODS, as_method
 from stiction.problem.friction import SCALES
-from stiction.problem.problem import Problem, stress_of
+from stiction.problem.problem import Problem
 from stiction.problem.profiles import ProfileFile, profile_in_file
 from stiction.random.dotted_keys import with_values
 from stiction.random.equally_likely import FIRST_MEMBERS, Source
 from stiction.random.fields import RandomField, RandomInterface, as_random_interface
 from stiction.reliability.answer import Answer
 from stiction.reliability.design import design_stress
-from stiction.reliability.failure import failure_probability
+from stiction.reliability.failure import QUANTITIES, demanded, failure_probability
 from stiction.reliability.solving import Probability, TargetCv, too_slow
 from stiction.study.run import PartOfRun, StoredRun, samples_of_part
 from stiction.study.sweep import SWEPT, Point, Sweep, grid_axes
@@ -153,7 +153,7 @@ class Question:
         Coefficient of variation to reach.
     """
 
-    stress: Real | None = None
+    stress: Positive | None = None
     force: Positive | None = None
     friction_coefficient: Positive | None = None
     probability: Probability | None = None
@@ -174,14 +174,11 @@ class Question:
         return {name: value for name, value in vars(self).items() if value is not None}
 
     def check(self, point: Experiment) -> None:
-        """Refuse a question that a sweep point cannot answer."""
-        if self.force is not None:
-            stress_of(point.problem, "reliability.force", self.force)
-        if self.friction_coefficient and not point.pressure > 0.0:
-            raise InputError(
-                "reliability.friction_coefficient: needs a normal pressure (Pa,"
-                " problem.load.normal_pressure) or a pressing force (N)"
-            )
+        """Refuse a question that a sweep point cannot answer. Doubt a demand in another unit."""
+        for name in QUANTITIES.keys() & self._given:
+            state = LimitState(point, name == "friction_coefficient")
+            with prefixed("reliability", "."):
+                demanded(state, name, self._given[name])
         if self.probability is not None and (slow := too_slow(point, None)):
             raise InputError(f"method: {slow}")
 
@@ -272,8 +269,9 @@ class Study(_Parts):
                 " separate study for each interface"
             )
         if self.reliability is not None:
-            for point in distinct(points, "problem", "random", "method"):
-                self.reliability.check(point)
+            with merge_warnings():
+                for point in distinct(points, "problem", "random", "method"):
+                    self.reliability.check(point)
         return self
 
     def _place_profiles(self) -> None:

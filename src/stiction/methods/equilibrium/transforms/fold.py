@@ -131,8 +131,6 @@ def follow_to_turn(
             if y is None:
                 break
             piece[node] += 1
-            share = pieces.starts[piece[node]]
-            strength[node] = share * sample.excess[node] + (1.0 - share) * sample.residual[node]
             W_before, slip[node] = weakening_rate[node], corner[node]
             weakening_rate[node] = pieces.slopes[piece[node]] * sample.weakening_rate[node]
             change = W_before - weakening_rate[node]
