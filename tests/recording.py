@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refuses
 
 FLOOR = 1e-9
 """Distance of numbers that count as equal, as a share of the largest of an output."""
@@ -126,6 +127,18 @@ def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
     def test(name: str, request: pytest.FixtureRequest) -> None:
         outputs = {text: said(partial(eval, text, scope)) for text in read(path)[name]}
         compare(path, name, outputs, request.config.getoption("--record"), 0.0)
+
+    return test
+
+
+def refusals(file: str, scope: dict[str, Any]) -> Callable[..., None]:
+    """A test of each call that the records of a file hold as text, with words of its refusal."""
+    path = Path(file).parents[1] / "records" / f"{Path(file).stem.removeprefix('test_')}.json"
+    words: Mapping[str, Any] = read(path)
+
+    @pytest.mark.parametrize("call", words)
+    def test(call: str) -> None:
+        refuses(words[call], partial(eval, call, scope))
 
     return test
 

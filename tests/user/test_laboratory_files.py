@@ -75,26 +75,28 @@ def test_maps_without_headings(tmp_path):
 
 def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     """pandas reads regular lines; any other file is read line by line, with the same refusals."""
+    monkeypatch.setattr(files, "LARGE", 2**13)
+    monkeypatch.setattr(files, "HEAD", 2**10)
     rng = np.random.default_rng(0)
-    x, values = np.arange(40_000) * 1e-3, np.round(1.0 + rng.random(40_000), 6)
+    x, values = np.arange(1000) * 1e-3, np.round(1.0 + rng.random(1000), 6)
     lines = [f"{a:.3f};{b:.6f}" for a, b in zip(x, values, strict=True)]
-    assert len("\n".join(lines)) > files.LARGE
     head = "x (mm);strength (MPa)"
     for text in ("\n".join([head, *lines]), "\n".join([head, *lines]).replace(".", ",")):
+        assert len(text) > files.LARGE
         np.testing.assert_array_equal(read(tmp_path, text), values * 1e6)
     for wrong, words in (
-        ("30.000;1,5", "two decimal marks"),
-        ("30.000;1.5;2", "line"),
-        ("30.000;Bad", "line 30002: 'Bad'"),
-        ("30.000;-1", "in line 30002"),
+        ("0.750;1,5", "two decimal marks"),
+        ("0.750;1.5;2", "line"),
+        ("0.750;Bad", "line 752: 'Bad'"),
+        ("0.750;-1", "in line 752"),
     ):
-        lines[30_000] = wrong
+        lines[750] = wrong
         refuses(words, lambda: read(tmp_path, "\n".join([head, *lines])))
-    lines[30_000] = "30.000;1.5;2"  # cells too many between blanks, too
+    lines[750] = "0.750;1.5;2"  # cells too many between blanks, too
     blank = "\n".join(lines).replace(";", " ")
     refuses("line", lambda: read(tmp_path, blank, x=0, value=1))
-    lines[30_000] = "30.000;"
-    assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [30_000]
+    lines[750] = "0.750;"
+    assert np.flatnonzero(np.isnan(read(tmp_path, "\n".join([head, *lines])))) == [750]
 
 
 def test_heights_become_strengths_by_a_map():
@@ -111,7 +113,10 @@ def test_heights_become_strengths_by_a_map():
 
 
 @pytest.mark.parametrize("mark", ["9.9E37", "-9.9e37", "9.91E37"])
-def test_marks_of_an_overload_are_no_strengths(tmp_path, mark):
+def test_marks_of_an_overload_are_no_values(tmp_path, mark):
     rows = "\n".join(["x (mm);strength (MPa)", *ROWS, f"4;{mark}"])
     refuses("in line 6 ... overload ... missing=", lambda: read(tmp_path, rows))
     assert is_read(read(tmp_path, rows, missing=float(mark))[:4])
+    forces = "\n".join([*(f"{i};{min(i, 60)}" for i in range(100)), f"100;{mark}"])
+    (tmp_path / "curve.csv").write_text(f"Time (s);Friction force (N)\n{forces}")
+    refuses("overload", lambda: st.read_curve(tmp_path / "curve.csv"))

@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from recording import refusals
 from refusals import refuses, warning_texts
-from setups import EXACT, LOCAL, beta_strength
+from setups import EXACT, LOCAL, beta_strength  # noqa: F401  # slider.json calls them
 from sliders import SOLID, coefficients, rig_problem
 
 import stiction as st
@@ -17,121 +18,14 @@ STIFF = dataclasses.replace(SOLID, shear_modulus=80e9, density=7800.0)
 
 
 def sampled(mu=MU, **parts):
-    return lambda: rig_problem(**parts).sample(mu)
+    return rig_problem(**parts).sample(mu)
 
 
 def coefficient(value):
     return xr.DataArray(value, attrs={"units": "1"})
 
 
-REFUSED = {
-    "a push above the slider": (
-        "drive ... 0.075 to 0.085 ... largest height 0.07 m fits",
-        sampled(drive=st.Pusher(height=0.08, width=0.01)),
-    ),
-    "a push wider than the slider": (
-        "drive ... largest width 0.01 m fits",
-        sampled(drive=st.Pusher(height=0.07, width=0.02)),
-    ),
-    "two pushers": (
-        "drive.side ... 'left' or 'right'",
-        sampled(drive=st.Pusher(height=0.02, width=0.01, side="both")),
-    ),
-    "a mass": ("drive.mass", sampled(drive=st.Pusher(height=0.02, width=0.01, mass=1.0))),
-    "a platen": ("drive ... Pusher", sampled(drive=st.Platen())),
-    "a machine without thickness": (
-        "thickness ... drive.stiffness",
-        sampled(thickness=None, drive=st.TopShear(stiffness=1e7)),
-    ),
-    "a plate that tilts": ("tilt ... plate", sampled(pressing="plate", tilt=0.1)),
-    "a press that pulls": ("tilt", sampled(tilt=1.2)),
-    "a base that ends first": (
-        "behind ... -0.01",
-        lambda: st.Base(height=0.03, behind=-0.01),
-    ),
-    "sizes in mm": (
-        "specimen.height: 75 m ... specimen.base.behind: 60 m ... Check its unit (m)",
-        sampled(height=75.0, base=st.Base(height=0.03, behind=60.0)),
-    ),
-    "a coarse mesh for the pusher": (
-        "specimen.drive.width ... interface.nodes = 20 or more",
-        sampled(nodes=16, drive=st.Pusher(height=0.02, width=0.007)),
-    ),
-    "a coarse mesh for the nucleation length": (
-        "interface.nodes: must be 130 or more",
-        sampled(problem={"friction": st.LinearWeakening(weakening_rate=4e11, residual_ratio=0.6)}),
-    ),
-    "a coarse mesh for the base": (
-        "specimen.base.height ... nodes = 70 or more",
-        sampled(base=st.Base(height=0.004)),
-    ),
-    "toppling": (
-        "topples ... at most 0.667 times ... 0.8",
-        sampled(
-            coefficients(PROBLEM, 1.0),
-            drive=st.Pusher(height=0.07, width=0.01),
-            tilt=1.0,
-            problem={"friction": st.LinearWeakening(weakening_rate=1e11, residual_ratio=0.8)},
-        ),
-    ),
-    "a material contrast": (
-        "specimen.base.solid ... up to 1.4 ... got 1.7",
-        sampled(coefficients(PROBLEM, 1.6), base=st.Base(height=0.03, solid=STIFF)),
-    ),
-    "another plane state": (
-        "base.solid.plane ... 'stress'",
-        sampled(base=st.Base(height=0.03, solid=dataclasses.replace(STIFF, plane="strain"))),
-    ),
-    "mode III": ("mode ... 'II'", sampled(problem={"mode": "III"})),
-    "stresses": ("strength ... friction coefficients ... unit 1", sampled(np.full(64, 3e6))),
-    "a residual stress": (
-        "residual_strength ... friction coefficients",
-        sampled({"strength": MU, "residual_strength": 1e6}, problem={
-            "friction": st.LinearWeakening(weakening_rate=1e11)
-        }),
-    ),
-    "a residual stress in the law": (
-        "friction.residual_strength ... residual_ratio",
-        sampled(problem={
-            "friction": st.LinearWeakening(weakening_rate=1e11, residual_strength=1e6)
-        }),
-    ),
-    "an initial stress": ("initial_stress", sampled({"strength": MU, "initial_stress": 1e5})),
-    "an initial stress of the load": (
-        "load.initial_stress",
-        sampled(problem={"load": st.Load(initial_stress=1e5, pressing_force=4e3)}),
-    ),
-    "an extent": (
-        "interface.extent",
-        sampled(problem={"interface": st.Interface(0.14, 64, extent=(0.02, 0.1))}),
-    ),
-    "no pressure": ("load ... normal force", sampled(problem={"load": st.Load()})),
-    "a profile of the pressure": (
-        "load.normal_pressure ... pressing_force",
-        sampled(problem={"load": st.Load(normal_pressure=np.linspace(1e6, 2e6, 64))}),
-    ),
-    "a pressure along a sample": (
-        "load.pressing_force ... no effect ... normal_pressure: follows from the rig",
-        sampled({"strength": MU, "normal_pressure": np.linspace(1e6, 2e6, 64)}),
-    ),
-    "random stresses": (
-        "random.strength ... friction coefficients",
-        lambda: st.monte_carlo(PROBLEM, beta_strength(0.01), method=EXACT, samples=1),
-    ),
-    "the local criterion": (
-        "local criterion ... pressure ... st.Equilibrium()",
-        lambda: st.onset(PROBLEM, MU, method=LOCAL),
-    ),
-    "ruptures": (
-        "rupture ... equal blocks ... st.Equilibrium()",
-        lambda: st.simulate_rupture(PROBLEM, MU, method=st.Rupture()),
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_a_slider_does_not_take(name):
-    refuses(*REFUSED[name])
+test_what_a_slider_does_not_take = refusals(__file__, globals())
 
 
 def test_coefficients_times_the_mean_pressure():
