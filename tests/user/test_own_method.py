@@ -85,16 +85,16 @@ def test_bounds_and_scaling_hold_only_if_a_method_says_so(method):
 
 def test_an_onset_at_minus_infinity_is_refused():
     problem, strength = make_problem(256), beta_strength(7e-3)
-    names = ("critical_stress", "first_instability")
     given = {"probability": 0.1, "progress": False, "max_evaluations": 100}
 
     def design(value):
+        names = ("critical_stress", "first_instability")
         method = Broken({})
         method.prepare = lambda problem: (
-            lambda sample: {
-                name: np.full(sample.samples, value if name in names else 1.0)
-                for name in onset_variables(problem.interface)
-            }
+            lambda sample: (
+                Broken({}).prepare(problem)(sample)
+                | dict.fromkeys(names, np.full(sample.samples, value))
+            )
         )
         return st.design_stress(problem, strength, method=method, **given)
 
@@ -133,19 +133,13 @@ def field_of(distribution):
 def test_a_class_whose_members_return_the_wrong_thing_is_refused():
     problem = st.paper.problem(nodes=256)
     uniform, spectrum = scipy.stats.uniform(1e6, 1e6), Negative(correlation_length=2e-3)
-    for words, call in (
-        (
-            "supports must return a list of reasons, got 'it does",
-            lambda: st.onset(problem, np.full(256, 1e6), method=Unlisted({})),
-        ),
-        ("from_scipy: its distribution must be frozen", lambda: field_of(scipy.stats.norm)),
-        (
-            "must have a finite mean ... got nan",
-            lambda: field_of(scipy.stats.triang(2.0, 1e6, 1e6)),
-        ),
-        (
-            "positive and finite ... smallest value of -1",
-            lambda: st.RandomField(uniform, spectrum).sample(problem.interface),
-        ),
-    ):
-        refuses(words, call)
+    refuses(
+        "supports must return a list of reasons, got 'it does",
+        lambda: st.onset(problem, np.full(256, 1e6), method=Unlisted({})),
+    )
+    refuses("from_scipy: its distribution must be frozen", lambda: field_of(scipy.stats.norm))
+    outside = scipy.stats.triang(2.0, 1e6, 1e6)
+    refuses("must have a finite mean ... got nan", lambda: field_of(outside))
+    field = st.RandomField(uniform, spectrum)
+    words = "positive and finite ... smallest value of -1"
+    refuses(words, lambda: field.sample(problem.interface))
