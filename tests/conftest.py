@@ -9,6 +9,9 @@ import tempfile
 from pathlib import Path
 from types import SimpleNamespace
 
+# Each process of the tests has one core, on which threads of BLAS would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import hypothesis
 import pytest
 

@@ -16,59 +16,48 @@ from stiction.cli.commands import app
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
 STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), quantity=None)
+
 SLIP = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
 
 
+def of_mean(mean):
+    """The random interface of the joint with another mean."""
+    field = dataclasses.replace(FIELD, marginal=st.Gamma(mean=mean, cv=0.15))
+    return dataclasses.replace(RANDOM, strength=field)
+
+
 @pytest.mark.parametrize(
-    ("problem", "name", "strength", "method"),
+    ("problem", "name", "table", "key", "strength", "method"),
     [
-        (PROBLEM, "normal_pressure", FIELD, LOCAL),
-        (PRESSED, "pressing_force", FIELD, EXACT),
-        (SLIP, "critical_slip", STRENGTH, EXACT),
-        (PROBLEM, "residual_strength", STRENGTH, EXACT),
+        (PROBLEM, "normal_pressure", "load", "normal_pressure", FIELD, LOCAL),
+        (PRESSED, "pressing_force", "load", "pressing_force", FIELD, EXACT),
+        (SLIP, "critical_slip", "friction", "critical_slip", STRENGTH, EXACT),
+        (PROBLEM, "residual_strength", "friction", "residual_ratio", STRENGTH, EXACT),
     ],
 )
-def test_a_factor_multiplies_a_constant_of_the_problem(problem, name, strength, method):
+def test_a_factor_multiplies_a_constant(problem, name, table, key, strength, method):
     """Sample by sample the onset is that of a problem with the constant times the factor."""
     random = st.RandomInterface(strength=strength, between={name: FACTOR})
-    interface = problem.interface
-    found = ensemble(problem, random, 12, method=method, seed=3)
-    factors = next(
-        v for k, v in random.profiles(interface, samples=12, seed=3).items() if k[0] == "b"
-    )
-    profiles = strength.sample(interface, samples=12, seed=3)
-    table, key = {
-        "normal_pressure": ("load", "normal_pressure"),
-        "pressing_force": ("load", "pressing_force"),
-        "critical_slip": ("friction", "critical_slip"),
-        "residual_strength": ("friction", "residual_ratio"),
-    }[name]
+    onsets = ensemble(problem, random, 12, method=method, seed=3).critical_stress
+    drawn = random.profiles(problem.interface, samples=12, seed=3)
+    (factors,) = (values[:, 0] for label, values in drawn.items() if label[0] == "b")
+    profiles = strength.sample(problem.interface, samples=12, seed=3)
     part = getattr(problem, table)
-    for number in range(12):
-        value = getattr(part, key) * factors[number, 0]
-        changed = dataclasses.replace(
-            problem, **{table: dataclasses.replace(part, **{key: value})}
-        )
-        of = (
-            {"friction_coefficient": profiles[number]}
-            if strength.quantity
-            else profiles[number]
-        )
-        exact = st.onset(changed, of, method=method)
-        assert float(found.critical_stress[number]) == pytest.approx(
-            float(exact.critical_stress[0]), rel=1e-9
-        )
-    assert np.std(factors[:, 0]) > 0.03
+    for onset, factor, profile in zip(onsets.values, factors, profiles, strict=True):
+        changed = dataclasses.replace(part, **{key: getattr(part, key) * factor})
+        given = {"friction_coefficient": profile} if strength.quantity else profile
+        scaled = dataclasses.replace(problem, **{table: changed})
+        exact = st.onset(scaled, given, method=method).critical_stress.item()
+        assert onset == pytest.approx(exact, rel=1e-9)
+    assert np.std(factors) > 0.03
 
 
 def test_a_design_has_the_scatter_of_the_pressing_force():
     """With coefficients it is one more factor of the strength; both are counted."""
-    random = st.RandomInterface(
-        strength=FIELD, between={"strength": FACTOR, "pressing_force": FACTOR}
-    )
-    both = st.RandomInterface(
-        strength=FIELD, between={"strength": st.Lognormal(mean=1.0, cv=np.sqrt(1.01**2 - 1.0))}
-    )
+    factors = {"strength": FACTOR, "pressing_force": FACTOR}
+    random = st.RandomInterface(strength=FIELD, between=factors)
+    joint = st.Lognormal(mean=1.0, cv=np.sqrt(1.01**2 - 1.0))
+    both = st.RandomInterface(strength=FIELD, between={"strength": joint})
     designs = [
         st.design_stress(PRESSED, given, probability=1e-2, **GIVEN) for given in (random, both)
     ]
@@ -107,8 +96,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
     found = design.sensitivities.sel(source=PRESSURE)
     assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
     assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
-    stated = {PRESSURE: (4e6, 8e6)}
-    given = GIVEN | {"sensitivities": stated, "probability": 1e-2}
+    given = GIVEN | {"probability": 1e-2, "sensitivities": {PRESSURE: (4e6, 8e6)}}
     wide = st.design_stress(PROBLEM, RANDOM, **given)
     ends = wide.sensitivities.sel(source=PRESSURE)
     assert float(ends.stress_at_high / ends.stress_at_low) == pytest.approx(2.0, rel=1e-6)
@@ -121,30 +109,18 @@ def test_a_design_is_in_proportion_to_the_pressure():
     assert "the error of the computation only" in text
     assert "weibull to lognormal" in text
     assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
-    refuses(
-        "sensitivities: problem.load.weight: is not a constant",
-        lambda: st.design_stress(
-            PROBLEM, RANDOM, **given | {"sensitivities": {"problem.load.weight": (1, 2)}}
-        ),
-    )
+    given["sensitivities"] = {"problem.load.weight": (1, 2)}
+    words = "sensitivities: problem.load.weight: is not a constant"
+    refuses(words, lambda: st.design_stress(PROBLEM, RANDOM, **given))
     plain = st.design_stress(PROBLEM, RANDOM, probability=1e-2, **GIVEN)
     refuses("has no sensitivities", lambda: st.plot.sensitivities(plain))
-
-
-def make(**tables):
-    return st.Study(
-        problem=PROBLEM, method=GIVEN["method"], samples=1,
-        reliability={"probability": 1e-1, "target_cv": 0.3}, **tables,
-    )  # fmt: skip
 
 
 def test_a_page_of_a_design(tmp_path):
     """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
     design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
     assert design.reliability_index == pytest.approx(-norm.ppf(1e-3))
-    inner = ensemble(
-        PROBLEM, RANDOM.strength, 5000, method=GIVEN["method"]
-    ).critical_stress.values
+    inner = ensemble(PROBLEM, RANDOM.strength, 5000).critical_stress.values
     law = RANDOM.between["strength"].distribution
     levels = np.linspace(0.6e6, 0.9e6, 301)
     below = [law.cdf(level / inner).mean() for level in levels]
@@ -152,12 +128,13 @@ def test_a_page_of_a_design(tmp_path):
     right = np.interp(0.05, below, levels)
     assert design.characteristic_stress == pytest.approx(right, rel=0.01)
     assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
-    source = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
-    evidence = [st.Lognormal(mean=1.0, cv=0.1)]
-    path = design.write_page(
-        tmp_path / "design.html", evidence=evidence, sources=source,
-        title="Lap joint 7",
-    )  # fmt: skip
+    told = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
+    about = {
+        "evidence": [st.Lognormal(mean=1.0, cv=0.1)],
+        "sources": told,
+        "title": "Lap joint 7",
+    }
+    path = design.write_page(tmp_path / "design.html", **about)
     text = path.read_text(encoding="utf-8")
     for words in (
         "Lap joint 7", "reliability index", f"{design.partial_factor:.6g}", "drawing 12",
@@ -166,24 +143,13 @@ def test_a_page_of_a_design(tmp_path):
         assert words in text, words
     assert text.count("certificate 8") == 2  # of both moduli
     assert f"{PROBLEM.solid.youngs_modulus:.5g}" in text
-    refuses(
-        "sources: ... load.weight ... is not an input",
-        lambda: design.write_page(path, sources={"load.weight": "scales"}),
-    )
+    words, told = "sources: ... load.weight ... is not an input", {"load.weight": "scales"}
+    refuses(words, lambda: design.write_page(path, sources=told))
     demand = st.failure_probability(PROBLEM, RANDOM, 0.7e6, **GIVEN)
     refuses("design: must come from st.design_stress", lambda: demand.write_page(path))
     # More confidence asks for less: where means differ by 5 %, 95 % of them exceed it.
     means = 0.2 * np.exp(0.05 * norm.ppf((np.arange(40) + 0.5) / 40))
-    likely = [
-        st.RandomInterface(
-            strength=st.RandomField(
-                st.Gamma(mean=mean, cv=0.15), RANDOM.strength.spectrum,
-                quantity="friction_coefficient", mean_mode=True,
-            ),
-            between=RANDOM.between,
-        )
-        for mean in means
-    ]  # fmt: skip
+    likely = [of_mean(mean) for mean in means]
     bold, careful = (
         st.design_stress(PROBLEM, likely, probability=1e-2, confidence=share, **GIVEN)
         for share in (0.5, 0.95)
@@ -197,12 +163,13 @@ def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeyp
     monkeypatch.setattr("stiction.study.study.FIRST_MEMBERS", 20)
 
     def interfaces(count, seed=0):
-        marginals = (st.Gamma(mean=mean, cv=0.15) for mean in np.linspace(0.19, 0.21, count))
-        fields = (dataclasses.replace(FIELD, marginal=marginal) for marginal in marginals)
-        return [dataclasses.replace(RANDOM, strength=field) for field in fields]
+        return [of_mean(mean) for mean in np.linspace(0.19, 0.21, count)]
 
-    source = SimpleNamespace(interfaces=interfaces)
-    study = make(random=source, peaks=np.array([0.7, 0.72, 0.9]) * 1e6)
+    study = st.Study(
+        problem=PROBLEM, method=LOCAL, random=SimpleNamespace(interfaces=interfaces), samples=1,
+        peaks=np.array([0.7, 0.72, 0.9]) * 1e6,
+        reliability={"probability": 1e-1, "target_cv": 0.3},
+    )  # fmt: skip
     study.to_toml(tmp_path / "study.toml")
     text = (tmp_path / "study.toml").read_text()
     assert 'random = "study.random.json"' in text
@@ -220,6 +187,5 @@ def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeyp
     assert "40 peaks against the prediction" in capsys.readouterr().out
     assert "the peaks contradict the prediction, p = 0.001" in page.read_text("utf-8")
     (tmp_path / "study.random.json").write_text("[{")
-    refuses(
-        "random: ... is not valid JSON", lambda: st.Study.from_toml(tmp_path / "study.toml")
-    )
+    words = "random: ... is not valid JSON"
+    refuses(words, lambda: st.Study.from_toml(tmp_path / "study.toml"))

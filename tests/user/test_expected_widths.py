@@ -11,13 +11,14 @@ from stiction.inference.specimens import Prediction
 PROBLEM = make_problem(64, 0.05, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.15), st.PowerLawSpectrum(4e-3), mean_mode=True)
 GIVEN = {"method": LOCAL, "progress": False}
+FEW = GIVEN | {"samples": 100, "between": "lognormal"}
 
 
 def test_intervals_become_narrower_as_the_root_of_the_tests():
     factors = np.exp(0.1 * np.random.default_rng(2).standard_normal(8))
     onsets = st.monte_carlo(PROBLEM, FIELD, samples=8, pilot=False, **GIVEN)
     peaks = onsets.critical_stress.values * factors
-    posterior = st.infer(PROBLEM, FIELD, peaks, samples=200, **GIVEN)
+    posterior = st.infer(PROBLEM, FIELD, peaks, **FEW)
     designs = {"many": 56}
     found = st.design_of_tests(PROBLEM, posterior, designs=designs, repetitions=12, **GIVEN)
     assert found.design.values.tolist() == ["now", "many"]
@@ -35,43 +36,35 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
 def test_a_design_is_for_specimens_of_the_problem():
     """Tests of two lengths in either order. By chance the designs of the lengths differ by 4 %."""
     peaks = {0.025: 1e6 * np.array([0.83, 0.9, 0.87]), 0.05: 1e6 * np.array([0.8, 0.85, 0.77])}
-    numbers = {"repetitions": 10, "designs": {"few": 1}}
+    given = GIVEN | {"repetitions": 10, "designs": {"few": 1}}
     stresses = []
     for lengths in ((0.025, 0.05), (0.05, 0.025)):
         groups = {length: peaks[length] for length in lengths}
-        posterior = st.infer(PROBLEM, FIELD, groups, samples=200, **GIVEN)
-        found = st.design_of_tests(PROBLEM, posterior, **numbers, **GIVEN)
+        posterior = st.infer(PROBLEM, FIELD, groups, **FEW)
+        found = st.design_of_tests(PROBLEM, posterior, **given)
         kinds = [posterior.likelihood.of(peaks.values(), [k, 1 - k]) for k in (0, 1)]
-        by_kind = dict(
-            zip(
-                lengths,
-                (Prediction(k, posterior.grid).quantile(1e-3) for k in kinds),
-                strict=True,
-            )
-        )
+        stress = [Prediction(kind, posterior.grid).quantile(1e-3) for kind in kinds]
+        by_kind = dict(zip(lengths, stress, strict=True))
         assert abs(by_kind[0.025] / by_kind[0.05] - 1.0) > 0.02
         assert found.design_stress[0] == pytest.approx(by_kind[0.05], rel=1e-3)
         stresses.append(float(found.design_stress[0]))
     assert stresses[0] == pytest.approx(stresses[1], rel=0.02)
     longer = make_problem(64, 0.1, weakening_rate=0.25e12)
-    refuses(
-        "problem of the posterior",
-        lambda: st.design_of_tests(longer, posterior, **numbers, **GIVEN),
-    )
-    groups = {0.025: peaks[0.025], 0.0375: peaks[0.05]}
-    other = st.infer(PROBLEM, FIELD, groups, samples=200, **GIVEN)
-    refuses(
-        "no peak is from a specimen of the problem",
-        lambda: st.design_of_tests(PROBLEM, other, **numbers, **GIVEN),
-    )
+    words = "problem of the posterior"
+    refuses(words, lambda: st.design_of_tests(longer, posterior, **given))
+    other = st.infer(PROBLEM, FIELD, {0.025: peaks[0.025], 0.0375: peaks[0.05]}, **FEW)
+    words = "no peak is from a specimen of the problem"
+    refuses(words, lambda: st.design_of_tests(PROBLEM, other, **given))
 
 
-def test_a_fit_is_taken_and_what_is_refused():
+def test_a_fit_is_taken_and_what_is_refused(monkeypatch):
+    for name in ("MAX_X_POINTS", "PREDICTED"):
+        monkeypatch.setattr(f"stiction.inference.specimens.{name}", 400)
     records = [
         factor * FIELD.sample(PROBLEM.interface, seed=k)[0]
         for k, factor in enumerate((1.0, 0.9, 1.1, 1.04, 0.97))
     ]
-    options = {"marginal": "gamma", "noise": False, "between": True, "bootstrap": 20}
+    options = {"marginal": "gamma", "noise": False, "between": "lognormal", "bootstrap": 20}
     fit = st.fit_field(records, PROBLEM.interface, progress=False, **options)
     designs = {"few": 5, "profiles": {"profiles": 6}}
     numbers = {"repetitions": 10, "samples": 100}

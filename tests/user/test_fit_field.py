@@ -47,11 +47,8 @@ def test_intervals_are_those_of_three_sets_of_repetitions():
     sets, _ = bootstrapped(plain._estimate, 20, 0, False)
 
     def end(of, share):
-        true = of.truth.parameters[LENGTH]
-        errors = [
-            np.log(one.parameters[LENGTH] / true) / one.parameters["efolding_length"] ** 0.5
-            for one in of.fits
-        ]
+        true, fits = of.truth.parameters[LENGTH], [fit.parameters for fit in of.fits]
+        errors = [np.log(p[LENGTH] / true) / p["efolding_length"] ** 0.5 for p in fits]
         off = np.quantile(errors, share, method="weibull") * truth["efolding_length"] ** 0.5
         return truth[LENGTH] * np.exp(-off)
 
@@ -85,9 +82,8 @@ def test_missing_values_are_left_out_and_counted():
 
 def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():
     """Of nearly normal coefficients bounds are hardly known; a lower one is no less than zero."""
-    field = st.RandomField(
-        st.Gamma(mean=0.31, cv=0.13), st.PowerLawSpectrum(6e-3), mean_mode=True
-    )
+    spectrum = st.PowerLawSpectrum(6e-3)
+    field = st.RandomField(st.Gamma(mean=0.31, cv=0.13), spectrum, mean_mode=True)
     grid = st.Interface(length=0.15, nodes=64)
     fit = st.fit_field(
         field.sample(grid, samples=4, seed=3), grid, marginal="beta", bootstrap=20,
@@ -97,9 +93,8 @@ def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():
     assert {one.quantity for one in (fit.field, *fit.repetitions)} == {"friction_coefficient"}
     members = [one.strength.marginal for one in fit.interfaces(40)]
     assert sum(one.low == 0.0 for one in members) > 5
-    means, deviations = np.array(
-        [(one.distribution.mean(), one.distribution.std()) for one in members]
-    ).T
+    laws = [marginal.distribution for marginal in members]
+    means, deviations = np.array([(law.mean(), law.std()) for law in laws]).T
     assert np.abs(means / fit.field.mean - 1.0).max() < 0.1  # the interval reaches to 0.03
     assert np.abs(deviations / fit.field.standard_deviation - 1.0).max() < 0.5
 
@@ -120,10 +115,8 @@ def test_a_picture_of_a_fit_is_of_all_records():
         points, swapped = (axes.lines[1].get_xydata() for axes in (panel, other))
         np.testing.assert_allclose(points, swapped, rtol=1e-9)  # sums in another order
     windows = fit._estimate.setting.windows
-    covariances = [
-        np.fft.irfft(window.periodogram(row), COUNT)
-        for window, row in zip(windows, fit._rows, strict=True)
-    ]
+    pairs = zip(windows, fit._rows, strict=True)
+    covariances = [np.fft.irfft(window.periodogram(row), COUNT) for window, row in pairs]
     mean = np.mean(covariances, axis=0)  # as many values in each
     measured = panels[0].lines[1].get_ydata()
     np.testing.assert_allclose(measured, (mean / mean[0])[: measured.size], rtol=1e-9)
@@ -133,10 +126,8 @@ def test_white_noise_is_refused_by_what_it_is():
     rng = np.random.default_rng(0)
     white = 1e6 + 1e5 * rng.standard_normal(COUNT)
     for given, place in ((labelled(white), None), (white, st.Interface(0.08, COUNT))):
-        refuses(
-            "are not correlated ... smaller spacing",
-            lambda g=given, p=place: fitted(g, interface=p),
-        )
+        words = "are not correlated ... smaller spacing"
+        refuses(words, lambda g=given, p=place: fitted(g, interface=p))
     assert fitted(labelled(VALUES + 5e4 * rng.standard_normal(COUNT))).field is not None
 
 

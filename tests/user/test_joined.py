@@ -107,7 +107,7 @@ def test_profiles_and_peaks_are_joined():
     onsets = st.monte_carlo(PROBLEM, ROUGH, seed=3, **LOCAL | {"samples": 9})
     peaks = onsets.critical_stress.values * (PEAKS / 1.05e6)
     both = st.infer(PROBLEM, fit, peaks, **LOCAL)
-    alone = st.infer(PROBLEM, ROUGH, peaks, **LOCAL)
+    alone = st.infer(PROBLEM, ROUGH, peaks, between="lognormal", **LOCAL)
     assert np.ptp(both.interval["mean"]) < np.ptp(alone.interval["mean"])
     assert np.ptp(both.interval["mean"]) < np.ptp(fit.interval["mean"])
     assert min(both.agreement.p_values.values()) > 0.05
@@ -120,7 +120,7 @@ def test_profiles_and_peaks_are_joined():
         200 * both.families["lognormal"], abs=28
     )
     with pytest.warns(st.AccuracyWarning, match="contradict the prediction, p = 0.0"):
-        apart = st.infer(PROBLEM, fit, 1.5 * peaks, **LOCAL)
+        apart = st.infer(PROBLEM, fit, 1.5 * peaks, between="lognormal", **LOCAL)
     assert any("contradict" in note for note in apart.notes)
     # A design repeats the doubts, and says what so few specimens cannot exclude.
     design = st.design_stress(
@@ -154,4 +154,4 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
         both = st.infer(PROBLEM, fit, PEAKS, **LOCAL)
     assert len(both.notes) == 1  # nine tests say more about the scatter than three
     with pytest.warns(st.AccuracyWarning, match="say little about the scatter"):
-        st.infer(PROBLEM, ROUGH, PEAKS[:3], **LOCAL)
+        st.infer(PROBLEM, ROUGH, PEAKS[:3], between="lognormal", **LOCAL)

@@ -23,13 +23,13 @@ SYSTEM = make_problem(NODES, weakening_rate=0.15e12)
 STRENGTH = 1e6 - 4e5 * np.exp(-(((X - 0.06) / 4e-3) ** 2)) + 1e6 * X
 
 
-def onset(tau_p, system=SYSTEM, **options):
-    return st.onset(system, tau_p, method=LOCAL, **options)
+def onset(tau_p):
+    return st.onset(SYSTEM, tau_p, method=LOCAL)
 
 
 def found(tau_p):
     result = onset(tau_p)
-    return float(result["critical_stress"][0]), float(result["critical_position"][0])
+    return result.critical_stress.item(), result.critical_position.item()
 
 
 def labelled(strength=STRENGTH, x=X, x_unit=None, **attributes):
@@ -91,10 +91,8 @@ def test_everything_beside_the_strength_is_read_alike():
     np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
     np.testing.assert_allclose(rows.initial_stress, 1e4)
     load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=0.1 * u.MPa)
-    weakening_rate = np.full(NODES, 0.2) * u.MPa / u.um
-    problem = make_problem(
-        NODES, weakening_rate=weakening_rate, residual_strength=tau_r, load=load
-    )
+    law = {"weakening_rate": np.full(NODES, 0.2) * u.MPa / u.um, "residual_strength": tau_r}
+    problem = make_problem(NODES, load=load, **law)
     assert problem.friction.weakening_rate == pytest.approx(np.full(NODES, 0.2e12))
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + X)
@@ -166,21 +164,18 @@ def test_a_pressure_without_places_is_the_mean_between_glued_plates():
     """Also where there are as many samples as nodes."""
     glued = dataclasses.replace(FREE, specimen=st.Blocks(height=0.05, pressing="glued"))
     strength = np.linspace(1.0e6, 1.1e6, 64 * 64).reshape(64, 64)
-    for pressure, mean in (
-        (np.full(64, 2e6), False),
-        (np.full((64, 1), 2e6), True),
-        (2e6, True),
+    of_mean = 2e6 * glued.blocks.pressure
+    for pressure, expected in (
+        (np.full(64, 2e6), np.full(64, 2e6)),
+        (np.full((64, 1), 2e6), of_mean),
+        (2e6, of_mean),
     ):
-        rows = glued.sample({"strength": strength, "normal_pressure": pressure})
-        expected = 2e6 * (glued.blocks.pressure if mean else np.ones(64))
+        given = {"strength": strength, "normal_pressure": pressure}
+        rows = glued.sample(given)
         np.testing.assert_allclose(rows.normal_pressure, np.tile(expected, (64, 1)))
+    given["initial_stress"] = np.zeros((3, 64))
     words = "initial_stress: must have one sample, or 64 as the strength, got 3"
-    refuses(
-        words,
-        lambda: glued.sample(
-            {"strength": strength, "normal_pressure": 2e6, "initial_stress": np.zeros((3, 64))}
-        ),
-    )
+    refuses(words, lambda: glued.sample(given))
 
 
 def test_a_scan_beyond_a_specimen_or_with_gaps_is_refused():

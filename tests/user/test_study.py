@@ -68,9 +68,8 @@ def test_a_function_cannot_be_written_down(tmp_path):
     words = "cannot be written down: spectrum.function is the Python function 'bell'"
     refuses(words, lambda: own.to_toml(tmp_path / "study.toml"))
     assert "bell" in own.run().attrs["study_incomplete"]
-    pair = in_python(
-        sweep=[{"random.strength.spectrum": [BASE.random.strength.spectrum, field.spectrum]}]
-    )
+    spectra = [BASE.random.strength.spectrum, field.spectrum]
+    pair = in_python(sweep=[{"random.strength.spectrum": spectra}])
     assert pair.run()["critical_stress"].shape == (2, 30)
     refuses("bell", pair.to_dict)
 
@@ -78,22 +77,18 @@ def test_a_function_cannot_be_written_down(tmp_path):
 # -- points of a sweep ---------------------------------------------------------------------------
 
 
-def test_a_key_of_toml_without_quotes_and_what_is_none(tmp_path):
+def test_a_key_of_toml_without_quotes():
     rupture = {"type": "rupture", "loading_rate": 1e8}
     points = swept({"method": {"start": ["rest", "equilibrium"]}}, method=rupture).experiments
     assert [point.method.start for point in points] == ["rest", "equilibrium"]
-    for text in (b"a = [", b"\xff"):
-        (tmp_path / "study.toml").write_bytes(text)
-        refuses("study.toml", lambda: st.Study.from_toml(tmp_path / "study.toml"))
 
 
 def test_whole_tables_are_values_too():
     marginals = [STUDY["random"]["strength"]["marginal"], LOGNORMAL]
     study = swept({"random.strength.marginal": marginals})
     np.testing.assert_array_equal(study.run()["marginal"], ["beta", "lognorm"])
-    assert study.experiments[1].random.members[0].strength.mean == pytest.approx(
-        scipy.stats.lognorm(0.2, scale=1e6).mean()
-    )
+    mean = study.experiments[1].random.members[0].strength.mean
+    assert mean == pytest.approx(scipy.stats.lognorm(0.2, scale=1e6).mean())
     scales = {"random.strength.marginal.scale": [1e6, 2e6]}
     stress = swept(scales, random__strength__marginal=LOGNORMAL).run()["critical_stress"].values
     # The onset is linear in the strength: twice the scale, twice the stress, to round-off.
@@ -111,12 +106,10 @@ def test_a_correlation_coefficient_is_swept():
     rho = result["random_correlation_strength_residual_strength"]
     assert rho.attrs == {"units": "1", "long_name": key}
     np.testing.assert_array_equal(result.strength[0], result.strength[2])
-    found = [
-        np.corrcoef(result.strength[i].values.flat, result.residual_strength[i].values.flat)
-        for i in (0, 2)
-    ]
+    flat = zip(result.strength.values, result.residual_strength.values, strict=True)
+    signs = [np.corrcoef(one.flat, other.flat)[0, 1].round() for one, other in flat]
     # The marginals bend the fields: |r| of +-1 becomes 0.9 or more (Grigoriu 1995).
-    assert [round(one[0, 1]) for one in found] == [-1, 1]
+    assert signs[::2] == [-1, 1]
 
 
 # -- a field that was measured in part -----------------------------------------------------------
@@ -177,11 +170,8 @@ def test_a_measured_profile_in_a_file_is_run_and_reported(tmp_path, monkeypatch,
     exact = st.onset(problem, given, method=st.LocalCriterion())
     stored = st.open_run("run")
     assert stored.dataset().critical_stress.values == exact.critical_stress.values
-    assert (
-        st.Study.from_result(stored.dataset())
-        == stored.study
-        == st.Study.from_toml("study.toml")
-    )
+    assert st.Study.from_result(stored.dataset()) == stored.study
+    assert stored.study == st.Study.from_toml("study.toml")
     methods = [{"type": "local_criterion"}, {"type": "equilibrium"}]
     both = st.Study.from_dict(stored.study.to_dict() | {"sweep": [{"method": methods}]}).run()
     assert both.sizes == {"onset_method": 2, "sample": 1}
