@@ -14,8 +14,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis
 import pytest
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
 
 from stiction.cli import commands
+
+try:
+    import fcntl
+except ImportError:  # Windows, where each worker compiles by itself
+    fcntl = None
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,6 +42,30 @@ os.environ.setdefault(
 os.environ["STICTION_CACHE_DIR"] = str(
     Path(tempfile.gettempdir()) / f"stiction-tests-{_digest_of_sources()}"
 )
+
+
+_compile, _awaited = Dispatcher.compile, set()
+
+
+def _compile_once(kernel, signature):
+    """Compile a kernel, unless another worker is compiling it: then wait, and load it."""
+    name = f"{kernel.py_func.__module__} {kernel.py_func.__qualname__} {signature}"
+    with global_compiler_lock:  # before any lock on a file, so that no thread waits for another
+        if name in _awaited:
+            return _compile(kernel, signature)
+        folder = Path(os.environ["NUMBA_CACHE_DIR"]) / "awaited"
+        folder.mkdir(parents=True, exist_ok=True)
+        _awaited.add(name)
+        try:
+            with open(folder / hashlib.sha256(name.encode()).hexdigest(), "w") as file:
+                fcntl.flock(file, fcntl.LOCK_EX)
+                return _compile(kernel, signature)
+        finally:
+            _awaited.remove(name)
+
+
+if fcntl is not None and "PYTEST_XDIST_WORKER" in os.environ:
+    Dispatcher.compile = _compile_once
 
 
 # The same examples on every machine; weekly others are drawn (--hypothesis-profile=default).

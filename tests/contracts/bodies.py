@@ -65,6 +65,8 @@ BODIES = {
     "blocks with an extent": body(64, 0.073, PLATEN, extent=(0.009, 0.061)),
     "slider": rig(40, 0.073),
 }
+WITH_ENDS = ("line with ends", "plane with ends", "blocks with an extent", "slider")
+"""One of each kind: for laws that do not ask whether an interface has ends."""
 METHODS_OF = {
     "local_criterion": lambda problem: st.LocalCriterion(),
     "equilibrium": lambda problem: st.Equilibrium(),

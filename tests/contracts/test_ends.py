@@ -54,7 +54,6 @@ BODIES = {
     "line": (line(), st.Rupture(loading_rate=1e8, events=4)),
     "blocks": (blocks(None, PUSHER), st.Rupture(events=4)),
     "blocks, partly bonded": (blocks((0.03, 0.065)), st.Rupture(events=4)),
-    "pushed blocks, partly bonded": (blocks((0.02, 0.08), PUSHER), st.Rupture(events=4)),
 }
 
 
@@ -281,7 +280,7 @@ def test_the_steepest_weakening_rate_is_at_any_slip_wherever_it_is_used():
     gentle = st.PiecewiseWeakening(
         slip=[0.5, 1.0], strength=[0.9, 0.0], weakening_rate=2e10, residual_strength=2e5
     )
-    problem = st.Problem(SOLID, st.Interface(0.2, 256), gentle)
+    problem = st.Problem(SOLID, st.Interface(0.2, 256), gentle, mode="III")
     sample = problem.sample(rough(256)[None])
     steepest = 2e10 * gentle.steepening
     assert gentle.steepening > 5.0

@@ -12,13 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, field_of, profiles_of, world
+from contracts.bodies import BODIES, WITH_ENDS, field_of, profiles_of, world
 
 import stiction as st
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET = {"progress": False}
-SHAKEN = [name for name in BODIES if name != "slider"]
 
 
 @cache
@@ -32,7 +31,7 @@ def rupture(name: str) -> Any:
     return run, place
 
 
-@pytest.mark.parametrize("name", [name for name in SHAKEN if "blocks" not in name])
+@pytest.mark.parametrize("name", ["line", "line with ends", "plane with ends"])
 def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
     run, place = rupture(name)
     options = {"origin": place, "normal_stress": -2e6, "benchmark": "a contract"}
@@ -64,7 +63,7 @@ def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
         st.external.write_scec(run.drop_vars("station_slip"), tmp_path, **options)
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", WITH_ENDS)
 def test_a_run_folder_and_its_exports_hold_the_study(name, tmp_path):
     """A run in two parts, its status, arrays and tables."""
     study = world(name).study

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, attempt, field_of, profiles_of
+from contracts.bodies import BODIES, WITH_ENDS, attempt, field_of, profiles_of
 
 import stiction as st
 from stiction import extensions
@@ -109,14 +109,14 @@ WRONG: dict[str, dict[str, Any]] = {  # type: a wrong value of each option
         "events": 1.5,
     },
 }  # fmt: skip
-SILENT = {"start": ["line with ends", "plane", "plane with ends"]}  # as its docstring says
+SILENT = {"start": ["line with ends", "plane with ends"]}  # as its docstring says
 CASES = [(kind, name) for kind in EXAMPLES for name in BODIES if (kind, name) not in UNFIT]
 every = pytest.mark.parametrize(("kind", "name"), CASES)
 every_option = pytest.mark.parametrize(
     ("kind", "option"), [(kind, option) for kind in OPTIONS for option in OPTIONS[kind]]
 )
 SAMPLES = {
-    name: field_of(problem).sample(problem.interface, samples=4, seed=5)
+    name: field_of(problem).sample(problem.interface, samples=3, seed=5)
     for name, problem in BODIES.items()
 }
 
@@ -179,7 +179,7 @@ def test_it_has_what_it_promises(kind, name):
 
 @every
 def test_alone_equals_in_a_batch_in_any_order(kind, name):
-    method, order = example(kind, BODIES[name]), [2, 0, 3, 1]
+    method, order = example(kind, BODIES[name]), [2, 0, 1]
     batch = plain(kind, name)
     turned = onset(name, method, SAMPLES[name][order])
     assert same(batch.isel(sample=order).drop_vars("sample"), turned.drop_vars("sample"))
@@ -220,9 +220,10 @@ def test_a_wrong_option_is_refused_by_its_name(kind, option):
 
 @every_option
 def test_every_option_counts_or_is_refused(kind, option):
-    """On every body: another value of it changes the result, or the refusal names it."""
+    """Another value of it changes the result, or the refusal names it."""
     counts = []
-    for name, problem in BODIES.items():
+    for name in WITH_ENDS:
+        problem = BODIES[name]
         if name in SILENT.get(option, ()) or (kind, name) in UNFIT:
             continue
         method, refusal = attempt(lambda problem=problem: supported(kind, option, problem))
@@ -271,12 +272,10 @@ def test_its_onsets_scale_with_strength_as_it_says(kind, name):
 
 
 @every
-@pytest.mark.parametrize("spread", [0.0, 3e5])
-def test_strength_bounds_its_onsets_as_it_says(kind, name, spread):
-    """Also where the load is uneven, and where a node of each sample hardly holds."""
-    problem = BODIES[name]
-    strength = np.array(SAMPLES[name])
-    strength[(slice(None), *np.array(strength.shape[1:]) // 2)] -= spread
+def test_strength_bounds_its_onsets_as_it_says(kind, name):
+    """Also where the load is uneven, and where a node of a sample hardly holds."""
+    problem, strength = BODIES[name], np.array(SAMPLES[name])
+    strength[(slice(1, None), *np.array(strength.shape[1:]) // 2)] -= 3e5
     method = example(kind, problem)
     if isinstance(problem.specimen, st.Slider):
         assert method.bounded_by_strength(problem, "critical_stress") == (False, False)
@@ -287,17 +286,12 @@ def test_strength_bounds_its_onsets_as_it_says(kind, name, spread):
     profile = np.broadcast_to(problem.load_profile, problem.interface.shape)
     first = ((rows.strength - rows.initial_stress) / profile)[:, free].min(axis=1)
     initial, mean = rows.initial_stress[:, free].mean(axis=1), profile[free].mean()
+    low, high = initial + mean * first, rows.strength[:, free].mean(axis=1)
     for event in ("critical_stress", "first_instability"):
         below, above = optional_member(method, "bounded_by_strength")(problem, event)
         stress = found[event].values
-        stress = stress[np.isfinite(stress)]
-        if below:
-            low = (initial + mean * first)[np.isfinite(found[event].values)]
-            assert (stress >= low * (1.0 - 1e-9)).all(), event
-        if above:
-            assert (stress <= rows.strength[:, free].mean(axis=1).max() * (1 + 1e-9)).all(), (
-                event
-            )
+        assert not below or not (stress < low * (1.0 - 1e-9)).any(), event
+        assert not above or not (stress > high * (1.0 + 1e-9)).any(), event
 
 
 def partly_firm(kind: str, name: str, kept: float) -> Any:
@@ -337,7 +331,7 @@ def events_by(kind: str, name: str) -> dict[str, Any]:
     method, inertia = example(kind, problem, events=2), kind == "rupture"
     first = profiles_of(problem, strength[0])
     drawn = st.monte_carlo(
-        problem, field_of(problem), method=method, samples=4, seed=5, **QUICK
+        problem, field_of(problem), method=method, samples=3, seed=5, **QUICK
     )
     calls = {"onset": onset(name, method), "monte_carlo": drawn}
     if inertia:
