@@ -46,13 +46,10 @@ def by_linear_programme(
     n, unit = len(stiffness), float(np.max(weakening_rate))
     matrix = (stiffness - np.diag(np.broadcast_to(weakening_rate, n))) / unit
     found = linprog(
-        np.r_[np.zeros(n), -1.0],
-        A_ub=np.c_[-matrix, np.broadcast_to(profile, n)],
-        b_ub=excess / 1e6,
-        bounds=[(0, None)] * n + [(None, None)],
-        method="highs-ds",
+        np.r_[np.zeros(n), -1.0], A_ub=np.c_[-matrix, np.broadcast_to(profile, n)],
+        b_ub=excess / 1e6, bounds=[(0, None)] * n + [(None, None)], method="highs-ds",
         options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
-    )
+    )  # fmt: skip
     assert found.status == 0
     return found.x[-1] * 1e6, found.x[:-1] * 1e6 / unit, -found.ineqlin.marginals
 

@@ -10,11 +10,9 @@ import stiction as st
 
 SOLID = st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress")
 SLIDER = st.Slider(
-    height=0.075,
-    thickness=0.006,
-    base=st.Base(height=0.03, behind=0.06, ahead=0.10),
+    height=0.075, thickness=0.006, base=st.Base(height=0.03, behind=0.06, ahead=0.10),
     drive=st.Pusher(height=0.02, width=0.01),
-)
+)  # fmt: skip
 
 
 def rig_problem(nodes: int = 64, *, problem: Any = None, **of_slider: Any) -> st.Problem:

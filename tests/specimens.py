@@ -28,10 +28,8 @@ def crooked(
         interface=st.Interface(length=0.083, nodes=nodes),
         friction=st.LinearWeakening(weakening_rate=weakening_rate, residual_strength=residual),
         specimen=st.Blocks(height=height, thickness=0.0071, drive=drive or st.Platen()),
-        load=more.pop("load", load),
-        mode=mode,
-        **more,
-    )
+        load=more.pop("load", load), mode=mode, **more,
+    )  # fmt: skip
 
 
 def rough(problem: st.Problem, seed: int, samples: int = 1, length: float = 4e-3) -> np.ndarray:

@@ -297,13 +297,9 @@ def test_a_deviation_is_in_the_band_if_its_p_value_is_above_ten_percent():
     """For campaigns of four tests from the prediction, and shifted more and more from it."""
     rng, seen = np.random.default_rng(0), set()
     prediction = st.monte_carlo(
-        make_problem(256),
-        st.RandomField(TRUTHS["beta"], ROUGH),
-        method=LOCAL,
-        samples=400,
-        pilot=False,
-        **QUIET,
-    )
+        make_problem(256), st.RandomField(TRUTHS["beta"], ROUGH), method=LOCAL, samples=400,
+        pilot=False, **QUIET,
+    )  # fmt: skip
     known = prediction.critical_stress.values
     for shift in np.linspace(0.0, 6e4, 16):
         peaks = rng.choice(known, 4) + shift

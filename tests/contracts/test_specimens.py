@@ -155,10 +155,8 @@ def test_twice_the_pressure_and_slip_are_twice_the_stress(name, kind):
         if (value := getattr(w.problem.load, key)) is not None:
             twice[f"problem.load.{key}"] = 2.0 * np.asarray(value)[()]
     problem = with_values({"problem": w.problem}, twice)["problem"]
-    before, after = (
-        plain(name, kind),
-        st.onset(problem, w.profiles(), method=w.method, progress=False),
-    )
+    before = plain(name, kind)
+    after = st.onset(problem, w.profiles(), method=w.method, progress=False)
     factors = {"Pa": 2.0, "N": 2.0, "1": 1.0}
     names = [key for key in before if before[key].attrs.get("units") in factors]
     names = [key for key in names if "magnitude" not in key]
@@ -192,10 +190,8 @@ def test_an_initial_stress_in_proportion_to_the_load_is_a_load(name, kind):
     initial = w.problem.load.initial_stress + 2e4 * w.problem.load_profile
     load = dataclasses.replace(w.problem.load, initial_stress=initial)
     problem = dataclasses.replace(w.problem, load=load)
-    before, after = (
-        plain(name, kind),
-        st.onset(problem, w.profiles(), method=w.method, progress=False),
-    )
+    before = plain(name, kind)
+    after = st.onset(problem, w.profiles(), method=w.method, progress=False)
     for key in ("critical_stress", "first_instability"):
         np.testing.assert_allclose(after[key], before[key], rtol=1e-6, err_msg=key)
     np.testing.assert_allclose(after.critical_load + 2e4, before.critical_load, rtol=1e-6)
@@ -205,10 +201,8 @@ def test_an_initial_stress_in_proportion_to_the_load_is_a_load(name, kind):
 def test_the_sensitivity_of_a_node_is_the_derivative_by_its_strength(name):
     """In pascals, for the nodes on which the onset depends most."""
     law = st.LinearWeakening(weakening_rate=0.09e12, residual_ratio=0.3)
-    problem, mu = (
-        dataclasses.replace(BODIES[name], friction=law),
-        world(name, "equilibrium").strength,
-    )
+    problem = dataclasses.replace(BODIES[name], friction=law)
+    mu = world(name, "equilibrium").strength
 
     def onset(strength: Any, **options: Any) -> Any:
         method = st.Equilibrium(**options)

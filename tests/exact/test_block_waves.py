@@ -22,13 +22,11 @@ FREE = st.Pusher(height=0.006, width=0.004)
 SLOW = 0.05e12
 """A weakening rate that few nodes resolve in mode III, too."""
 DRIVES = [
-    st.Platen(),
-    st.Platen(stiffness=2e7, mass=0.1),
-    st.Platen(stiffness=float("inf")),
+    st.Platen(), st.Platen(stiffness=2e7, mass=0.1), st.Platen(stiffness=float("inf")),
     st.Pusher(height=0.012, width=0.005, side="right"),
     st.Pusher(height=0.006, width=0.004, stiffness=3e7, mass=0.05),
     st.Pusher(height=0.016, width=0.004, side="both", stiffness=float("inf")),
-]
+]  # fmt: skip
 
 
 def of(problem, strength):
@@ -178,10 +176,8 @@ def test_energy_is_kept(drive, mode, attenuation):
     event = begin(sample, mesh, problem.blocks.stiffness, state, 0.5)
     waves, dx = event.waves, mesh.spacing
     begun, mass = waves.slip.copy(), mesh.mass[:, None]
-    matrix, spring = (
-        whole_matrix(mesh, 48),
-        mesh.stiffness if np.isfinite(mesh.stiffness) else 0.0,
-    )
+    matrix = whole_matrix(mesh, 48)
+    spring = mesh.stiffness if np.isfinite(mesh.stiffness) else 0.0
 
     def velocities():
         return np.hstack([waves.u_rate, waves.v_rate]).astype(float)

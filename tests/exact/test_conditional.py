@@ -159,10 +159,8 @@ def test_the_regression_has_the_moments_of_skewed_posteriors(case):
 def test_draws_fit_contradictory_values_as_well_as_their_mean_does():
     """A smooth field and 60 unrelated values of little noise: the updates do not settle."""
     field = st.RandomField(BETA, st.PowerLawSpectrum(5e-3), mean_mode=True)
-    places, values = (
-        np.linspace(1e-3, 19e-3, 60),
-        np.random.default_rng(3).uniform(0.7, 1.6, 60),
-    )
+    places = np.linspace(1e-3, 19e-3, 60)
+    values = np.random.default_rng(3).uniform(0.7, 1.6, 60)
     known = conditioning(given_on(places, 1e6 * values, 2e3, field), LINE)
     phi = field.modes(LINE).basis(places[None])
     draws = known.draws(np.random.default_rng(0).standard_normal((200, phi.shape[1])))

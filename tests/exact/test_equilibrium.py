@@ -116,11 +116,8 @@ def test_a_length_that_nothing_stops_has_the_least_drop_and_the_largest_energy()
     law = st.PiecewiseWeakening(slip=[0.6, 1.0], strength=[0.9, 0.0], weakening_rate=1e10)
     rng = np.random.default_rng(0)
     peak, residual, profile, weakening_rate = rng.uniform(1.0, 2.0, (4, 9)) * [
-        [2e6],
-        [1e5],
-        [1.0],
-        [1e10],
-    ]
+        [2e6], [1e5], [1.0], [1e10],
+    ]  # fmt: skip
     sample = make_sample(peak, residual, profile, weakening_rate, pieces_of(law))
     runs = Runs(COLUMN, COLUMN, 9, 2e-3, 1.5e9)
     # Half-length a: pi a D^2/(2 G*) is the energy; d_c is 0.1/0.6 of (tau_p - tau_r)/W.

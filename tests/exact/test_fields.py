@@ -118,10 +118,8 @@ def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, ends, m
     x = np.array(np.meshgrid(*interface.coordinates.values(), indexing="ij"))
     shares = x / np.reshape(lengths, (-1, *[1] * len(numbers)))
     phase = 2.0 * np.pi * np.tensordot(numbers.T, shares, 1)
-    a, b = (
-        draws[:, mean_mode::2] * modes.sigma[1:],
-        draws[:, mean_mode + 1 :: 2] * modes.sigma[1:],
-    )
+    a = draws[:, mean_mode::2] * modes.sigma[1:]
+    b = draws[:, mean_mode + 1 :: 2] * modes.sigma[1:]
     direct = np.tensordot(a, np.cos(phase), 1) + np.tensordot(b, np.sin(phase), 1)
     mean = modes.sigma[0] * draws[:, 0] * mean_mode
     # Round-off of a sum of hundreds of terms.

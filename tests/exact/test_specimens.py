@@ -93,14 +93,11 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     """No patch is unstable; the largest stress is that under dead load."""
     soft, stiff = (
         crooked(
-            height=0.004,
-            weakening_rate=0.02e12,
-            drive=st.Platen(stiffness=k),
-            mode="III",
+            height=0.004, weakening_rate=0.02e12, drive=st.Platen(stiffness=k), mode="III",
             load=st.Load(),
         )
         for k in (0.0, INF)
-    )
+    )  # fmt: skip
     strength = rough(soft, 5, 1, 0.02)
     free = exact_onset(soft, strength)
     with pytest.warns(st.AccuracyWarning, match="slides stably") as caught:
@@ -250,11 +247,9 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     """A pusher near the interface: of three samples, those closer than a fiftieth of the fall."""
     monkeypatch.setattr(DenseSearch, "widest_gap", -1.0)
     problem = crooked(
-        nodes=128,
-        residual=0.61e6,
-        weakening_rate=0.25e12,
+        nodes=128, residual=0.61e6, weakening_rate=0.25e12,
         drive=st.Pusher(height=0.004, width=0.003),
-    )
+    )  # fmt: skip
     strength, found = rough(problem, 3, 4), []
     texts = warning_texts(lambda: found.append(exact_onset(problem, strength)))
     above = (found[0].critical_stress.values - 0.61e6) / np.median(strength - 0.61e6, axis=1)
@@ -347,10 +342,8 @@ def test_a_swept_rigid_machine_is_stored(tmp_path):
     study = st.Study(
         problem=problem,
         random=st.RandomField(st.Lognormal(mean=1.0e6, cv=0.2), st.PowerLawSpectrum(9e-3)),
-        method=EXACT,
-        samples=2,
-        sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
-    )
+        method=EXACT, samples=2, sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
+    )  # fmt: skip
     assert study.to_dict()["problem"]["specimen"]["quality_factor"] == "inf"
     found = study.run(out=tmp_path / "run", pilot=False)
     again = st.open_run(tmp_path / "run")

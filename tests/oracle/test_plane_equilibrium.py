@@ -138,10 +138,8 @@ def test_arrest_equals_relaxation_node_by_node(wide):
 def first_loss_of_stability(problem, strength, load, slip):
     """Follow slip node by node from a state; the load at which K - W is no longer definite."""
     stiff = dense(symbol_of(problem), problem.interface.shape)
-    weakening_rate, residual = (
-        problem.friction.weakening_rate,
-        problem.friction.residual_strength,
-    )
+    weakening_rate = problem.friction.weakening_rate
+    residual = problem.friction.residual_strength
     critical = (strength - residual) / weakening_rate
     fallen, inside = slip >= critical * (1.0 - 1e-9), slip > 0.0
     while True:

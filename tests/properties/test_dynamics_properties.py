@@ -145,11 +145,9 @@ def test_an_arrested_rupture_radiates_no_more():
 
 LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
 DRIVES = [
-    LOW,
-    st.Pusher(height=0.012, width=0.005),
-    st.Platen(stiffness=2e7, mass=0.1),
+    LOW, st.Pusher(height=0.012, width=0.005), st.Platen(stiffness=2e7, mass=0.1),
     st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf")),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("drive", DRIVES)
