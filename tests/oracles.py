@@ -66,13 +66,9 @@ def largest_load(
 
 
 def by_relaxation(
-    symbol: Any,
-    load: Any,
-    strength: Callable[[Any], Any],
-    end: Any,
-    slip: Any = None,
+    symbol: Any, load: Any, strength: Callable[[Any], Any], end: Any, slip: Any = None,
     rest: float = 5e-7,
-) -> Any:
+) -> Any:  # fmt: skip
     """Slip of the least equilibrium under stresses `load`, or None where all slides beyond `end`.
 
     Strictly local and monotone: each node slips a little until no stress is `rest` Pa above the

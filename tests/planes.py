@@ -11,15 +11,9 @@ class Lattice(HalfSpaces):
     """A plane with the wavenumbers (2/h) sin(k h/2) of a lattice, up to nu = 0.45 a Z-matrix."""
 
     def symbol(self, shape):
-        first, second = (
-            2.0 * n / length * np.sin(np.pi * mode / n)
-            for n, length, mode in zip(
-                shape,
-                self.lengths,
-                (np.arange(shape[0])[:, None], np.arange(shape[1] // 2 + 1)[None, :]),
-                strict=True,
-            )
-        )
+        (n, m), (length, width) = shape, self.lengths
+        first = 2.0 * n / length * np.sin(np.pi * np.arange(n) / n)[:, None]
+        second = 2.0 * m / width * np.sin(np.pi * np.arange(m // 2 + 1) / m)
         k = np.hypot(first, second)
         k[0, 0] = 1.0
         return 0.5 * (self.moduli[0] * first**2 + self.moduli[1] * second**2) / k

@@ -26,10 +26,5 @@ def warning_texts(call: Callable[[], Any]) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         call()
-    return sorted(
-        {
-            str(warning.message)
-            for warning in caught
-            if warning.category.__module__.startswith("stiction")
-        }
-    )
+    ours = [given for given in caught if given.category.__module__.startswith("stiction")]
+    return sorted({str(given.message) for given in ours})

@@ -77,15 +77,12 @@ BREAKING_PLANE = make_problem(
 )
 
 _ANGLE = turns(128)
-CROOKED = make_problem(
-    128,
-    0.05,
-    solid=STRESS,
-    weakening_rate=0.2e12 + 2e10 * np.sin(_ANGLE),
-    residual_strength=3e5 + 5e4 * np.cos(_ANGLE),
-    load=st.Load(
-        profile=1.2 + 0.2 * np.cos(_ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * _ANGLE)
-    ),
+_UNEVEN = st.Load(
+    profile=1.2 + 0.2 * np.cos(_ANGLE), initial_stress=5e4 + 3e4 * np.sin(2 * _ANGLE)
 )
+CROOKED = make_problem(
+    128, 0.05, solid=STRESS, weakening_rate=0.2e12 + 2e10 * np.sin(_ANGLE),
+    residual_strength=3e5 + 5e4 * np.cos(_ANGLE), load=_UNEVEN,
+)  # fmt: skip
 CROOKED_STRENGTH = 1.3e6 - 2e5 * np.cos(_ANGLE) + 5e4 * np.sin(5 * _ANGLE)
 """A line on which everything varies, under a load of a mean other than one."""

@@ -20,16 +20,9 @@ LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 
 
 def make_problem(
-    nodes: Any = 256,
-    length: Any = 0.1,
-    *,
-    solid: st.Solid = SOLID,
-    friction: Any = None,
-    load: st.Load | None = None,
-    mode: Any = "II",
-    width: float | None = None,
-    **weakening: Any,
-) -> st.Problem:
+    nodes: Any = 256, length: Any = 0.1, *, solid: st.Solid = SOLID, friction: Any = None,
+    load: st.Load | None = None, mode: Any = "II", width: float | None = None, **weakening: Any,
+) -> st.Problem:  # fmt: skip
     """The paper's system in plane strain but for what is given; pairs make it a plane."""
     if not {"weakening_rate", "critical_slip"} & set(weakening):
         weakening["weakening_rate"] = RATE  # None leaves it to profiles
@@ -83,18 +76,13 @@ def within(problem: st.Problem, extent: Any) -> st.Problem:
 
 
 def beta_strength(
-    correlation_length: float,
-    low: float = 0.66e6,
-    high: float = 1.66e6,
-    power_kept: float | None = None,
-    **options: Any,
-) -> st.RandomField:
+    correlation_length: float, low: float = 0.66e6, high: float = 1.66e6,
+    power_kept: float | None = None, **options: Any,
+) -> st.RandomField:  # fmt: skip
     """The paper's marginal, on other bounds perhaps, with its spectrum of another length."""
-    return st.RandomField(
-        st.Beta(alpha=1.5, beta=3.0, low=low, high=high),
-        st.PowerLawSpectrum(correlation_length, power_kept=power_kept),
-        **options,
-    )
+    marginal = st.Beta(alpha=1.5, beta=3.0, low=low, high=high)
+    spectrum = st.PowerLawSpectrum(correlation_length, power_kept=power_kept)
+    return st.RandomField(marginal, spectrum, **options)
 
 
 def smooth_noise(correlation: float, rng: np.random.Generator, shape: Any) -> Any:

@@ -9,17 +9,10 @@ import stiction as st
 
 
 def crooked(
-    *,
-    nodes: int = 96,
-    drive: Any = None,
-    height: float = 0.031,
-    mode: str = "II",
-    nu: float = 0.33,
-    plane: str = "stress",
-    weakening_rate: float = 0.19e12,
-    residual: float = 0.52e6,
-    **more: Any,
-) -> st.Problem:
+    *, nodes: int = 96, drive: Any = None, height: float = 0.031, mode: str = "II",
+    nu: float = 0.33, plane: str = "stress", weakening_rate: float = 0.19e12,
+    residual: float = 0.52e6, **more: Any,
+) -> st.Problem:  # fmt: skip
     """A specimen with nothing symmetric about it."""
     x = (np.arange(nodes) + 0.5) / nodes
     load = st.Load(initial_stress=-2e4 + 9e4 * x * (1.0 - 0.7 * x), normal_pressure=2.1e6)

@@ -62,19 +62,15 @@ def results(name: str) -> dict[str, Any]:
     """What every call says about one sample."""
     problem, method = BODIES[name]
     strength = rough(problem.interface.size)
+    asked = {"method": method, "progress": False}
+    how = {"method": method} if problem.specimen else {}
     found = {
-        "simulate_rupture": st.simulate_rupture(
-            problem, strength, method=method, progress=False
-        ),
-        "onset": st.onset(problem, strength, method=method, progress=False).isel(sample=0),
-        "equilibrium_path": st.equilibrium_path(
-            problem, strength, [2e5, 4e5], method=method if problem.specimen else None
-        ),
+        "simulate_rupture": st.simulate_rupture(problem, strength, **asked),
+        "onset": st.onset(problem, strength, **asked).isel(sample=0),
+        "equilibrium_path": st.equilibrium_path(problem, strength, [2e5, 4e5], **how),
     }
     if problem.specimen is not None:
-        found["first event"] = st.simulate_rupture(
-            problem, strength, method=method, event=0, progress=False
-        )
+        found["first event"] = st.simulate_rupture(problem, strength, event=0, **asked)
     return found
 
 
@@ -137,28 +133,22 @@ def test_nothing_beyond_the_ends_has_an_effect(method):
                 other[key], plain[key], rtol=1e-9, err_msg=f"{change} {key}"
             )
     # Images act on each other by the square of extent over period.
-    stress = {
-        times: st.onset(line(0.1 * times, 256 * times), np.tile(strength, times), **ask)
-        for times in (8, 16)
-    }
+    eight, sixteen = (
+        st.onset(line(0.1 * n, 256 * n), np.tile(strength, n), **ask) for n in (8, 16)
+    )
     for key, values in plain.items():
         if values.attrs["units"] in {"Pa", "N", "N m", "J/m"}:
-            scale = np.nanmax(np.abs(stress[8][key]), initial=1e-300)
+            scale = np.nanmax(np.abs(eight[key]), initial=1e-300)
             near = 0.02 * scale + 1e-6  # (1/8)² of the stress, and round-off of gaps, Pa
-            np.testing.assert_allclose(stress[16][key], stress[8][key], atol=near, err_msg=key)
+            np.testing.assert_allclose(sixteen[key], eight[key], atol=near, err_msg=key)
 
 
-@pytest.mark.parametrize(
-    ("extent", "mirrored"),
-    [
-        ((0.0, 0.05), (0.05, 0.1)),
-        (((0.0, 0.05), (0.02, 0.06)), ((0.05, 0.1), (0.02, 0.06))),
-        (
-            st.Ellipse(centre=(0.03, 0.03), semi_axes=(0.03, 0.02)),
-            st.Ellipse(centre=(0.07, 0.03), semi_axes=(0.03, 0.02)),
-        ),
-    ],
-)
+LEFT, RIGHT = (st.Ellipse(centre=(x, 0.03), semi_axes=(0.03, 0.02)) for x in (0.03, 0.07))
+MIRRORED = [((0.0, 0.05), (0.05, 0.1)), (LEFT, RIGHT),
+            (((0.0, 0.05), (0.02, 0.06)), ((0.05, 0.1), (0.02, 0.06)))]  # fmt: skip
+
+
+@pytest.mark.parametrize(("extent", "mirrored"), MIRRORED)
 def test_an_extent_and_its_mirror_image_have_mirrored_nodes(extent, mirrored):
     """x -> -x maps node i to node n - i, so the end of a period is its first node."""
     flat = np.ndim(extent) == 1
@@ -198,18 +188,14 @@ def event_of(load: Any = HELD, **options: Any) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"courant": 0.45},
-        {"courant": 0.3},
-        {"end_time": 30.0},
-        {"end_time": 120.0},
-        {"stop": "time"},
-        {"load": CREEPING, "stop": "time"},
-        {"load": CREEPING, "stop": "time", "end_time": 150.0},
-    ],
-)
+CHANGES = [
+    {"courant": 0.45}, {"courant": 0.3}, {"end_time": 30.0}, {"end_time": 120.0},
+    {"stop": "time"}, {"load": CREEPING, "stop": "time"},
+    {"load": CREEPING, "stop": "time", "end_time": 150.0},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("change", CHANGES)
 def test_an_event_ends_wherever_a_run_and_its_steps_end(change):
     """No number of an event moves by 1 %, whatever happens after it."""
     expected, found = event_of(), event_of(**change)

@@ -24,12 +24,10 @@ TRUTHS = {
     "weibull": st.Weibull(mean=1e6, cv=0.2),
     "normal": st.TruncatedNormal(mean=1e6, cv=0.2, low=5e5, high=1.5e6),
 }
-LIST = [
-    dataclasses.replace(
-        RANDOM, strength=dataclasses.replace(FIELD, marginal=st.Gamma(mean=mean, cv=0.15))
-    )
-    for mean in (0.19, 0.2, 0.21)
+FIELDS = [
+    dataclasses.replace(FIELD, marginal=st.Gamma(mean=m, cv=0.15)) for m in (0.19, 0.2, 0.21)
 ]
+LIST = [dataclasses.replace(RANDOM, strength=field) for field in FIELDS]
 
 
 @cache
@@ -63,24 +61,18 @@ def test_ends_of_an_interval_are_admissible_with_ends_of_another():
     for seed in range(2):
         fit, values = fitted("beta", True, seed)
         family = fit._estimate.setting.marginal
-        limits = [
-            family.quiet(values, noise).min()
-            for noise in (fit.parameters["noise"], fit.interval["noise"][1])
-        ]
+        noises = fit.parameters["noise"], fit.interval["noise"][1]
+        limits = [family.quiet(values, noise).min() for noise in noises]
         end = fit.interval["marginal.low"][1]
         assert end <= limits[1] * (1.0 + 1e-12)
         inside.append(end > limits[0])
     assert any(inside)
 
 
-@pytest.mark.parametrize(
-    ("alpha", "noise", "count"),
-    [
-        (1.1, False, 4),
-        pytest.param(1.1, False, 40, marks=pytest.mark.slow),
-        pytest.param(1.5, 8e3, 40, marks=pytest.mark.slow),
-    ],
-)
+MANY = [pytest.param(*row, 40, marks=pytest.mark.slow) for row in ((1.1, False), (1.5, 8e3))]
+
+
+@pytest.mark.parametrize(("alpha", "noise", "count"), [(1.1, False, 4), *MANY])
 def test_shapes_near_their_limit_are_covered(alpha, noise, count):
     """A shape at a free bound is at least 1; the interval respects this, and is no shorter."""
     hits = {"marginal.alpha": 0, "marginal.beta": 0}
@@ -166,19 +158,15 @@ def test_peaks_in_another_unit_are_refused(name, factor):
 
 def test_the_field_of_a_fit_is_not_taken_for_the_fit():
     """Where the fit says more than its field, a call with the field says so."""
-    records = [
-        FIELD.sample(PROBLEM.interface, seed=seed)[0] * factor
-        for seed, factor in enumerate((1.0, 0.9, 1.1))
-    ]
+    records = FIELD.sample(PROBLEM.interface, samples=3) * [[1.0], [0.9], [1.1]]
     given = {"marginal": "gamma", "noise": False, "bootstrap": 20, "progress": False}
     given["quantity"] = "friction_coefficient"
     fit = st.fit_field(records, PROBLEM.interface, between=True, **given)
     stress = 0.55e6
     rough = GIVEN | {"target_cv": 0.5}
+    peaks, few = [0.9e6, 1e6, 1.1e6], {"method": LOCAL, "samples": 100} | QUIET
     calls = (
-        lambda: st.infer(
-            PROBLEM, fit.field, [0.9e6, 1e6, 1.1e6], method=LOCAL, samples=100, **QUIET
-        ),
+        lambda: st.infer(PROBLEM, fit.field, peaks, **few),
         lambda: st.failure_probability(PROBLEM, fit.field, stress, **rough),
         lambda: st.design_stress(PROBLEM, fit.field, probability=0.1, **rough),
         lambda: st.failure_curve(PROBLEM, fit.field, smallest=0.1, **rough),
@@ -218,11 +206,9 @@ def few_members(monkeypatch):
 def test_a_source_of_fields_is_taken_as_a_list_of_fields(call, number):
     """By every call that takes a source; at most 300 samples, all of the same field."""
     name = call.partition("_")[2]
-    given = (
-        {"stress": number}
-        if name == "probability"
-        else {"probability": number, "sensitivities": False}
-    )
+    given = {"stress": number}
+    if call == "design_stress":
+        given = {"probability": number, "sensitivities": False}
     answer = getattr(st, call)(PROBLEM, OfFields(), max_evaluations=300, **given, **GIVEN)
     low, high = answer.interval[name]
     assert low < high
@@ -281,10 +267,8 @@ def test_scatter_of_new_joints_alone_lowers_a_design(tests_alone):
     scatter = {"pressing_force": st.Lognormal(mean=1.0, cv=cv)}
     joints = tests_alone.with_between(scatter)
     given = {"target_cv": 0.2, "sensitivities": False, "max_evaluations": 2000, **OF_TESTS}
-    alone, both = (
-        st.design_stress(JOINT, random, probability=1e-2, **given)
-        for random in (tests_alone, joints)
-    )
+    alone = st.design_stress(JOINT, tests_alone, probability=1e-2, **given)
+    both = st.design_stress(JOINT, joints, probability=1e-2, **given)
     assert both.stress < 0.99 * alone.stress
     peaks = np.sort(tests_alone.predicted[0]) / JOINT.area
     factors = scatter["pressing_force"].distribution.ppf((np.arange(400) + 0.5) / 400)

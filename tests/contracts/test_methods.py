@@ -222,7 +222,7 @@ def test_a_wrong_option_is_refused_by_its_name(kind, option):
 def test_every_option_counts_or_is_refused(kind, option):
     """Another value of it changes the result, or the refusal names it."""
     counts = []
-    for name in WITH_ENDS:
+    for name in ("line", *WITH_ENDS):
         problem = BODIES[name]
         if name in SILENT.get(option, ()) or (kind, name) in UNFIT:
             continue
@@ -342,11 +342,10 @@ def events_by(kind: str, name: str) -> dict[str, Any]:
         how = {"method": method} if inertia else {}
         calls["equilibrium_path"] = st.equilibrium_path(problem, first, [1e5], **how)
     return {
-        call: result.isel(sample=0, missing_dims="ignore")[
-            [key for key in result if "event" in result[key].dims]
-        ]
+        call: result.isel(sample=0, missing_dims="ignore").drop_vars(
+            [key for key in result if "event" not in result[key].dims])
         for call, result in calls.items()
-    }
+    }  # fmt: skip
 
 
 @every

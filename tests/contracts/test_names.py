@@ -63,10 +63,8 @@ def table_of(count, folder):
 
 def stated(count):
     """What is assumed of tests with so many stated fields."""
-    fields = [
-        dataclasses.replace(FIELD, marginal=st.Gamma(mean=0.2 + 0.01 * i, cv=0.15))
-        for i in range(count)
-    ]
+    marginals = (st.Gamma(mean=0.2 + 0.01 * i, cv=0.15) for i in range(count))
+    fields = [dataclasses.replace(FIELD, marginal=marginal) for marginal in marginals]
     given = {"method": LOCAL, "samples": 100, "progress": False}
     return str(st.infer(PROBLEM, fields, [0.95e6, 1e6, 1.05e6], **given).assumptions)
 
@@ -82,15 +80,10 @@ COUNTED = {  # a text about so many things, and what it says of each that it sho
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("name", "count"),
-    [
-        (name, count)
-        for name in COUNTED
-        for count in (2, 3, 60)
-        if name != "stated fields" or count == 2
-    ],
-)
+COUNTS = [("stated fields", 2), *((name, n) for name in [*COUNTED][1:] for n in (2, 3, 60))]
+
+
+@pytest.mark.parametrize(("name", "count"), COUNTS)
 def test_a_text_counts_what_it_does_not_show(name, count, tmp_path):
     text, each = COUNTED[name]
     said = text(count, tmp_path)

@@ -59,15 +59,13 @@ OTHERS: dict[str, Any] = {  # parameter: another value, for all calls or by call
     "load_cell_error": 3e4, "unit": "kPa", "designs": {"more": 6}, "repetitions": 12,
 }  # fmt: skip
 BY_CALL: dict[tuple[str, str], Any] = {
-    ("equilibrium_path", "method"): st.Rupture(),
+    ("equilibrium_path", "method"): st.Rupture(), ("equilibrium_path", "profiles"): 0.98 * ROWS[0],
     ("simulate_rupture", "method"): st.Rupture(loading_rate=3e9),
-    ("simulate_rupture", "profiles"): 0.98 * ROWS[0],
-    ("fit_field", "profiles"): 1.02 * NOISY,
-    ("equilibrium_path", "profiles"): 0.98 * ROWS[0],
+    ("simulate_rupture", "profiles"): 0.98 * ROWS[0], ("fit_field", "profiles"): 1.02 * NOISY,
     ("monte_carlo", "samples"): 41,
     ("infer", "between"): {"strength": st.Lognormal(mean=1.0, cv=0.1)},
     ("design_of_tests", "designs"): {"few": 6},
-}
+}  # fmt: skip
 REPLACES = {"friction_coefficient": "stress", "force": "stress"}
 """Parameters that are given in place of another one."""
 SILENT = {("design_of_tests", "probability"), ("design_stress", "confidence")}

@@ -127,13 +127,9 @@ def assert_drawn_alike(drawing: Any, reference: Any, close: float, factor: Any =
 
 def sizes_of(w: World) -> dict[str, list[float]]:
     """The largest numbers in each unit that results of a world hold, and its lengths."""
-    sizes = {
-        "Pa": [w.strength.max() * (2e6 if w.coefficients else 1.0)],
-        "m": [],
-        "N": [],
-        "s": [],
-    }
-    sizes["m"] += [*w.interface.lengths, sizes["Pa"][0] / 0.2e12]  # and slip that weakens
+    stress = w.strength.max() * (2e6 if w.coefficients else 1.0)
+    lengths = [*w.interface.lengths, stress / 0.2e12]  # and slip that weakens
+    sizes = {"Pa": [stress], "m": lengths, "N": [], "s": []}
     for (_, known), result in RESULTS.items():
         for values in table(result).values() if known is w else ():
             if (unit := values.attrs.get("units")) in sizes and values.size:

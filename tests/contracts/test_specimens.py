@@ -41,10 +41,8 @@ def pusher(place: float, width: float, **more: Any) -> st.Pusher:
 
 def slider(drive: Any = None, base: st.Base = BASE, **more: Any) -> st.Problem:
     drive = drive or st.Pusher(height=0.006, width=0.004, stiffness=6e7)
-    return body(
-        st.Slider(height=0.041, thickness=0.0071, base=base, drive=drive, **more),
-        st.Load(pressing_force=1.1e3),
-    )
+    of_slider = {"height": 0.041, "thickness": 0.0071, "base": base, "drive": drive} | more
+    return body(st.Slider(**of_slider), st.Load(pressing_force=1.1e3))
 
 
 BODIES = {  # a number of each field of Load, Blocks, Slider, Base and of each drive
@@ -115,10 +113,8 @@ def test_every_field_of_a_load_and_of_a_specimen_has_another_value():
 def test_other_units_change_nothing_else(name, kind):
     other = world(name, kind).in_units(Pa=0.25, m=2.0, s=8.0)
     close = 1e-9 if kind == "equilibrium" else 1e-5
-    before, after = (
-        r.drop_vars("event_magnitude", errors="ignore")
-        for r in (plain(name, kind), onset(other))
-    )
+    results = plain(name, kind), onset(other)
+    before, after = (r.drop_vars("event_magnitude", errors="ignore") for r in results)
     assert_alike(before, after, close, other.factor)
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from rigs import plain_rig
 
 from stiction.elasticity.blocks import Pushes, block_response
 from stiction.elasticity.columns import Body, block, eliminated
@@ -133,35 +132,6 @@ def test_equal_blocks_on_rollers_and_between_platens():
     order = np.log2(np.divide(*errors))
     assert order[0] > 1.9, errors
     assert order[1] > 1.5, errors  # the push ends between lines
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"base_solid": (2e11, 0.3), "push": (0.02, 0.01), "tilt": -0.6},
-        {"base_solid": (5e8, 0.4), "push": (0.06, 0.01), "plate": True},
-    ],
-)
-def test_all_lines_of_both_bodies_at_once(given):
-    """Linear elements across, in a single sparse matrix. Finer elements quarter the difference."""
-    n, (middle, width), E, nu = 16, given["push"], *given["base_solid"]
-    rig = contact_rig(
-        LENGTH, n, Body(0.075, 3e9 / 2.7, 2.65 / 1.35),
-        Body(0.03, 0.5 * E / (1.0 + nu), (3.0 - nu) / (1.0 + nu)),
-        push=(middle - 0.5 * width, middle + 0.5 * width), tilt=given.get("tilt", 0.0),
-        pressing="plate" if given.get("plate") else "soft",
-    )  # fmt: skip
-    errors = []
-    for lines in (31, 61):
-        plain = plain_rig(n, beyond=0, lines=lines, **given)
-        errors.append([
-            abs(rig.K - plain.K).max() / rig.K.diagonal().max(),
-            n * abs(rig.T - plain.T).max(),
-            n * abs(rig.T_p - plain.T_p).max(),
-            abs(rig.C / plain.C - 1.0),
-        ])  # fmt: skip
-    assert max(errors[1]) < 0.01, errors
-    assert np.divide(*errors).min() > 3.0, errors
 
 
 # -- closed forms of contact mechanics -----------------------------------------------------------
