@@ -111,10 +111,7 @@ class Agreement(Result):
     def notes(self) -> tuple[str, ...]:
         """Doubts, if the peaks contradict the prediction."""
         p = min(self.p_values.values())
-        text = (
-            f"the peaks contradict the prediction, p = {p:.2g} of their agreement. Check units,"
-            " method and surfaces"
-        )
+        text = f"the peaks contradict the prediction, p = {p:.2g}. Check units, method and surfaces"
         return (text,) if p < DOUBTFUL_P_VALUE else ()
 
     def _summary(self) -> Summary:
@@ -262,20 +259,15 @@ def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
 def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
     name = measured.variable
     if name not in prediction:
-        raise InputError(
-            f"prediction: lacks the measured quantity, {name}. It holds"
-            f" {', '.join(map(str, prediction.data_vars))}"
-        )
+        known = ", ".join(map(str, prediction.data_vars))
+        raise InputError(f"prediction: lacks the measured quantity, {name}. It holds {known}")
     if prediction[name].ndim != 1 or len(measured.values) > 1:
         raise InputError(
-            "prediction: must be for a single kind of specimen. Choose a step of a sweep with isel,"
-            " and compare kinds in separate calls"
+            "prediction: must be for one kind of specimen. Choose a step of a sweep by isel"
         )
     values = np.asarray(prediction[name].values, dtype=np.float64)
     if missing := int(np.isnan(values).sum()):
-        warn_accuracy(
-            f"{missing} of {values.size} predicted samples have no peak and are left out"
-        )
+        warn_accuracy(f"{missing} of {values.size} predictions have no peak and are left out")
     if missing == values.size:
         raise InputError("prediction: no sample has a peak")
     return values[np.isfinite(values)]
@@ -312,8 +304,7 @@ def _with_posterior(
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():
         raise InputError(
-            "peaks: the posterior was fitted to them and so lies near them. Compare peaks of"
-            " further tests, or leave some out of the fit"
+            "peaks: the posterior was fitted to them. Compare peaks of further tests"
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])

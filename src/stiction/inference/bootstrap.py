@@ -295,9 +295,7 @@ def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField
     members = []
     for row in zip(*free.values(), strict=True):
         values = dict(zip(free, row, strict=True))
-        within = {
-            n: float(np.clip(values[n], *limits[n])) for n in values.keys() & limits.keys()
-        }
+        within = {n: float(np.clip(values[n], *limits[n])) for n in values.keys() & limits}
         member = with_values(field, in_field(values | within))
         if isinstance(member.marginal, Beta):  # the limits keep mean and scatter
             bounds = {n: values[n] for n in values.keys() & SIDES.keys()}

@@ -159,10 +159,8 @@ class Curve(Result):
 
     def _row(self, name: str) -> Row:
         count, force = len(self.drops), partial(in_words, self.unit)
-        texts = [
-            f"+- {force(self.peak_error)}",
-            f"at {in_words(self.travel_unit, self.peak_travel)}",
-        ]
+        place = in_words(self.travel_unit, self.peak_travel)
+        texts = [f"+- {force(self.peak_error)}", f"at {place}"]
         texts.append(f"{count} precursor" + "s" * (count != 1))
         if count:
             first, most = self.drops.force[0], self.drops.size.max()
@@ -318,9 +316,7 @@ def read_curve(
                 parts = _parts(readings.part(rows, label), noise, split)
                 tests += [_curve(part, noise, split) for part in parts]
     if len({(curve.unit, curve.travel_unit) for curve in tests}) > 1:
-        raise InputError(
-            "source: units of force or travel differ between tests. Read them in separate calls"
-        )
+        raise InputError("source: tests differ in their units. Read them in separate calls")
     ends = [curve.name for curve in tests if math.isnan(curve.plateau)]
     if ends and split != "cycles":
         warn_accuracy(
@@ -422,9 +418,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     """Return the parts of a record that are one test each."""
     known = np.isfinite(readings.travel) & np.isfinite(readings.force)
     if not known.all():  # machines miss single readings
-        warn_accuracy(
-            f"{readings.name}: {int((~known).sum())} of {known.size} readings are missing"
-        )
+        warn_accuracy(f"{readings.name}: {np.sum(~known)} of {known.size} readings are missing")
         readings = readings.part(known)
     travel, force = readings.travel, readings.force
     threshold = _threshold(force, noise)[1]
@@ -437,8 +431,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     if turns.size:
         if split != "strokes":
             raise InputError(
-                "forces have both signs, as in a reciprocating test. Pass split='strokes' to read"
-                " each stroke as a test"
+                "forces have both signs, as in a reciprocating test. Pass split='strokes'"
             )
         # The sign holds until the force clearly has the other sign.
         begins = [np.flatnonzero(signs[:turn] != signs[turn])[-1] + 1 for turn in turns]

@@ -229,10 +229,8 @@ def _as_table(name: str, design: Any, second: str) -> dict[str, Any]:
     """
     is_table = isinstance(design, Mapping) and any(isinstance(key, str) for key in design)
     table, keys = dict(design) if is_table else {"tests": design}, ("tests", second)
-    if unknown := [
-        unknown_name(f"designs: {name}", str(k), keys) for k in table if k not in keys
-    ]:
-        raise InputError(unknown)
+    if unknown := [str(key) for key in table if key not in keys]:
+        raise InputError([unknown_name(f"designs: {name}", key, keys) for key in unknown])
     return {"tests": 0} | table
 
 
@@ -245,12 +243,11 @@ def _plans(
     plans = {}
     for name, design in designs.items():
         table, path = _as_table(name, design, "known"), f"designs: {name}: known"
-        tests = (
-            table["tests"] if isinstance(table["tests"], Mapping) else {None: table["tests"]}
-        )
+        tests = table["tests"]
+        tests = tests if isinstance(tests, Mapping) else {None: tests}
         if not tests or not all(is_whole(count, 1) for count in tests.values()):
             raise InputError(
-                f"designs: {name}: tests: must be a whole number >= 1, for each length (m)"
+                f"designs: {name}: tests: must be a whole number >= 1 per length (m)"
             )
         known = check("known", table.get("known", ()), Names)  # from other measurements
         if unknown := [unknown_name(path, key, names) for key in known if key not in names]:
@@ -328,9 +325,7 @@ def _present(
         same = [length is None or math.isclose(length, size) for length in random.peaks.lengths]
         order = np.argsort(np.logical_not(same), kind="stable")
         if not any(same):
-            raise InputError(
-                f"random: no peak is from a specimen of the problem, {size:g} m long"
-            )
+            raise InputError(f"random: no peak is from a specimen of the problem, {size:g} m")
         tables = tables.of([tables.peaks[kind] for kind in order], order)
         mass = random.grid.mass.sum(axis=(1, 2, 3))
     else:
@@ -356,9 +351,7 @@ def _widths(
 ) -> xr.Dataset:  # fmt: skip
     """Return widths of intervals and design stresses after further measurements."""
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
-        raise InputError(
-            "designs: profiles: need a fit. Further profiles are as long as its profiles"
-        )
+        raise InputError("designs: profiles: need a fit, whose profiles give their length")
     _, now = grid_of_profiles(tables.profiles, tables)
     rng = np.random.default_rng([simulation.seed, 8])
     simulation.meter.stage("simulated campaigns", len(plans) * repetitions)

@@ -321,10 +321,8 @@ class FieldFit(WithFactors, Result):
     def _summary(self) -> Summary:
         marginal = getattr(self.field.marginal, "type", "marginal").replace("_", " ")
         spectrum = getattr(self.field.spectrum, "type", "").replace("_", " ")
-        title = (
-            f"{marginal} marginal, {spectrum} spectrum from {self.lengths_held:.3g} correlation"
-            " lengths"
-        )
+        held = f"{self.lengths_held:.3g} correlation lengths"
+        title = f"{marginal} marginal, {spectrum} spectrum from {held}"
         of_field = QUANTITIES[self.quantity].units
         rows = [
             Row(name, value, self.interval[name], unit_of_key(name, of_field))
@@ -442,9 +440,7 @@ def fit_field(
     points = sum(record.values.size for record in records)
     ratio = None if anisotropy is True else float(anisotropy or 1.0)
     if ratio != 1.0 and records[0].values.ndim == 1:
-        raise InputError(
-            "anisotropy: applies to maps only, but the profiles are lines. Leave it out"
-        )
+        raise InputError("anisotropy: applies to maps only, not to lines. Leave it out")
     spacing = max(max(record.spacings) for record in records)
     longest = max(max(np.multiply(one.values.shape, one.spacings)) for one in records)
     # A correlation length outside this range leaves no trace in a record.
@@ -465,9 +461,8 @@ def fit_field(
         estimates, families = ranking(settings, rows)
         # A family that is rarely drawn needs few repetitions.
         weights = [one.weight for one in families.values() if one.weight > 0.0]
-        counts = [
-            max(MIN_REPETITIONS, round(bootstrap * w / max(weights))) for w in weights[1:]
-        ]
+        most = max(weights)
+        counts = [max(MIN_REPETITIONS, round(bootstrap * w / most)) for w in weights[1:]]
         # 3.
         try:
             repeated, further = bootstrapped(
@@ -479,9 +474,7 @@ def fit_field(
             settings = [setting for setting in settings if setting.marginal != error.family]
             if not settings:
                 raise
-            warn_accuracy(
-                f"{error}: the family is left out, because such records are far from it"
-            )
+            warn_accuracy(f"{error}: the family is left out. Such records are far from it")
     # 4. and 5.
     field = estimates[0].field(quantity)
     object.__setattr__(field, "specimens_of_fit", len(levels) if between else 0)
@@ -574,8 +567,7 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
             f" {math.sqrt(left):.3g} left. The correlation length then depends on the family"
         )
     doubts += [
-        f"{name} {value:.3g} lies at an end of the searched range. The data do not determine it."
-        " Fix its value in spectrum= or anisotropy="
+        f"{name} {value:.3g} lies at an end of the searched range. Fix spectrum= or anisotropy="
         for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [

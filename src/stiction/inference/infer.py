@@ -212,9 +212,7 @@ def infer(
         simulation = Simulation(method, samples, seed, workers, meter)
         if of_parameters:
             if between is not None:
-                raise InputError(
-                    "between: has no effect on the parameters of this prior. Leave it out"
-                )
+                raise InputError("between: has no effect with this prior. Leave it out")
             unknown = make_prior(problem, random, prior)
             posterior = _of_parameters(unknown, simulation, measured, error)
         else:
@@ -312,8 +310,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     if texts:
         notes.append(
             f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
-            f" {PRIOR_END:.0%} of it. Check the unit of the peaks, and widen the prior if it is a"
-            " guess"
+            f" {PRIOR_END:.0%} of it. Check the unit of the peaks, or widen the prior"
         )
     # The local criterion may be inaccurate where the posterior lies,
     # not in all of the prior.
@@ -418,8 +415,7 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
         )
     if profiles.levels.size == 1:
         notes.append(
-            "the profiles come from one specimen, and all others are assumed to vary along their"
-            " length as it does. Scan further specimens. If the records are of different specimens,"
-            " fit them with between=True"
+            "the profiles come from one specimen, and others are assumed to vary along their length"
+            " as it does. Scan further specimens, or pass between=True for records of several"
         )
     return notes

@@ -151,9 +151,7 @@ def of_length(problem: Problem, length: float | None) -> Problem:
     """
     interface = problem.interface
     if length is not None and interface.is_plane:
-        raise InputError(
-            "peaks: specimen lengths apply to lines only, but the interface is a plane"
-        )
+        raise InputError("peaks: lengths of specimens apply to lines, not to a plane")
     if length is None or np.isclose(length, interface.measure, rtol=1e-9):
         return problem
     if problem.load.pressing_force is not None:
@@ -211,13 +209,11 @@ def simulate(
 
 def area_of(prior: Prior, method: Any, length: float | None) -> float:
     """Return the area, m², of specimens with a given length, m, or as in the problem if None."""
-    least, most = (
-        ends.problem.area for ends in experiments_at(prior, prior.ends, method, length)
-    )
+    at_ends = experiments_at(prior, prior.ends, method, length)
+    least, most = (experiment.problem.area for experiment in at_ends)
     if least != most:
         raise InputError(
-            f"peaks: are forces, but the prior changes the area, {least:g} to {most:g} m2. Give"
-            " peaks as stresses, in Pa"
+            f"peaks: the prior changes the area, {least:g} to {most:g} m2. Give stresses in Pa"
         )
     return least or math.nan
 
@@ -226,9 +222,7 @@ def variable_of(problem: Problem, random: Any, unit: str) -> str:
     """Return the variable that tests measure in a unit, if the problem defines this variable."""
     variable = VARIABLES[si_of(unit)]
     if variable == "critical_force" and problem.area is None:
-        raise InputError(
-            "peaks: forces need an area. Give Blocks(thickness=...) or Interface(width=...)"
-        )
+        raise InputError("peaks: forces need Blocks(thickness=...) or Interface(width=...)")
     if variable == "critical_force":
         warn_of_weld(problem, "peaks")
     given = () if random is None else random.names

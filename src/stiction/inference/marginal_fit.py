@@ -250,8 +250,7 @@ def family_table(given: Any) -> dict[str, Any]:
         return dict(given)
     if not isinstance(given, str):
         raise InputError(
-            f"must be a name, or a table {{'type': name, ...}} that fixes parameters, got"
-            f" {describe(given)}"
+            f"must be a name or a table {{'type': name, ...}}, got {describe(given)}"
         )
     return {"type": given}
 
@@ -275,9 +274,8 @@ def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: 
     first = start or MARGINALS[family.name](mean=mean, cv=float(quiet.std()) / mean, low=low)
     shape, _, scale = first.distribution.args
     limits = [(-700.0, 700.0), (-5.0, 5.0) if family.name == "lognormal" else (-1.6, 7.0)]
-    return Search(
-        np.log([scale, shape]), limits, lambda v: (math.exp(v[1]), low, math.exp(v[0]))
-    )
+    at = np.log([scale, shape])
+    return Search(at, limits, lambda v: (math.exp(v[1]), low, math.exp(v[0])))
 
 
 def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:

@@ -169,8 +169,7 @@ def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peak
     measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
         raise InputError(
-            f"load_cell_error: {load_cell_error:g} {unit} is more than the largest peak. Give the"
-            " standard deviation in the unit of the peaks"
+            f"load_cell_error: {load_cell_error:g} {unit} exceeds the largest peak. Check its unit"
         )
     if measured.specimens is None:
         return measured, error
@@ -339,22 +338,18 @@ def _of_table(
     names = [c for c in of_specimens if c not in lengths and role_of(c) == "specimen"]
     if len(lengths) > 1 or len(names) > 1:
         raise InputError(unclear(columns, "specimen or its length", "value", lengths + names))
-    used = {
-        what: group[0] for what, group in (("length", lengths), ("specimen", names)) if group
-    }
+    kinds = {"length": lengths, "specimen": names}
+    used = {kind: group[0] for kind, group in kinds.items() if group}
     if isinstance(normal, str):
         used["normal force"] = stated_column(columns, "normal", normal)
     left = [c for c in columns if c not in (*lengths, *names, used.get("normal force"))]
     peak = read_column(left, "peak", "value", value, VARIABLES)
     for column in columns:
-        timed = (
-            column not in (peak, *used.values()) and column.unit and column.may_be_in("m", "s")
-        )
-        long = column.values.size >= MIN_CURVE_LINES
+        timed = column.unit and column.may_be_in("m", "s")
+        long = column not in (peak, *used.values()) and column.values.size >= MIN_CURVE_LINES
         if timed and long and np.all(np.diff(column.values) >= 0):
             raise InputError(
-                f"{column.label!r} only rises over {column.values.size} lines, as in the curve of"
-                " one test. Read curves with st.read_curve"
+                f"{column.label!r} only rises, as in the curve of a test. Call st.read_curve"
             )
     _refuse_statistics(table, peak)
     known = replace(peak, values=without_missing(peak.values, options))
@@ -393,9 +388,7 @@ def _of_table(
         sizes = column_in_si(lengths[0], "length", None, ("m",))[0][kept]
         if np.isnan(sizes).any():
             line = table.lines[kept][np.isnan(sizes).argmax()]
-            raise InputError(
-                f"length: missing in line {line}. Give the length of each specimen"
-            )
+            raise InputError(f"length: missing in line {line}. Give each specimen a length")
         groups = {size: sizes == size for size in np.unique(sizes)}
     made = make_peaks({size: values[rows] for size, rows in groups.items()}, si)
     return replace(

@@ -355,9 +355,8 @@ class SpecimenPosterior(Posterior):
             )
         if self.peaks.loads is not None:
             texts.append(
-                "the unit is a specimen: its slip loads scatter about their mean, which has an"
-                f" error of {self.likelihood.error / np.mean(self.peaks.values[0]):.1%}. This is"
-                " no scatter between joints"
+                "the unit is a specimen: the mean of its slip loads, which has an error of"
+                f" {self.likelihood.error / np.mean(self.peaks.values[0]):.1%}"
             )
         usual = profiles.prior.scatter is FactorPrior().scatter
         law = f"half-Cauchy with scale {PRIOR_SCALE:g}" if usual else "as stated"
@@ -412,11 +411,8 @@ class SpecimenPosterior(Posterior):
     def _summary(self) -> Summary:
         summary = super()._summary()
         shares = ", ".join(f"{name} {share:.0%}" for name, share in self.families.items())
-        notes = [
-            *summary.notes,
-            *self.assumptions,
-            f"distributions between specimens: {shares}",
-        ]
+        notes = [*summary.notes, *self.assumptions]
+        notes.append(f"distributions between specimens: {shares}")
         if self.agreement is not None:
             p = min(self.agreement.p_values.values())
             notes.append(f"agreement of peaks and profiles: p = {p:.2g}")

@@ -124,9 +124,7 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     with prefixed("prior"):
         distributions = distributions_of(given)
     if not isinstance(random, RandomField | RandomInterface):
-        raise InputError(
-            "prior: needs one random field or interface. Leave it out with a fit or a list"
-        )
+        raise InputError("prior: needs one interface. Leave it out with a fit or a list")
     random = as_random_interface(random)
     refuse_conditioned([random])
     prior = Prior(problem, random, distributions)

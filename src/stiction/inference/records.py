@@ -106,9 +106,8 @@ def _is_scalar(value: Any) -> bool:
 
 
 def _records(source: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    values: Any = profile_in_si(
-        named(source, quantity), quantity, (QUANTITIES[quantity].units,)
-    )
+    units = (QUANTITIES[quantity].units,)
+    values: Any = profile_in_si(named(source, quantity), quantity, units)
     places: dict[str, Array] = {}
     if hasattr(values, "dims"):
         values, places = points_of(values)
@@ -123,9 +122,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         spacings.append(spacing)
     shape = [number.max() + 1 for number in index]
     if np.unique(np.ravel_multi_index(index, shape)).size < index[0].size:
-        raise InputError(
-            "x or y repeats, so that one place of the map has two values. Keep one of them"
-        )
+        raise InputError("x and y repeat: a place of the map has two values. Keep one")
     rows = values.reshape(-1, values.shape[-1])
     full = np.full((rows.shape[0], *shape), np.nan)
     full[(slice(None), *index)] = rows
@@ -135,9 +132,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 def _of_array(array: Array, interface: Interface | None) -> list[Record]:
     """Return records from values (*shape) or (samples, *shape) at the nodes of an interface."""
     if interface is None:
-        raise InputError(
-            "an array has no point spacing. Give the interface, or a DataArray over 'x' (m)"
-        )
+        raise InputError("an array has no spacing. Give interface=, or a DataArray over x (m)")
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):
         samples = f"(samples, {', '.join(map(str, shape))})"

@@ -169,9 +169,7 @@ def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name and the fixed parameters of a spectrum family, after checks."""
     table = family_table(given)
     if "power_kept" in table:
-        raise InputError(
-            "power_kept: does not apply to a fit of the whole spectrum. Leave it out"
-        )
+        raise InputError("power_kept: a fit is of the whole spectrum. Leave it out")
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
 
@@ -223,9 +221,8 @@ class SpectrumFamily:
     def vector(self, values: Sequence[float]) -> Array:
         """Return free parameters on the scale of the search."""
         pairs = zip(self.free, values, strict=True)
-        return np.array(
-            [v if n == "noise_share" else math.log(v - offset(n)) for n, v in pairs]
-        )
+        logs = [v if n == "noise_share" else math.log(v - offset(n)) for n, v in pairs]
+        return np.array(logs)
 
     def vector_of(self, model: Model) -> Array:
         """Return the vector for a model."""
