@@ -144,9 +144,8 @@ class Experiment:
 
     def _mean(self, name: str) -> float:
         members = self.random.members
-        return float(
-            np.mean([mean_in_stress(self.problem, member, name) for member in members])
-        )
+        means = [mean_in_stress(self.problem, member, name) for member in members]
+        return float(np.mean(means))
 
     def check_fields(self) -> None:
         """Warn about fields that do not suit the grid, the interface or their units."""

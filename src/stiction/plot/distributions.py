@@ -187,9 +187,8 @@ def quantiles(
             band: dict[str, Any] = {"color": color(number), "linewidth": 0}
             if not others:
                 axes.fill_between(place, values[0], values[4], alpha=0.12, **band)
-            axes.fill_between(
-                place, values[1], values[3], alpha=0.12 if others else 0.25, **band
-            )
+            alpha = 0.12 if others else 0.25
+            axes.fill_between(place, values[1], values[3], alpha=alpha, **band)
             style = {"capsize": 2, "marker": MARKERS[number % len(MARKERS)], **series(number)}
             axes.errorbar(place, values[2], yerr=errors, label=label, **style)
         axes.set(xlabel=name, ylabel=text)
@@ -324,17 +323,14 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     """
     table = design.sensitivities
     if not table.sizes.get("source"):
-        raise InputError(
-            "design: has no sensitivities. Pass sensitivities=True to st.design_stress"
-        )
+        raise InputError("design: has none. Pass sensitivities=True to st.design_stress")
     quantity = "force" if np.isfinite(design.area) else "stress"
     ends = np.stack([table[f"{quantity}_at_low"].values, table[f"{quantity}_at_high"].values])
     factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())
     place = np.arange(ends.shape[1])[::-1]
     with on_axes(ax) as axes:
-        axes.axvspan(
-            *(end * factor for end in design.interval[quantity]), color=BAND, linewidth=0.0
-        )
+        first, last = (end * factor for end in design.interval[quantity])
+        axes.axvspan(first, last, color=BAND, linewidth=0.0)
         axes.axvline(getattr(design, quantity) * factor, color=INK, linewidth=0.8)
         low, high = np.sort(ends, axis=0) * factor
         axes.barh(place, high - low, left=low, height=0.5, color=color(1))

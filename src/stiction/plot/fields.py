@@ -225,9 +225,8 @@ def onset(
         else:
             x = interface.x * unit_for("m", interface.lengths)[0]
             axes.plot(x, tau_p * factor, color=QUIET, linewidth=0.8, label=r"strength $\tau_p$")
-            with suppress(
-                InputError
-            ):  # no single nucleation length: the strength alone is drawn
+            # Without a single nucleation length the strength alone is drawn.
+            with suppress(InputError):
                 averaged = nucleation_stress(problem, tau_p) * factor
                 axes.plot(x, averaged, label=r"nucleation stress $\tau_n$", **series(0))
             name_line(axes, interface, with_unit("shear stress", unit))
@@ -263,9 +262,7 @@ def chosen_row(
     counts = {result.sizes["sample"] for result in by_sample.values()}
     counts |= set() if rows is None else {len(rows)}
     if len(counts) > 1:
-        raise InputError(
-            f"results: must have as many samples as strength, got {sorted(counts)}"
-        )
+        raise InputError(f"results: need as many samples as strength, got {sorted(counts)}")
     last = min(counts, default=math.inf) - 1
     if not is_whole(sample, 0) or sample > last:
         raise InputError(f"sample: must be 0 to {last}, got {sample}")
@@ -287,9 +284,7 @@ def _mark(
             text += f" (coefficient {float(result['friction_coefficient'][0]):.4f})"
         text += f" at {', '.join(f'{part:.2f}' for part in place)} {length_unit}"
         style: dict[str, Any] = {"linestyle": "none", "color": color(number + 1), "label": text}
-        style |= {
-            "marker": MARKERS[number % len(MARKERS)],
-            "markersize": max(9.0 - 3.5 * number, 2.0),
-        }
+        style["marker"] = MARKERS[number % len(MARKERS)]
+        style["markersize"] = max(9.0 - 3.5 * number, 2.0)
         at = place if interface.is_plane else (*place, load * factor)
         axes.plot(*at, markeredgecolor="white", markeredgewidth=0.8, **style)

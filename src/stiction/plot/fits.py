@@ -86,9 +86,8 @@ def _histogram(axes: Axes, field_fit: FieldFit) -> None:
 
 def _quantiles(axes: Axes, field_fit: FieldFit) -> None:
     estimate = field_fit._estimate
-    values = estimate.setting.marginal.quiet(
-        np.concatenate(field_fit._rows), estimate.model.noise
-    )
+    measured, noise = np.concatenate(field_fit._rows), estimate.model.noise
+    values = estimate.setting.marginal.quiet(measured, noise)
     factor, unit = unit_for(QUANTITIES[field_fit.quantity].units, values)
     share = (np.arange(200) + 0.5) / 200
     expected, *spread = (
@@ -161,9 +160,8 @@ def _pooled_spectrum(observed: list[Observed], powers: list[Array]) -> Array:
 def _spectrum(
     axes: Axes, field_fit: FieldFit, observed: list[Observed], simulated: list[list[Observed]]
 ) -> None:
-    scale, unit = unit_for(
-        QUANTITIES[field_fit.quantity].units, np.concatenate(field_fit._rows)
-    )
+    values = np.concatenate(field_fit._rows)
+    scale, unit = unit_for(QUANTITIES[field_fit.quantity].units, values)
     model, windows = field_fit._estimate.model, [of_window.window for of_window in observed]
     k, measured = _pooled_spectrum(observed, _powers(observed))
     fitted = _pooled_spectrum(observed, [model.expectation(w) for w in windows])[1]
@@ -239,10 +237,9 @@ def agreement(result: Agreement, *, ax: Axes | None = None) -> FigureAxes:
             away = result.band / np.sqrt(values.size)
             band = (np.clip(share + sign * away, 0.0, 1.0) for sign in (-1.0, 1.0))
             name = f"90 % of {values.size} tests each{of}"
-            axes.fill_between(
-                at * factor, *band, color=paint, alpha=0.2, linewidth=0.0, label=name
-            )
-            axes.plot(at * factor, share, color=paint, label=f"predicted{of}")
+            x, style = at * factor, {"color": paint, "alpha": 0.2, "linewidth": 0.0}
+            axes.fill_between(x, *band, label=name, **style)
+            axes.plot(x, share, color=paint, label=f"predicted{of}")
             seen = at[np.searchsorted(share, [0.001, 0.999]).clip(max=at.size - 1)]
             low, high = min(seen[0], values.min()), max(seen[1], values.max())
             margin = 0.05 * (high - low)

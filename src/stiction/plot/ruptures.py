@@ -210,9 +210,8 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
     if latest > 0.0:
         x, y = (length * place for place in interface.coordinates.values())
         levels = np.linspace(0.0, latest, 10)[1:-1]
-        lines = axes.contour(
-            x, y, scale * since.T, levels=levels, cmap="viridis", linewidths=0.9
-        )
+        since = scale * since.T
+        lines = axes.contour(x, y, since, levels=levels, cmap="viridis", linewidths=0.9)
         bar = ScalarMappable(lines.norm, lines.cmap)
         text = f"front ({time_unit}{begin})"
         axes.figure.colorbar(bar, ax=axes, label=text, shrink=0.8)

@@ -238,9 +238,7 @@ def precursors(
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
-        raise InputError(
-            "result: some paths contain forces and others stresses. Draw them in separate figures"
-        )
+        raise InputError("result: some paths contain forces, others stresses. Draw two figures")
     si = str(results[0][name].attrs["units"])
     if tests and (tests.unit, tests[0].travel_unit) != (si, "m"):
         raise InputError(
@@ -270,14 +268,12 @@ def precursors(
             events = below.vlines(at, start, end, color=ACCENT, linewidth=width)
         events.set_label("slips in an arrested event")
         for test in tests:
+            travel, force = test.travel * length, test.force * factor
+            (curve,) = above.plot(travel, force, color=INK, linewidth=0.5, alpha=0.7)
             at = test.drops.travel * length
-            (curve,) = above.plot(
-                test.travel * length, test.force * factor, color=INK, linewidth=0.5, alpha=0.7
-            )
             (drops,) = above.plot(at, test.drops.force * factor, "v", color=INK, markersize=3.0)
-            (marks,) = below.plot(
-                at, np.full(at.size, edge), "|", color=INK, markersize=5.0, clip_on=False
-            )
+            top = np.full(at.size, edge)
+            (marks,) = below.plot(at, top, "|", color=INK, markersize=5.0, clip_on=False)
         if tests:
             curve.set_label(f"{len(tests)} tests")
             drops.set_label("measured precursors")

@@ -41,9 +41,7 @@ def _one_or_two(value: Any, read: Callable[[Any], Any]) -> Any:
     if not isinstance(value, list | tuple):
         return read(value)
     if len(value) != 2:
-        raise ValueError(
-            "must be a number for a line, or two numbers (along x, along y) for a plane"
-        )
+        raise ValueError("must be a number for a line, or two (along x, along y) for a plane")
     return tuple(map(read, value))
 
 
@@ -285,9 +283,8 @@ class Interface(Listed):
 
     def mean(self, profiles: Array) -> Array:
         """Return means of profiles (..., *shape) over the nodes that can break."""
-        return (
-            profiles[..., self.breakable].mean(-1) if self.is_held else profiles.mean(self.axes)
-        )
+        held = self.is_held
+        return profiles[..., self.breakable].mean(-1) if held else profiles.mean(self.axes)
 
     @property
     def breakable_measure(self) -> float:

@@ -91,9 +91,7 @@ class Load(Listed):
             problems.append(f"profile must be positive everywhere, got {np.min(profile):g}")
         if not (pressure is None or is_unplaced(pressure) or np.mean(pressure) > 0.0):
             mean = np.mean(pressure)
-            problems.append(
-                f"normal_pressure must be positive on average. Its mean is {mean:g}"
-            )
+            problems.append(f"normal_pressure must be positive on average, got {mean:g}")
         if pressure is not None and self.pressing_force is not None:
             problems.append(
                 "pressing_force: give either normal_pressure (Pa) or pressing_force (N), not both"
@@ -178,9 +176,7 @@ class Problem(Listed):
         interface, specimen = self.interface, self.specimen
         pressure: Any = self.load.normal_pressure
         if specimen is None:
-            text = (
-                "interface.ends: free ends belong to a specimen. Give specimen=st.Blocks(...)"
-            )
+            text = "interface.ends: free ends need a specimen. Give specimen=st.Blocks(...)"
             return [text] * interface.is_free
         if interface.is_plane:
             return ["specimen: blocks meet on a line; give length and nodes one number each"]
@@ -198,8 +194,7 @@ class Problem(Listed):
             problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
-                f"specimen.height: {specimen.height:g} m is less than two spacings of the nodes,"
-                f" {interface.spacing:.3g} m. Take more nodes"
+                f"specimen.height: below two spacings of {interface.spacing:.3g} m. Take more nodes"
             )
         high = specimen.height / interface.measure
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
@@ -443,17 +438,14 @@ def warn_of_weld(problem: Problem, name: str) -> None:
         percent = 100.0 * problem.interface.breakable_measure / problem.interface.measure
         warn_accuracy(
             f"{name}: is compared with the shear force on the part that can break, {percent:.3g} %"
-            " of the interface. Beyond it the blocks are in one piece, and the machine carries the"
-            " force on both parts"
+            " of the interface. The machine also carries the force on the part in one piece"
         )
 
 
 def refuse_specimen(problem: Problem, what: str, instead: str) -> None:
     """Raise an `InputError` with advice, `instead`, if the problem has a specimen."""
     if problem.specimen is not None:
-        raise InputError(
-            f"problem.specimen: {what} applies to half-spaces, not to finite blocks. {instead}"
-        )
+        raise InputError(f"problem.specimen: {what} applies to half-spaces only. {instead}")
 
 
 def refusals(problem: Problem, method: Any) -> list[str]:

@@ -29,7 +29,7 @@ from stiction.base.errors import InputError, prefixed, unknown_name, warn_accura
 from stiction.base.model import FilePath, Number, check, checked
 from stiction.base.units import as_numbers, check_measured, profile_in_si
 from stiction.base.variables import PROFILES, QUANTITIES
-from stiction.problem.checks import check_resolution, steepest_weakening_rate
+from stiction.problem.checks import check_resolution
 from stiction.problem.interface import Interface
 from stiction.problem.reading.columns import Reading, Wanted
 from stiction.problem.reading.files import load
@@ -67,9 +67,7 @@ def named_profiles(given: Any) -> dict[str, Any]:
     if not isinstance(given, Mapping):  # a Dataset is one too
         return {"strength": given}
     known = (*PROFILES, "friction_coefficient")
-    unknown = [
-        unknown_name("profiles", str(name), known) for name in given if name not in known
-    ]
+    unknown = [unknown_name("profiles", str(key), known) for key in given if key not in known]
     if "strength" in given and "friction_coefficient" in given:
         unknown.append("profiles: give either strength (Pa) or friction_coefficient (1)")
     if unknown and not hasattr(given, "data_vars"):
@@ -133,10 +131,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
             f"strength is not above residual_strength at {100.0 * constant.mean():.2g} % of"
             " the nodes. These do not weaken: their strength is constant"
         )
-    steepest = steepest_weakening_rate(
-        sample.strength, sample.residual_strength, sample.weakening_rate
-    )
-    check_resolution(problem, steepest * problem.friction.steepening)
+    check_resolution(problem, sample.steepest_weakening_rate)
     return sample
 
 
@@ -288,9 +283,8 @@ def read_profile(
         if interface is None:
             array = _in_order(array)
         else:
-            (values,) = as_rows(
-                on_nodes(array, quantity, interface), "strength", interface
-            ).values
+            placed = on_nodes(array, quantity, interface)
+            (values,) = as_rows(placed, "strength", interface).values
             array = xr.DataArray(values, interface.coordinates, interface.dims)
     for dim in {"x", "y"} & {*array.coords}:
         array[dim].attrs.update(units="m", long_name=f"position along {dim}")

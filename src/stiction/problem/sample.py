@@ -131,9 +131,7 @@ class Sample(Result, _Profiles):
     @property
     def steepest_weakening_rate(self) -> float:
         """Largest weakening rate at any slip, Pa/m, among nodes that may break."""
-        first = steepest_weakening_rate(
-            self.strength, self.residual_strength, self.weakening_rate
-        )
+        first = steepest_weakening_rate(*self[:3])
         return first * float(self.problem.friction.steepening)
 
     def mean_stress(self, load: Array) -> Array:
@@ -297,8 +295,7 @@ def refuse_missing(values: Array, interface: Interface) -> None:
         f"values are missing (NaN) at {rows[row].sum()} of {interface.size} nodes"
         f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
         f" {interface.describe_node(int(np.argmax(rows[row])))}. Make interface.length the"
-        " length of the record, or draw equally likely values there with"
-        " RandomField.given(profile)"
+        " length of the record, or draw values there with RandomField.given(profile)"
     )
 
 
@@ -319,8 +316,7 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
         raise InputError(f"must be positive, got {given}")
     if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
         raise InputError(
-            f"its mean is {array.mean():.3g}; if that is a strength, state its unit, as"
-            " .assign_attrs(units='Pa') does"
+            f"its mean is {array.mean():.3g}. A strength needs .assign_attrs(units='Pa')"
         )
     if name == "residual_strength" and least < 0.0:
         raise InputError(f"must not be negative, got {given}")

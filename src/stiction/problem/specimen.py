@@ -129,13 +129,12 @@ class TopShear(Listed):
     type: Literal["top_shear"] = "top_shear"
 
 
-DRIVES = Kinds(
-    "drives", {"platen": "problem.specimen:Platen", "pusher": "problem.specimen:Pusher"}
-)
-SLIDER_DRIVES = Kinds(
-    "drives of sliders",
-    {"pusher": "problem.specimen:Pusher", "top_shear": "problem.specimen:TopShear"},
-)
+def _kinds(family: str, **names: str) -> Kinds:
+    return Kinds(family, {key: f"problem.specimen:{name}" for key, name in names.items()})
+
+
+DRIVES = _kinds("drives", platen="Platen", pusher="Pusher")
+SLIDER_DRIVES = _kinds("drives of sliders", pusher="Pusher", top_shear="TopShear")
 
 
 def _only(*kinds: type) -> Callable[[Any], Any]:
@@ -150,9 +149,8 @@ def _beyond_side(drive: Any, height: float) -> list[str]:
     if low >= -1e-9 * height and high <= (1.0 + 1e-9) * height:
         return []
     width = 2.0 * min(drive.height, height - drive.height)
-    fitting = (
-        f"width {width:.6g}" if width > 0.0 else f"height {height - 0.5 * drive.width:.6g}"
-    )
+    highest = height - 0.5 * drive.width
+    fitting = f"width {width:.6g}" if width > 0.0 else f"height {highest:.6g}"
     return [
         f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the side from"
         f" 0 to {height:g} m. The largest {fitting} m fits"
@@ -376,8 +374,7 @@ class Slider(Listed):
         if mode != "II":
             problems.append("mode: a slider is sheared in its plane. Leave 'II'")
         if base.solid is not None and base.solid.plane != solid.plane:
-            text = "specimen.base.solid.plane: must be the plane state of the slider"
-            problems.append(f"{text}, {solid.plane!r}")
+            problems.append(f"specimen.base.solid.plane: must be the slider's {solid.plane!r}")
         sizes = {"height": self.height, "base.height": base.height}
         resolved = {name: 0.5 * size for name, size in sizes.items()}
         if isinstance(self.drive, Pusher):
@@ -414,8 +411,7 @@ class Slider(Listed):
         if (limit := limits.min(initial=np.inf)) < peak.max():
             raise InputError(
                 "specimen.base.solid: differs so much from the slider that the path is defined for"
-                f" friction coefficients up to {limit:.3g} only, got {peak.max():.3g}. With more,"
-                " slip at a node loads nodes next to it"
+                f" friction coefficients up to {limit:.3g} only, got {peak.max():.3g}"
             )
         least, ratio = residual.mean(axis=-1).max(), self.toppling_ratio(length)
         if least >= ratio:
@@ -427,7 +423,5 @@ class Slider(Listed):
         return np.maximum(-n * on_cells(rig.T_p[n:]), MIN_PRESSURE)
 
 
-SPECIMENS = Kinds(
-    "specimens", {"blocks": "problem.specimen:Blocks", "slider": "problem.specimen:Slider"}
-)
+SPECIMENS = _kinds("specimens", blocks="Blocks", slider="Slider")
 Specimen = Annotated[Blocks | Slider, OneOf(SPECIMENS, _only(Blocks, Slider), default="blocks")]

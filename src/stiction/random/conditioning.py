@@ -438,7 +438,5 @@ def conditioning_of(
         rows.append(phi)
     whole = np.concatenate(rows)
     used = np.flatnonzero(whole.any(axis=0))
-    measured = Measured(
-        marginals, np.concatenate(values), np.concatenate(noises), whole[:, used]
-    )
-    return used, conditioned(measured)
+    measured, errors = np.concatenate(values), np.concatenate(noises)
+    return used, conditioned(Measured(marginals, measured, errors, whole[:, used]))

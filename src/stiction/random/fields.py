@@ -171,9 +171,8 @@ class RandomField(Listed):
         too short for a field without mean mode.
         """
         self._alone.warn_if_inaccurate(interface)
-        return self._alone.profiles(interface, samples=samples, seed=seed, first=first)[
-            "strength"
-        ]
+        profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
+        return profiles["strength"]
 
     @cached_property
     def _alone(self) -> RandomInterface:
@@ -356,9 +355,7 @@ class RandomInterface(Listed):
         for table, given, valid in (
             ("correlation", named, self.names), ("between", between, FACTORS)
         ):  # fmt: skip
-            problems += [
-                unknown_name(table, name, valid) for name in given if name not in valid
-            ]
+            problems += [unknown_name(table, key, valid) for key in given if key not in valid]
         if {"normal_pressure", "pressing_force"} <= {*between}:
             problems.append("between: give one of normal_pressure and pressing_force, got both")
         for name, marginal in between.items():

@@ -131,9 +131,8 @@ def quantile_table(marginal: Any) -> Array:
     interpolate(checks.ravel(), table, interpolated)
     # Errors are relative to the value, but not at its zero crossing.
     scale = np.maximum(np.abs(exact), 1e-6 * distribution.std())
-    wrong = ~(np.abs(interpolated.reshape(checks.shape) - exact) <= TABLE_RTOL * scale).all(
-        axis=1
-    )
+    error = np.abs(interpolated.reshape(checks.shape) - exact)
+    wrong = ~(error <= TABLE_RTOL * scale).all(axis=1)
     # A NaN slope marks the piece, and the
     # piece before it, which has the same node.
     result = table.copy()

@@ -200,9 +200,7 @@ class Weibull(_ByMoments):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
-            raise InputError(
-                f"cv: must be 0.001 to 10 as a fraction of mean - low, got {ratio:g}"
-            )
+            raise InputError(f"cv: over mean - low must be 0.001 to 10, got {ratio:g}")
 
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)
@@ -267,9 +265,8 @@ class TruncatedNormal(_ByMoments):
 
         def moments(guess: Any) -> Any:
             mean, variance = scipy.stats.truncnorm.stats(*parameters(guess))
-            return np.array(
-                [(mean - self.mean) / deviation, np.sqrt(variance) / deviation - 1.0]
-            )
+            spread = np.sqrt(variance) / deviation
+            return np.array([(mean - self.mean) / deviation, spread - 1.0])
 
         # The widest distributions: exponential, and with two bounds uniform.
         excess = self.mean - self.low
@@ -307,8 +304,7 @@ class ScipyMarginal(Marginal):
         """Return the table that describes this marginal in a study file."""
         if self.frozen is not None:
             raise ValueError(
-                f"marginal is the Python distribution {self.type!r}, which scipy does not know by"
-                " name"
+                f"marginal is the Python distribution {self.type!r}, which scipy does not know"
             )
         return {"type": self.type, **dict(self.parameters)}
 

@@ -147,10 +147,8 @@ def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
         before, lag = lag, lag + max(above / slope, step)
         above = excess(lag)
         step *= 1.005  # longer steps for spectra with little power near their truncation
-    ratio: float = brentq(
-        lambda ratio: excess(ratio * lag), before / lag, 1.0, xtol=1e-15, rtol=1e-14
-    )
-    return ratio * lag
+    tight: Any = {"xtol": 1e-15, "rtol": 1e-14}
+    return lag * brentq(lambda ratio: excess(ratio * lag), before / lag, 1.0, **tight)
 
 
 @model

@@ -304,12 +304,10 @@ class Answer(Result):
         interval = {} if self.algorithm == "exact" and not self.cv else self.interval
         unit, scale = self._demand
         characteristic, low, high = scale * self.characteristic_stress, *self.band
-        rows = [
-            Row(
-                name.replace("_", " "), values[name][0], interval.get(name, ()), values[name][1]
-            )
-            for name in names
-        ]
+        rows = []
+        for name in names:
+            value, si = values[name]
+            rows.append(Row(name.replace("_", " "), value, interval.get(name, ()), si))
         rows += [
             Row("coefficient of variation", self.cv or math.nan),
             Row("part of it by the list of interfaces", self.members_cv or math.nan),
@@ -318,9 +316,7 @@ class Answer(Result):
             Row("fraction that survives any stress", self.survived or math.nan),
             Row("reliability index", self.reliability_index),
             Row("lower bound of the stress", self.lower_bound or math.nan, (), "Pa"),
-            Row(
-                f"5 % value, confidence {100.0 * self.confidence:g} %", characteristic, (), unit
-            ),
+            Row(f"5 % value, confidence {100 * self.confidence:g} %", characteristic, (), unit),
             Row("partial factor", self.partial_factor),
         ]
         known = [row for row in rows if math.isfinite(row.value)]
@@ -329,9 +325,7 @@ class Answer(Result):
             title = "No stress has this probability"
         notes = [f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"]
         if moves := moves_of(self):
-            notes.append(
-                "the interval is the error of the computation only; the design moves by:"
-            )
+            notes.append("interval: the error of the computation only. The design moves by:")
         for source, least, most, *designs in moves:
             ends = " to ".join(filter(None, (least, most)))
             notes.append(f"  {source}: {ends}: {' to '.join(filter(None, designs))}")

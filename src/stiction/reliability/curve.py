@@ -147,9 +147,8 @@ def failure_curve(
         state = weakest_first(state)
         goal = Goal(sampling_target(state, target_cv), probability=smallest)
         tail = sample_curve(state, goal, budget)
-        return TailPoint(
-            state, tail, tail.quantile(smallest) if tail.complete else tail.reached
-        )
+        stress = tail.quantile(smallest) if tail.complete else tail.reached
+        return TailPoint(state, tail, stress)
 
     with Meter("failure_curve", show=progress) as meter, merge_warnings() as warned:
         warn_of_field(experiment)

@@ -157,11 +157,8 @@ def design_stress(
     def solve(experiment: Experiment, meter: Meter, spent: int) -> Answer:
         state, budget = prepare(experiment, workers, meter, max_evaluations, spent=spent)
         answer = _quantile(state, probability, target_cv, budget, confidence)
-        wanted = (
-            experiment.random.source is not None
-            if sensitivities is None
-            else bool(sensitivities)
-        )
+        by_default = experiment.random.source is not None
+        wanted = by_default if sensitivities is None else bool(sensitivities)
         if wanted and math.isfinite(answer.stress):
             stated = sensitivities if isinstance(sensitivities, dict) else {}
             effects = sensitivities_of(state, probability, answer.stress, stated)
@@ -194,9 +191,8 @@ def _quantile(
     # characteristic value.
     counts, enough = count_tail(state, goal, budget)
     if counts:
-        asked |= {
-            "characteristic_stress": counts.characteristic(confidence), "confidence": confidence
-        }  # fmt: skip
+        asked["characteristic_stress"] = counts.characteristic(confidence)
+        asked["confidence"] = confidence
     if counts and enough:
         tail = counts.tail
     else:

@@ -131,9 +131,8 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
     if stresses[high] < UNDETERMINED * stresses[low]:
         return []
     area = state.experiment.problem.area
-    ends = [
-        in_words("N" if area else "Pa", (area or 1.0) * stresses[name]) for name in (high, low)
-    ]
+    unit, scale = ("N", area) if area else ("Pa", 1.0)
+    ends = [in_words(unit, scale * stresses[name]) for name in (high, low)]
     needed = math.ceil(math.log(ODDS) / law.divergence(low, high))
     return [
         f"the tests do not determine P = {probability:g}: the {high} family leads to"
@@ -207,8 +206,7 @@ def warn_of_field(experiment: Experiment) -> None:
     """Warn about the field of a fit in place of a fit with scatter between specimens."""
     if specimens_of_fit(experiment.random):
         warn_accuracy(
-            "random: is the field of a fit, without the scatter between specimens, so that failures"
-            " are too rare. Pass the fit itself"
+            "random: is the field of a fit, without the scatter between specimens. Pass the fit"
         )
 
 

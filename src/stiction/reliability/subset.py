@@ -280,9 +280,8 @@ def descend(
     check_memory("algorithm 'subset'", STORED_COPIES * 8.0 * samples * dimension, ADVICE)
     # 1. plain samples
     draws = rng.standard_normal((samples, dimension))
-    populations = [
-        Population(math.inf, 0.0, function(draws), np.arange(samples), label(draws), draws)
-    ]
+    level = Population(math.inf, 0.0, function(draws), np.arange(samples), label(draws), draws)
+    populations = [level]
     evaluations = samples
     while True:
         here = populations[-1]
@@ -313,13 +312,10 @@ def descend(
         if complete or stuck or evaluations + cost > max_evaluations:
             return Descent(samples, populations, lowest, evaluations, complete)
         # 5. back to full number
-        states, chain_values, acceptance, step = grow(
+        states, values, acceptance, step = grow(
             function, here.draws[seeds], values[seeds], lowest, steps, here.step, rng
         )
-        family = np.tile(here.ancestors[seeds], steps)
-        populations.append(
-            Population(
-                lowest, reached, chain_values, family, label(states), states, acceptance, step
-            )
-        )
+        family, members = np.tile(here.ancestors[seeds], steps), label(states)
+        level = Population(lowest, reached, values, family, members, states, acceptance, step)
+        populations.append(level)
         evaluations += cost

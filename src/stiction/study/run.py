@@ -41,9 +41,7 @@ def _part(value: Any) -> tuple[int, int]:
     match = re.fullmatch(r"(\d+)/(\d+)", value, re.ASCII) if isinstance(value, str) else None
     number, of = map(int, match.groups()) if match else (0, 0)
     if not 1 <= number <= of:
-        raise ValueError(
-            "must be K/N with K from 1 to N, such as '3/100' for the third of 100 parts"
-        )
+        raise ValueError("must be K/N with K from 1 to N, such as 3/100 for the third part")
     return number, of
 
 
@@ -177,9 +175,8 @@ class StoredRun:
         rows, place = self._read(), check("path", path, FilePath)
         if not (partial or rows.done.all()):
             raise RunError(
-                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} samples exist."
-                " Run the study again to compute the others, or export a part: partial=True, in"
-                " a shell --partial"
+                f"{self.path}: {int(rows.done.sum())} of {rows.done.size} samples exist. Run the"
+                " study again, or export a part: partial=True, in a shell --partial"
             )
         result = self._checked(rows)
         if place.suffix == ".nc" and not events:
@@ -210,9 +207,7 @@ def write_result(result: xr.Dataset, path: Path) -> None:
         for name, variable in result.variables.items()
         if variable.ndim and variable.size and variable.dtype.kind in "fiub"
     }
-    write_whole(
-        path, lambda aside: result.to_netcdf(aside, engine="h5netcdf", encoding=encoding)
-    )
+    write_whole(path, lambda file: result.to_netcdf(file, engine="h5netcdf", encoding=encoding))
 
 
 def event_table(result: xr.Dataset) -> pd.DataFrame:

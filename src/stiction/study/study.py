@@ -75,20 +75,21 @@ _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 MOST_WRITTEN = 8
 """Random interfaces that a study file holds itself; more of them are in
 a file next to it."""
-MethodOfStudy: Any = Annotated[
-    Any,
-    OneOf(
-        METHODS, lambda given: NotImplemented if isinstance(given, dict) else as_method(given)
-    ),
-    "Method",
-]
+
+
+def _method(given: Any) -> Any:
+    return NotImplemented if isinstance(given, dict) else as_method(given)
+
+
+MethodOfStudy: Any = Annotated[Any, OneOf(METHODS, _method), "Method"]
 """Any registered method. In a study file ``type`` selects it."""
-_Interface: Any = Annotated[
-    RandomInterface,
-    BeforeValidator(
-        lambda given: as_random_interface(given) if isinstance(given, RandomField) else given
-    ),
-]
+
+
+def _interface(given: Any) -> Any:
+    return as_random_interface(given) if isinstance(given, RandomField) else given
+
+
+_Interface: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
 
 
 def _interfaces(given: Any) -> Any:
@@ -184,11 +185,8 @@ class Question:
 
     def answer(self, experiment: Experiment, workers: int | None = None) -> Answer:
         """Answer the question for a point of a study."""
-        options = self._given | {
-            "method": experiment.method,
-            "seed": experiment.seed,
-            "workers": workers,
-        }
+        options = self._given | {"method": experiment.method, "workers": workers}
+        options["seed"] = experiment.seed
         if self.probability is None:
             return failure_probability(experiment.problem, experiment.random, **options)
         options["sensitivities"] = True
@@ -265,8 +263,7 @@ class Study(_Parts):
         wide = [name for name in variables if {"x", "y"} & {*variables[name].dims}]
         if wide and len({point.problem.interface for point in points}) > 1:
             raise InputError(
-                f"sweep: {', '.join(wide)} cannot be kept along an interface that is swept. Make a"
-                " separate study for each interface"
+                f"sweep: {', '.join(wide)} cannot be kept along a swept interface. Split the study"
             )
         if self.reliability is not None:
             with merge_warnings():
@@ -438,7 +435,7 @@ class Study(_Parts):
             given = json.loads(result.attrs["study"])
         except (AttributeError, KeyError, TypeError, ValueError):
             raise InputError(
-                "result: must be a dataset with the study, as JSON, in its attribute 'study'"
+                "result: must hold a study as JSON in its attribute 'study'"
             ) from None
         return cls.from_dict(given)
 
@@ -455,9 +452,7 @@ def _check_toml(content: bytes) -> None:
             line = line[: match.start(1)]
         words += len(line)
         if line.count(b".") > MAX_DOTS and not line.lstrip().startswith(b"#"):
-            raise InputError(
-                f"has a line with more than {MAX_DOTS} dots apart from its numbers"
-            )
+            raise InputError(f"has a line with over {MAX_DOTS} dots apart from numbers")
     if words > MAX_TOML_WORDS or len(content) > MAX_TOML_BYTES:
         raise InputError(
             f"has more than {MAX_TOML_BYTES} bytes, or {MAX_TOML_WORDS} outside lists of numbers."
@@ -473,9 +468,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         try:
             text = content.decode("utf-16" if wide else "utf-8-sig")
         except UnicodeDecodeError as error:
-            raise InputError(
-                f"is not text in UTF-8 (byte {error.start}). Save it as UTF-8"
-            ) from None
+            raise InputError(f"is not UTF-8 (byte {error.start}). Save it as UTF-8") from None
         _check_toml(text.encode())
         try:
             return tomllib.loads(text)

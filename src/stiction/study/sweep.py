@@ -78,6 +78,10 @@ def _flat(given: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return result
 
 
+def _long(key: str) -> str:
+    return full_key(key) if key.split(".")[0] in SHORT_KEYS else key
+
+
 def read_axes(given: Any) -> list[Axis]:
     """Return the axes of a sweep from tables in a study."""
     if not isinstance(given, list | tuple):
@@ -86,12 +90,7 @@ def read_axes(given: Any) -> list[Axis]:
     for number, table in enumerate(given):
         with prefixed(f"[{number}]"):
             # Keys of the strength may omit their beginning, as in a prior.
-            axes.append(
-                {
-                    full_key(key) if key.split(".")[0] in SHORT_KEYS else key: values
-                    for key, values in _axis(table).items()
-                }
-            )
+            axes.append({_long(key): values for key, values in _axis(table).items()})
     keys = [key for axis in axes for key in axis]
     problems: dict[str, None] = {}
     for key in keys:

@@ -130,9 +130,8 @@ class FrictionLaw(Listed):
             if below > MAX_REACH:
                 return math.inf
         while (middle := 0.5 * (above + below)) not in (above, below):
-            above, below = (
-                (middle, below) if self.fraction(middle) > fraction else (above, middle)
-            )
+            higher = self.fraction(middle) > fraction
+            above, below = (middle, below) if higher else (above, middle)
         return below
 
     def fraction(self, u: Any) -> Array:
@@ -181,9 +180,8 @@ class FrictionLaw(Listed):
     @cached_property
     def scale(self) -> tuple[str, Any] | None:
         """Name and value of the given scale (W, d_c or Gamma), or None if it is in the profiles."""
-        return next(
-            ((s, getattr(self, s)) for s in SCALES if getattr(self, s) is not None), None
-        )
+        given = ((name, getattr(self, name)) for name in SCALES)
+        return next((pair for pair in given if pair[1] is not None), None)
 
     def residual(self, strength: Array) -> Array:
         """Return tau_r, Pa, for a peak strength (Pa, with any shape)."""
@@ -347,15 +345,12 @@ class PiecewiseWeakening(FrictionLaw):
             given = f"{slip.size - 1} and {strength.size - 1}"
             raise InputError(f"slip and strength: give a number for each corner, got {given}")
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
-            raise InputError(
-                f"slip: must increase, begin above 0 and end at exactly 1, got {self.slip}"
-            )
+            raise InputError(f"slip: must increase from above 0 to exactly 1, got {self.slip}")
         falls = -np.diff(strength)
         if np.any(falls[1:] <= 0.0) or falls[0] < 0.0 or strength[-1] != 0.0:
             raise InputError(
-                "strength: must decrease at every corner and end at exactly 0; only the first value"
-                f" may be 1, got {self.strength}. Replace a later plateau by a slight fall, and"
-                " start the law at the top of a hump"
+                "strength: must decrease at every corner and end at exactly 0. Only the first value"
+                f" may be 1, got {self.strength}. Start the law at the top of a hump"
             )
         return self
 
@@ -481,9 +476,7 @@ def contradictions(law: FrictionLaw) -> list[str]:
     # compiles.
     name, parameters = type(law).__name__, law.parameters
     if not all(hasattr(parameters, name) for name in ("_fields", "f", "initial_slope")):
-        return [
-            f"{name}: its parameters must be a NamedTuple with initial_slope and f(self, u)"
-        ]
+        return [f"{name}: parameters must be a NamedTuple with initial_slope and f(self, u)"]
     if not 0.0 < law.reach < np.inf:
         return [
             f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"

@@ -203,9 +203,7 @@ def unclear(
     columns: Sequence[Column], quantity: str, argument: str, likely: Sequence[Column] = ()
 ) -> str:
     """Return the message that refuses a choice, with all columns and the argument to add."""
-    listed = [
-        f"{column} ({'no numbers' if column.text else role_of(column)})" for column in columns
-    ]
+    listed = [f"{c} ({'no numbers' if c.text else role_of(c)})" for c in columns]
     more = f" and {len(listed) - MAX_LISTED} more" * (len(listed) > MAX_LISTED)
     headings = [column.label for column in columns]
     arguments = [

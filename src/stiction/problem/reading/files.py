@@ -101,9 +101,7 @@ def load(path: Path, options: Options) -> Table | xr.Dataset | Array:
     if ending in NETCDF:
         return _read_netcdf(content_of(path))
     endings = ", ".join((*TEXT, EXCEL, ".npy", *NETCDF))
-    raise InputError(
-        f"must end in {endings}, got {path.name!r}. Export text from the instrument"
-    )
+    raise InputError(f"must end in {endings}, got {path.name!r}. Export it as text")
 
 
 def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008  # a tuple

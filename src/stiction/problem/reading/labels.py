@@ -175,9 +175,7 @@ def named(
         if hasattr(data, "data_vars"):
             array, read = _of_dataset(data, quantity, dims, value)
         elif value not in (None, data.name):
-            raise InputError(
-                f"value: {value!r} is not the name of the only variable, {data.name!r}"
-            )
+            raise InputError(f"value: {value!r} is not the only variable, {data.name!r}")
         if x is not None or {*array.coords} != {*dims}:
             array = _with_places(array, dims, x)
     # 2. The dimensions.
@@ -249,9 +247,7 @@ def _with_places(array: Any, dims: tuple[str, ...], x: Wanted) -> Any:
             raise InputError(unknown_name("x", str(x), [*map(str, array.coords)]))
         along, called = {"x": array[x].variable}, ["x"]
     if len(called) > len(dims):
-        raise InputError(
-            f"coordinates {' and '.join(called)} could be the position x. Pass x={called[0]!r}"
-        )
+        raise InputError(f"coordinates {' and '.join(called)} could be x. Pass x={called[0]!r}")
     places = {name if len(dims) == 2 else "x": along[name] for name in called}
     dropped = [name for name in array.coords if name not in array.dims]
     return array.drop_vars(dropped).assign_coords(places)
@@ -262,8 +258,7 @@ def several_tables(table: Table) -> str:
     lines = ", ".join(map(str, table.begins[:5])) + ", ..." * (len(table.begins) > 5)
     return (
         f"holds {len(table.begins)} tables with remarks between them, which begin at lines {lines}."
-        " Pass skip= with the number of lines above the last one, or save the wanted table in a"
-        " file of its own"
+        " Pass skip= with the number of lines above the last one, or save the wanted table alone"
     )
 
 
