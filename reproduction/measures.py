@@ -19,7 +19,7 @@ from reproduction.setting import DROP, FIRST, HIGH, LAST, LOW, MEAN, RATIOS, SIM
 from reproduction.studies import NORMAL, READINGS, infinite_variance_ratio
 from stiction.statistics import density
 
-RESIDUAL, SECOND = setting.RESIDUAL, setting.SECOND
+RESIDUAL = setting.RESIDUAL
 SPACING = setting.PROBLEM.interface.spacing
 POINT_SKEWNESS = float(setting.MARGINAL.distribution.stats(moments="s"))
 Rows = list[tuple[float | str, Number]]
@@ -316,7 +316,7 @@ def arrest_shares(d: Data, name: str, chosen=None) -> Rows:
 
 def so_many(d: Data, events) -> Number:
     """Return the chance of so many ruptures with arrested events if the strength alone varied."""
-    return estimates.chance_of_so_many(np.asarray(events) > 0, arrested_again(d, SECOND))
+    return estimates.chance_of_so_many(np.greater(events, 0), arrested_again(d, setting.SECOND))
 
 
 def skewed(d: Data, skew: int, ratio: float) -> np.ndarray:

@@ -20,7 +20,7 @@ PRINTED_RATIOS = (0.25, 0.5, 1.0, 2.0)  # xi_0/h_n of the paper's Monte Carlo st
 PRINTED_RATE = 2e7  # loading rate of the ruptures, Pa/s. The paper does not give its own
 OWN_KEYS = ("correlation_ratios", "loading_rate")
 MAX_RATIOS = 6  # as many correlation lengths can be told apart in a figure
-MIN_NODES = 16  # fewest nodes in the nucleation length
+MIN_NODES_SPANNED = 16  # fewest nodes in the nucleation length
 TAIL = 1e-4  # probability beyond each end of the range shown of an unbounded strength
 
 
@@ -72,10 +72,10 @@ def _check(study: st.Study) -> None:
         mistakes += [] if mistakes else method.supports(problem)
     if not mistakes:
         span = problem.nucleation_length / problem.interface.spacing
-        if span < MIN_NODES:
-            nodes = 2 * int(np.ceil(0.5 * problem.interface.size * MIN_NODES / span))
+        if span < MIN_NODES_SPANNED:
+            nodes = 2 * int(np.ceil(0.5 * problem.interface.size * MIN_NODES_SPANNED / span))
             mistakes.append(f"problem.interface.nodes: the nucleation length spans {span:.1f} nodes"
-                            f" of at least {MIN_NODES}; give {nodes} or more")  # fmt: skip
+                            f" of at least {MIN_NODES_SPANNED}; give {nodes} or more")  # fmt: skip
         mean = study.random.properties["strength"].marginal.distribution.mean()
         if not 1e-7 < mean / problem.effective_modulus < 0.1:
             mistakes.append(f"random.strength.marginal: a mean of {mean:g} Pa beside a modulus of"

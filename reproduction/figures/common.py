@@ -8,7 +8,7 @@ from reproduction.setting import HIGH, LOW, MEAN, RATIOS
 
 WIDTH = 4.5  # inches; type of 8.5 points is then 9 pixels high on a screen of 390 pixels
 DASHES = ("-", "--", "-.", ":", (0, (7.0, 1.5, 1.0, 1.5, 1.0, 1.5)), (0, (2.5, 2.5)))
-STRENGTHS = (LOW / MEAN, HIGH / MEAN)  # the range of the strength over its mean
+STRENGTH_RANGE = (LOW / MEAN, HIGH / MEAN)  # the range of the strength over its mean
 XI = r"$\xi_0/h_\mathrm{n}$"
 
 

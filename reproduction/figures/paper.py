@@ -31,7 +31,7 @@ def figure_1(d: Data):
     law.annotate("$W$", (0.42, 0.6), (0.62, 0.75))
     tau_p = d["representative"]["strength"].values / MEAN
     field.plot(X, tau_p, color="C0", lw=0.9)
-    low, high = common.span(tau_p, common.STRENGTHS)
+    low, high = common.span(tau_p, common.STRENGTH_RANGE)
     # The upper half is for the inset.
     field.set(xlim=(0, 1), ylim=(low, 2.1 * high - 1.1 * low))
     inset = field.inset_axes((0.3, 0.68, 0.66, 0.32))
@@ -191,7 +191,7 @@ def figure_5(d: Data):
     fields = [first, *fields]
     s = np.linspace(LOW, HIGH, 300)
     strengths.plot(LAW.pdf(s) * MEAN, s / MEAN, color="black")
-    low, high = common.span(common.STRENGTHS)
+    low, high = common.span(common.STRENGTH_RANGE)
     strengths.set(ylim=(low, high))
     shown = {minima: [], nucleation: [], stress: []}
     for ratio, strip in zip(RATIOS, fields, strict=True):

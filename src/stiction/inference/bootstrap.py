@@ -50,14 +50,14 @@ from stiction.base.errors import InputError
 from stiction.base.progress import Meter, Show
 from stiction.inference.estimate import BestFit, estimate
 from stiction.inference.marginal_fit import LEAST_SHAPE, WIDEST, Family, beta_of
-from stiction.inference.whittle import NAMES, RANGES, offset
+from stiction.inference.whittle import OF_SPECTRUM, RANGES, offset
 from stiction.random.dotted_keys import full_key, with_values
 from stiction.random.fields import RandomField
 from stiction.random.marginals import Beta
 
-CONFIDENCE = 0.9
+FIT_CONFIDENCE = 0.9
 """Level of the intervals, as everywhere in the package."""
-TAILS = 0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE)
+TAILS = 0.5 * (1.0 - FIT_CONFIDENCE), 0.5 * (1.0 + FIT_CONFIDENCE)
 """Probabilities below the ends of an interval."""
 MIN_REPETITIONS = 20
 """Fewest repetitions that determine a tail of errors."""
@@ -285,7 +285,7 @@ def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField
     field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)
     free: dict[str, list[float]] = {}
     for name in fitted.parameters:
-        if name == "mean" or name.startswith("marginal.") or name in NAMES:
+        if name == "mean" or name.startswith("marginal.") or name in OF_SPECTRUM:
             scale = scale_of(name, [repeated])
             places = scale.less(fitted, repeated).tolist()
             means = free.get("mean", places)  # bounds are given by their distance from the mean

@@ -58,7 +58,7 @@ from stiction.base.errors import InputError, UnitWarning, collect_warnings, issu
 from stiction.inference.marginal_fit import Family, mean_log_likelihood
 from stiction.inference.records import Record
 from stiction.inference.whittle import (
-    NAMES,
+    OF_SPECTRUM,
     Model,
     Observed,
     SpectrumFamily,
@@ -128,7 +128,7 @@ class BestFit:
         of_marginal = self.setting.marginal.parameters(self.marginal)
         values |= {f"marginal.{name}": value for name, value in of_marginal.items()}
         free = self.setting.spectrum.of(self.model)
-        values |= {name: value for name, value in free.items() if name in NAMES}
+        values |= {name: value for name, value in free.items() if name in OF_SPECTRUM}
         if "noise_share" in free:
             values["noise"] = self.model.noise
         return values

@@ -47,7 +47,7 @@ from stiction.base.model import Count, Flag, NotNegative, Number, Positive, Prog
 from stiction.base.representation import Result, Row, Summary
 from stiction.base.variables import QUANTITIES, unit_of_key
 from stiction.inference.bootstrap import (
-    CONFIDENCE,
+    FIT_CONFIDENCE,
     MIN_REPETITIONS,
     TAILS,
     NotRepeated,
@@ -338,7 +338,7 @@ class FieldFit(WithFactors, Result):
             lines.append(f"scores of families: {scores}{tied}")
         lines.append(f"p-values: {p_values} ({len(self.repetitions)} repetitions)")
         lines += [f"! {doubt}" for doubt in self.doubts]
-        return Summary(title, rows, f"{100 * CONFIDENCE:g} % interval", lines)
+        return Summary(title, rows, f"{100 * FIT_CONFIDENCE:g} % interval", lines)
 
 
 @checked

@@ -74,7 +74,7 @@ letter."""
 SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
 """Beginnings of the heading of a column that says which specimen was
 tested."""
-COEFFICIENTS = (0.05, 1.0)
+SLIP_FACTORS = (0.05, 1.0)
 """Range of slip factors. Swapped columns or units lead far beyond it."""
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
 """Variable of a method that each unit measures."""
@@ -445,11 +445,11 @@ def _coefficients(values: Array, forces: Array, si: str, surfaces: int) -> Array
     """Return friction coefficients, and refuse those that swapped columns or units would give."""
     coefficients = values / (surfaces * forces)
     typical = float(np.median(coefficients))
-    if not COEFFICIENTS[0] <= typical <= COEFFICIENTS[1]:
+    if not SLIP_FACTORS[0] <= typical <= SLIP_FACTORS[1]:
         raise InputError(
             f"normal: the median friction coefficient would be {typical:.3g}, from"
             f" {np.median(values):.4g} {si} over {surfaces} times {np.median(forces):.4g} {si}."
-            f" Slip factors lie between {COEFFICIENTS[0]:g} and {COEFFICIENTS[1]:g}. Check that the"
+            f" Slip factors lie between {SLIP_FACTORS[0]:g} and {SLIP_FACTORS[1]:g}. Check that the"
             " two columns are not swapped, their units, and surfaces="
         )
     return coefficients

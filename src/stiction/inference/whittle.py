@@ -75,10 +75,10 @@ FLOOR = 1e-3
 """Floor as a fraction of the highest power, which is averaged over
 records and neighbours."""
 NEIGHBOURS = 5
-ORDERS, COARSE = 10, 0.1
+MAP_ORDERS, MAP_STEP = 10, 0.1
 """Hermite orders of the map of a marginal, and steps of z that give
 them to 1e-4."""
-NAMES = ("correlation_length", "exponent", "anisotropy")
+OF_SPECTRUM = ("correlation_length", "exponent", "anisotropy")
 """Parameters of a spectrum, by their keys."""
 AT_END = 1e-3
 """Largest distance of an estimate at an end of a range, as a fraction
@@ -93,7 +93,7 @@ LONGEST = 1.5
 
 def hermite_shares(marginal: Any) -> Array:
     """Return the fractions of the variance in Hermite orders 0, 1, ... The last one is the rest."""
-    shares = hermite_coefficients(marginal, COARSE, ORDERS) ** 2
+    shares = hermite_coefficients(marginal, MAP_STEP, MAP_ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
 
@@ -239,7 +239,7 @@ class SpectrumFamily:
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
         pairs = zip(self.of(model).items(), near, strict=True)
-        return {name: value for (name, value), end in pairs if end and name in NAMES}
+        return {name: value for (name, value), end in pairs if end and name in OF_SPECTRUM}
 
 
 class Whittle(NamedTuple):

@@ -46,13 +46,13 @@ diagonal, for which a path is defined. It counts how much the slip of a
 cell loads another cell forwards."""
 
 
-_COEFFICIENTS = (
+_NEEDS_COEFFICIENTS = (
     "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1, a"
     " random field of coefficients, or friction.residual_ratio"
 )
 UNFIT_FOR_SLIDER = {
-    "strength": _COEFFICIENTS,
-    "residual_strength": _COEFFICIENTS,
+    "strength": _NEEDS_COEFFICIENTS,
+    "residual_strength": _NEEDS_COEFFICIENTS,
     "initial_stress": "follows from the pressing of a slider. Leave it out",
     "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
     "extent": "all of a slider can slip. Leave it out",

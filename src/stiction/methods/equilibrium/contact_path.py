@@ -79,9 +79,9 @@ Integers = NDArray[np.int64]
 
 RATE_RTOL = 1e-10
 """A rate below this fraction of its scale is round-off."""
-PIVOT_RTOL = 1e-9
+CONTACT_PIVOT_RTOL = 1e-9
 """Smallest positive pivot, as a fraction of the diagonal of M."""
-OVERSTRESS_RTOL = 1e-12
+CONTACT_OVERSTRESS_RTOL = 1e-12
 """Overstress that is round-off, as a fraction of the largest force."""
 MAX_EVENTS_PER_NODE = 64
 """Events for each cell and edge, on average, after which a path is
@@ -210,7 +210,7 @@ def _start(state: Contact, node: int) -> None:
         pivot -= entry * right[t]
         for r in range(k):
             left[r] += entry * inverse[t, r]
-    if not pivot > PIVOT_RTOL * abs(columns[node, node]):
+    if not pivot > CONTACT_PIVOT_RTOL * abs(columns[node, node]):
         state.stack[state.counts[N_STACKED]], state.motion[node] = node, Motion.UNSTABLE
         state.counts[N_STACKED] += 1
         return
@@ -311,7 +311,7 @@ def _nearest_kink(state: Contact, target: float) -> Kink:
     e, slowest = state.stack[held - 1], int(np.argmin(rate[:n]))  # without E, e is not read
     if rate[slowest] < -RATE_RTOL * fastest:
         return Kink(0.0, slowest, Kind.STOP)
-    if held and overstress[e] < -OVERSTRESS_RTOL * _largest(overstress):
+    if held and overstress[e] < -CONTACT_OVERSTRESS_RTOL * _largest(overstress):
         return Kink(0.0, e, Kind.RELEASE)
     forces = 0.0 if held else _largest(state.load)
     kink = Kink(np.inf if held else target - state.loads[LOAD], 0, Kind.TARGET)
@@ -319,7 +319,7 @@ def _nearest_kink(state: Contact, target: float) -> Kink:
         stiffness = abs(state.columns[i, i])
         least = RATE_RTOL * (stiffness * fastest + forces)
         if held and i == e:
-            least_pivot = max(least, PIVOT_RTOL * stiffness)
+            least_pivot = max(least, CONTACT_PIVOT_RTOL * stiffness)
             kink = _nearer(kink, overstress[i], -change[i], least_pivot, i, Kind.AT_STRENGTH)
         elif state.motion[i] == Motion.REST:
             kink = _nearer(kink, -overstress[i], change[i], least, i, Kind.START)

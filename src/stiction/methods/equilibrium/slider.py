@@ -62,12 +62,12 @@ OF_SLIDERS = {
 WITH_FIXED_PRESSURE = {"event_energy_stress_drop", "event_fracture_energy"}
 """Variables of events that are defined for a pressure that does not
 change."""
-STRENGTH_STEP = 1e-7
+COEFFICIENT_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
-MIN_NODES = 16
+NODES_AT_ENDS = 16
 """Nodes in a nucleation length without a warning about the ends of the
 slider."""
-COARSE = (
+COARSE_ENDS = (
     "stress is singular at the ends of the slider. At 17 nodes, twice as many move static friction"
     " by up to 0.04 % and the first instability by up to 0.5 %"
 )
@@ -286,7 +286,7 @@ class SliderSolver:
 
         The first dimension of each is the sample.
         """
-        warn_if_coarse(self.problem, rows.steepest_weakening_rate, MIN_NODES, COARSE)
+        warn_if_coarse(self.problem, rows.steepest_weakening_rate, NODES_AT_ENDS, COARSE_ENDS)
         pushes = [self.path(rows, row).follow() for row in range(rows.samples)]
         table = [self._values(rows, row, push) for row, push in enumerate(pushes)]
         flags = [(not push.known, push.topples, push.first is None) for push in pushes]
@@ -328,10 +328,10 @@ class SliderSolver:
             # Between events paths are straight, so a small step gives the exact derivative.
             values["sensitivity"] = np.full(n, np.nan)
             for node in range(n if first else 0):
-                path = self.path(rows, row, node, STRENGTH_STEP)
+                path = self.path(rows, row, node, COEFFICIENT_STEP)
                 path.move()
                 rise = (path.state().force - first.force) / self.length  # type: ignore[union-attr]
-                step = STRENGTH_STEP * rows.normal_pressure[row, node]
+                step = COEFFICIENT_STEP * rows.normal_pressure[row, node]
                 values["sensitivity"][node] = rise / step
         if most := self.options.events:
             values |= self.event_table(push, most)
