@@ -227,10 +227,8 @@ class Onsets:
             onsets = np.log(self.area * self.ratios[field].mean(axis=1))
             away = np.log(peaks)[:, None] - x - np.interp(x, self.at, onsets)
             return -0.5 * (away / deviation) ** 2 - np.log(deviation * peaks[:, None])
-        known, near = (
-            self.densities[field],
-            corners([Axis(0, self.at, np.positive)], x[:, None]),
-        )
+        known = self.densities[field]
+        near = corners([Axis(0, self.at, np.positive)], x[:, None])
         scales = self.area * np.stack([np.zeros(x.size), np.exp(x)])
         of_v, out = known.between(*near), np.empty((x.size, peaks.size))
         log_likelihoods(known.table, *near, of_v, scales, error, peaks, out)

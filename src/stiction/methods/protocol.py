@@ -166,9 +166,8 @@ def prepared(problem: Problem, method: Method) -> Solver:
     # Other layers read these variables from any method.
     lacking = [name for name in ONSET_VARIABLES if name not in variables]
     if lacking:
-        raise InputError(
-            f"method: the variables of {method.label} must include {', '.join(lacking)}"
-        )
+        names = ", ".join(lacking)
+        raise InputError(f"method: the variables of {method.label} must include {names}")
 
     def solve(sample: Sample) -> Values:
         values = {name: np.asarray(value) for name, value in solver(sample).items()}

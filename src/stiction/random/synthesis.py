@@ -134,10 +134,8 @@ class Modes:
             phase = np.pi * self.interface.first * self.numbers[0, 1:] / self.interface.size
             a, b = draws[:, start::2], draws[:, start + 1 :: 2]
             draws = draws.copy()
-            draws[:, start::2], draws[:, start + 1 :: 2] = (
-                a * np.cos(phase) + b * np.sin(phase),
-                b * np.cos(phase) - a * np.sin(phase),
-            )
+            draws[:, start::2] = a * np.cos(phase) + b * np.sin(phase)
+            draws[:, start + 1 :: 2] = b * np.cos(phase) - a * np.sin(phase)
         out = np.empty((draws.shape[0], math.prod(shape[:-1]), shape[-1]))
         synthesise(draws, self.sigma, numbers, self.has_mean, out)
         fields = out.reshape(-1, *shape)

@@ -286,10 +286,8 @@ def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
         return Counts(state, onsets[:, None], members[:, None], np.full((samples, 1), np.nan))
     laws, law = random.factor_laws
     # 5. The ratio of onset and strength depends on the field alone.
-    ratios, own_factor = (
-        onsets / random.means[members],
-        draws[:, random.factor_column(interface)],
-    )
+    ratios = onsets / random.means[members]
+    own_factor = draws[:, random.factor_column(interface)]
     for number in np.unique(law[members]):
         rows = np.flatnonzero(law[members] == number)
         ratios[rows] /= from_normal(laws[number], own_factor[rows])

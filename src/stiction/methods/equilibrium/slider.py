@@ -152,10 +152,8 @@ def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
         state = make_contact(K * sign * sign[:, None], T_p * sign, friction, overstress, moved)
         beyond = np.flatnonzero(overstress > 0.0)  # cells first, so that edges are on top
         state.stack[: beyond.size], state.motion[beyond] = beyond, Motion.UNSTABLE
-        state.counts[contact_path.N_STACKED], state.loads[contact_path.LOAD] = (
-            beyond.size,
-            FIRST_PRESSING * force,
-        )
+        state.counts[contact_path.N_STACKED] = beyond.size
+        state.loads[contact_path.LOAD] = FIRST_PRESSING * force
         while (status := follow(state, force)) in (Status.ARRESTED, Status.UNSTABLE):
             pass
         if status != Status.AT_TARGET:
