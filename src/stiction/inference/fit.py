@@ -456,27 +456,9 @@ def fit_field(
         )
     refuse_uncorrelated(windows, rows)
     settings = [FitSetting(windows, one, family, bool(between)) for one in marginal]
-    while True:
-        # 2.
-        estimates, families = ranking(settings, rows)
-        # A family that is rarely drawn needs few repetitions.
-        weights = [one.weight for one in families.values() if one.weight > 0.0]
-        most = max(weights)
-        counts = [max(MIN_REPETITIONS, round(bootstrap * w / most)) for w in weights[1:]]
-        # 3.
-        try:
-            repeated, further = bootstrapped(
-                estimates[0], bootstrap, seed, progress,
-                list(zip(estimates[1:], counts, strict=False)),
-            )  # fmt: skip
-            break
-        except NotRepeated as error:
-            settings = [setting for setting in settings if setting.marginal != error.family]
-            if not settings:
-                raise
-            warn_accuracy(f"{error}: the family is left out. Such records are far from it")
+    families, repeated, further = _refitted(settings, rows, bootstrap, seed, progress)
     # 4. and 5.
-    field = estimates[0].field(quantity)
+    field = repeated[0].truth.field(quantity)
     object.__setattr__(field, "specimens_of_fit", len(levels) if between else 0)
     fit = FieldFit(
         **_judged(repeated, rows, levels, bootstrap, between),
@@ -486,7 +468,7 @@ def fit_field(
         missing=(points - sum(row.size for row in rows), points),
         quantity=quantity,
         _repeated=[repeated[0], *further],
-        _rows=estimates[0].as_of_one(rows),
+        _rows=repeated[0].truth.as_of_one(rows),
         _levels=levels,
         _families=between,
     )
@@ -496,6 +478,26 @@ def fit_field(
         fit.field.modes(interface)
         fit.field.warn_if_inaccurate(interface)
     return fit
+
+
+def _refitted(
+    settings: list[FitSetting], rows: Sequence[Array], count: int, seed: int, progress: Progress
+) -> tuple[dict[str, Goodness], list[Refits], list[Refits]]:
+    """Return the families, and repetitions of the best and of others (steps 2 and 3)."""
+    estimates, families = ranking(settings, rows)
+    # A family that is rarely drawn needs few repetitions.
+    weights = [one.weight for one in families.values() if one.weight > 0.0]
+    most = max(weights)
+    counts = [max(MIN_REPETITIONS, round(count * w / most)) for w in weights[1:]]
+    further = list(zip(estimates[1:], counts, strict=False))
+    try:
+        return families, *bootstrapped(estimates[0], count, seed, progress, further)
+    except NotRepeated as error:
+        settings = [setting for setting in settings if setting.marginal != error.family]
+        if not settings:
+            raise
+        warn_accuracy(f"{error}: the family is left out. Such records are far from it")
+        return _refitted(settings, rows, count, seed, progress)
 
 
 def _judged(
