@@ -50,7 +50,7 @@ def final_speed(driving, nodes=4096):
         method=st.Rupture(load_history=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=500),
     )
-    found = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
+    found, _ = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
     found = found[nodes // 2 : nodes // 2 + int(0.425 * nodes)]
     return found[np.isfinite(found)][-20:].mean() / SOLID.rayleigh_wave_speed
 

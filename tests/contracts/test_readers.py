@@ -160,6 +160,22 @@ def test_a_table_has_the_same_numbers_in_each_format(reader, tmp_path):
         assert len(results) == 1, (option, results)
 
 
+@pytest.mark.parametrize("form", ["text", "workbook"])
+@pytest.mark.parametrize("name", ["specimen", "Probe", "test", "No."])
+def test_specimens_have_whole_numbers_or_names(name, form, tmp_path):
+    """Otherwise the headings are swapped. A test without a specimen is no test of another."""
+    rows = [[name, "peak (MPa)"], *([i + 1.0, value] for i, value in enumerate(MPA))]
+    swapped = [rows[0], *(row[::-1] for row in rows[1:])]
+    assert read("read_peaks", form, rows, tmp_path)[0]
+    assert f"{name!r}: numbers of specimens must be whole" in read(
+        "read_peaks", form, swapped, tmp_path)[1]  # fmt: skip
+    for kind in (float, lambda number: f"P{number:g}"):
+        gap = [rows[0], *([kind(row[0]), row[1]] for row in rows[1:])]
+        gap[3][0] = ""
+        _, refusal = read("read_peaks", form, gap, tmp_path)
+        assert name in ("test", "No.") or "has no specimen in line 4" in refusal
+
+
 BARE = [row[:1] + row[2:] for row in PROFILE[1:]]
 """Three columns without headings."""
 

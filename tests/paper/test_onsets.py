@@ -71,7 +71,7 @@ def final_speed(ratio, nodes):
         method=st.Rupture(load_history=([0.0, 1.0], [load, load]), implicit=False),
         save=st.Save([], every=1000),
     )
-    speed = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
+    speed, _ = rupture_speed(run["arrival_time"].values, spacing, problem.nucleation_length)
     at = nodes // 2 + np.arange(int(0.38 * nodes), int(0.42 * nodes))
     return float(np.mean(speed[at])) / QUARTER.rayleigh_wave_speed
 

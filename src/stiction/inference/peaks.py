@@ -274,7 +274,7 @@ def read_peaks(
     source : path
         A table with a heading and one test in each line. Rows of
         statistics below the tests (mean, SD, n) are left out. A column
-        ``specimen`` may hold the number or name of the specimen, and a
+        ``specimen`` may hold the whole number or name of the specimen, and a
         column ``length [mm]`` its length.
     value : str or int, optional
         Column of the peaks: heading, name, or number from 0. By default
@@ -352,6 +352,13 @@ def _of_table(
                 f"{column.label!r} only rises, as in the curve of a test. Call st.read_curve"
             )
     _refuse_statistics(table, peak)
+    for column in (*names, *columns[:1]):
+        numbers = role_of(column) == "specimen" and not (column.text or column.unit)
+        if numbers and (part := column.values % 1.0 > 0.0).any():
+            raise InputError(
+                f"{column.label!r}: numbers of specimens must be whole, got"
+                f" {column.values[part][0]:g} in line {table.lines[part][0]}. Are columns swapped?"
+            )
     known = replace(peak, values=without_missing(peak.values, options))
     values, si = column_in_si(known, "peak", unit, VARIABLES, "unit")
     # A stated word or number marks a test without a peak. Any other NaN
@@ -366,6 +373,11 @@ def _of_table(
     labels: Array | None = None
     if names:
         labels = np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept]
+        if (missing := np.isin(labels, ["", "nan"])).any():
+            raise InputError(
+                f"{names[0].label!r}: has no specimen in line {table.lines[kept][missing][0]}. Give"
+                " the number or name of each specimen"
+            )
         stems = [part[1] for name in labels if (part := PART.fullmatch(str(name)))]
         if len(stems) == labels.size and len({*stems}) < len({*labels}):
             warn_accuracy(

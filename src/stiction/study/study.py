@@ -92,9 +92,10 @@ def _interface(given: Any) -> Any:
 _Interface: Any = Annotated[RandomInterface, BeforeValidator(_interface)]
 
 
-def _interfaces(given: Any) -> Any:
+def _interfaces(given: Any, info: pydantic.ValidationInfo) -> Any:
     """Return the interfaces from a fit or a posterior. Return other values unchanged."""
-    return given.interfaces(FIRST_MEMBERS) if isinstance(given, Source) else given
+    seed = info.data.get("seed", 0)
+    return given.interfaces(FIRST_MEMBERS, seed) if isinstance(given, Source) else given
 
 
 RandomOfStudy: Any = Annotated[
@@ -198,9 +199,9 @@ class _Parts(Listed):
     """The parts of a study at a sweep point. Each part is valid by itself."""
 
     problem: Problem
+    seed: Number = 0  # before the random properties, which a source draws with it
     random: RandomOfStudy | None = None
     method: MethodOfStudy
-    seed: Number = 0
 
 
 @model(kw_only=True)

@@ -9,6 +9,8 @@
    strength. The distance of two nodes on a line over the difference of
    their arrival times is an apparent speed (`rupture_speed`). Each
    speed is a mean over a window of two or half a nucleation length.
+   The median weighs the windows, so that round-off in arrival times
+   does not move it (`front_speeds`).
 4. The spectrum is the Fourier integral of an event's moment rate
    (`rate_spectrum`).
 """
@@ -38,12 +40,11 @@ SPECTRUM = Variable("N", "amplitude spectrum of the moment rate per length", ("f
 NODES_IN_SHORTEST_WAVE = 8.0
 """Of a spectrum: spacings of nodes in the shortest shear wave."""
 FREQUENCIES = 100
-SPEED_SPANS: dict[str, Any] = {
-    "rupture_speed": (2.0, np.max),
-    "median_rupture_speed": (0.5, np.median),
-}
-"""Length over which a speed is a mean, in units of h_n, and the
-statistic over all places."""
+SPEED_SPANS = {"rupture_speed": 2.0, "median_rupture_speed": 0.5}
+"""Length over which a speed is a mean, in units of h_n."""
+BACKWARDS, MONOTONE = 1e-3, 1.0 - 1e-9
+"""Part of the time over a window in which the front goes back, from which on it has no speed, and
+the weight of a window in which it does not go back."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -235,32 +236,38 @@ def front_speeds(
     """
     spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
     front = {}
-    for name, (lengths, statistic) in SPEED_SPANS.items():
+    for name, lengths in SPEED_SPANS.items():
         window = min(max(lengths * nucleation, 8.0 * spacing), longest)
         times = arrival
         if interface.is_free:  # fronts do not pass from one end to the other
             times = np.append(arrival, np.full(round(window / spacing), np.nan))
-        speeds = rupture_speed(times, spacing, window)
-        speeds = speeds[np.isfinite(speeds)]
-        front[name] = float(statistic(speeds)) if speeds.size else np.nan
+        speeds, weights = rupture_speed(times, spacing, window)
+        kept = np.flatnonzero(weights >= (MONOTONE if name == "rupture_speed" else 1e-9))
+        kept = kept[np.argsort(speeds[kept])]
+        below = np.cumsum(weights[kept]) - 0.5 * weights[kept]
+        # The largest speed, or the median as a continuous function of the weights.
+        place = np.inf if name == "rupture_speed" else 0.5 * weights[kept].sum()
+        front[name] = float(np.interp(place, below, speeds[kept])) if kept.size else np.nan
     return front
 
 
-def rupture_speed(arrival: Floats, spacing: float, window: float) -> Floats:
-    """Return the apparent speed of a front at each node on a line, m/s, or NaN.
+def rupture_speed(arrival: Floats, spacing: float, window: float) -> tuple[Floats, Floats]:
+    """Return the apparent speed of a front at each node on a line, m/s, or NaN, and its weight.
 
     `arrival` (s) is periodic, and NaN at nodes that the front did not
-    reach. The speed is a mean over `window` (m). It is NaN unless the
-    arrival is strictly monotone over the window. This excludes places where
+    reach. The speed is a mean over `window` (m). Its weight is 1 if the
+    arrival is monotone over the window, and falls to 0 if the front goes
+    back for the part `BACKWARDS` of the time. This excludes places where
     patches begin or fronts meet.
     """
     # A window over more than the line would compare a front with itself.
     half = max(1, round(0.5 * window / spacing))
     if 2 * half >= arrival.size:
-        return np.full(arrival.shape, np.nan)
+        return np.full(arrival.shape, np.nan), np.zeros(arrival.shape)
     wrapped = np.concatenate([arrival[-half:], arrival, arrival[:half]])
     steps = np.lib.stride_tricks.sliding_window_view(np.diff(wrapped), 2 * half)
-    monotone = np.all(steps > 0.0, axis=1) | np.all(steps < 0.0, axis=1)
-    slowness = np.abs(wrapped[2 * half :] - wrapped[: -2 * half]) / (2 * half * spacing)
-    with np.errstate(divide="ignore"):
-        return np.where(monotone, 1.0 / slowness, np.nan)
+    times = np.abs(wrapped[2 * half :] - wrapped[: -2 * half])
+    back = np.maximum(0.5 * (np.abs(steps).sum(axis=1) - times), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weight = np.nan_to_num(np.maximum(1.0 - back / (BACKWARDS * times), 0.0))
+        return np.where(weight > 0.0, 2 * half * spacing / times, np.nan), weight
