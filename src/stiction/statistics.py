@@ -146,8 +146,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     high = math.inf if bounds[1] is None else bounds[1]
     if not low <= smallest < largest <= high:
         raise InputError(
-            f"values: must differ, and lie between the bounds {low:g} and {high:g}. They lie"
-            f" between {smallest:g} and {largest:g}"
+            f"values: must differ and lie between the bounds {low:g} and {high:g}, got"
+            f" {smallest:g} to {largest:g}"
         )
     # 1. A bound far from the sample would waste cells, as the kernel
     # never reaches half a spread.

@@ -123,11 +123,11 @@ def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, f
     `InputError` if any of them varies along the interface.
     """
     check_law(problem)
-    refuse_specimen(problem, "this", "sample the nucleation stress with st.monte_carlo")
+    refuse_specimen(problem, "this theory", "Sample the nucleation stress with st.monte_carlo")
     load, initial = problem.load_profile, problem.load.initial_stress
     pressure = 1.0 if strength.quantity is None else problem.given_pressure
     if pressure is None:
-        raise InputError("load.normal_pressure: is missing, and strength is in coefficients")
+        raise InputError("load.normal_pressure: is needed for strength in coefficients (Pa)")
     varying = {
         "load.profile: varies": np.ptp(load) > 0.0,
         "load.initial_stress: varies": np.ptp(initial) > 0.0,

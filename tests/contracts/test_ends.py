@@ -212,7 +212,7 @@ def test_an_event_that_the_run_cuts_short_is_marked_and_counted():
             warnings.simplefilter("always")
             found = st.onset(problem, rows, method=method, progress=False)
             run = st.simulate_rupture(problem, strength, method=method, progress=False)
-        told = [str(one.message) for one in caught if "had not ended" in str(one.message)]
+        told = [str(one.message) for one in caught if "during the last" in str(one.message)]
         counts = [("2 of 2 samples" in text, "1 of 1 sample" in text) for text in told]
         assert counts == ([(True, False), (False, True)] if cut else [])
         for result in (found, run):

@@ -157,7 +157,7 @@ def test_a_short_list_names_only_interfaces_whose_probability_is_known(known, ca
     members = np.array([known, *[math.nan] * 4])
     short = SimpleNamespace(members=members, cv=0.3, members_cv=0.25)
     (text,) = few_members(random, short, 0.1)
-    assert ("1 of its 5 different ones carry 90%" in text) == carried
+    assert ("1 of 5 different ones carry 90%" in text) == carried
 
 
 def test_draws_of_a_list_must_have_their_dimension():

@@ -323,7 +323,7 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     carriers = 1 + np.searchsorted(np.cumsum(np.sort(shares)[::-1]), 0.9)
     told = int(re.search(r"(\d+) of its 12.*90% of the mean", given.warnings[-1])[1])
     assert told == pytest.approx(carriers, abs=1)
-    shown = re.search(r"part of it by the list of interfaces +([\d.]+)", str(given))
+    shown = re.search(r"of which by choice of the interfaces +([\d.]+)", str(given))
     assert float(shown[1]) == pytest.approx(given.members_cv, rel=1e-5)  # six digits are shown
     assert f"coefficient of variation {given.cv:.6g}" in " ".join(str(given).split())
     assert np.isnan(found.band[0])  # few members have samples so low

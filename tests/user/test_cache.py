@@ -150,7 +150,7 @@ def test_a_newer_numba_is_plain_numba(monkeypatch):
     )
     newer = numba.version_info._replace(short=(99, 0))
     monkeypatch.setattr(numba, "version_info", newer)
-    with pytest.raises(ImportError, match="not tried"):
+    with pytest.raises(ImportError, match="not tested"):
         imported()
     monkeypatch.setattr(
         decorators, "_Guard", None

@@ -106,7 +106,7 @@ def test_a_design_is_in_proportion_to_the_pressure():
     assert by["stress by weibull"] < design.stress < by["stress by lognormal"]
     assert "stress by normal" in by
     text = str(design)
-    assert "the error of the computation only" in text
+    assert "errors of the computation only" in text
     assert "weibull to lognormal" in text
     assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
     given["sensitivities"] = {"problem.load.weight": (1, 2)}

@@ -116,7 +116,7 @@ def test_every_help_has_examples_and_no_text_is_cut(runs):
 @pytest.mark.filterwarnings("always")
 def test_the_example_is_a_study_that_runs_without_a_doubt(inside, runs):
     runs("example study.toml")
-    runs("example study.toml", "exists already", code=2)
+    runs("example study.toml", "already exists", code=2)
     for line in ("check study.toml", "run study.toml --out run", "report run"):
         said = runs(line)
         assert "warning" not in said, said

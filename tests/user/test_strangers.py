@@ -248,7 +248,7 @@ NETCDF_ATTACKS = {
         "strength", (2**40,), "f8", chunks=(2**20,), compression="gzip")),
     "large chunks": ("more than the limit", lambda file: file.create_dataset(
         "strength", (8,), "f8", maxshape=(None,), chunks=(2**26,), compression="gzip")),
-    "large values of a small chunk": ("another size than its chunks", inflating),
+    "large values of a small chunk": ("to a wrong size", inflating),
     "another filter": ("unsupported filter", lambda file: file.create_dataset(
         "strength", (8,), "f8", compression="lzf")),
 }  # fmt: skip

@@ -176,7 +176,7 @@ def test_a_measured_profile_in_a_file_is_run_and_reported(tmp_path, monkeypatch,
     both = st.Study.from_dict(stored.study.to_dict() | {"sweep": [{"method": methods}]}).run()
     assert both.sizes == {"onset_method": 2, "sample": 1}
     for wrong, words in (
-        ({"samples": 2}, "samples: given profiles"),
+        ({"samples": 2}, "samples: must be 1"),
         ({"random": STUDY["random"]}, "random: give either"),
         ({"profiles": None}, "random: give either"),
         ({"reliability": {"stress": 1e6}}, "reliability: has no effect"),

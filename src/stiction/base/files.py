@@ -178,7 +178,7 @@ def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
         members = archive.infolist()
         packed = any(member.compress_type != zipfile.ZIP_STORED for member in members)
         if packed or sum(member.file_size for member in members) > len(content):
-            raise ValueError("its members are compressed or larger than the file")
+            raise ValueError("members are compressed or larger than the file")
         arrays = {}
         for member in members:
             with archive.open(member) as stream:
@@ -321,8 +321,8 @@ def kernel_folder(module: str, compiler: str) -> Path:
     digest = hashlib.sha256(state).hexdigest()[:16]
     if os.path.lexists(".numba_config.yaml"):  # it may come from a stranger
         _warn_once(
-            ".numba_config.yaml: numba reads this file in the current folder. stiction does not"
-            " take the folder of its compiled kernels from it"
+            ".numba_config.yaml: numba reads this file in the current folder, but stiction does"
+            " not look in this file for the folder of its compiled kernels"
         )
     given = os.environ.get("NUMBA_CACHE_DIR")
     kept = Path(given) if given else cache_folder() / "compiled"

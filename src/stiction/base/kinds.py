@@ -31,11 +31,11 @@ def register(kind: T) -> T:
     if not isinstance(name, str):
         raise InputError(f'{kind}: needs a field such as type: Literal["mine"] = "mine"')
     if missing := getattr(kind, "__abstractmethods__", ()):
-        raise InputError(f"{kind.__name__}: lacks {', '.join(sorted(missing))}")
+        raise InputError(f"{kind.__name__}: must define {', '.join(sorted(missing))}")
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
     holder = known.setdefault(name, kind)
     if (holder.__module__, holder.__qualname__) != (kind.__module__, kind.__qualname__):
-        raise InputError(f"{kind.__name__}: {holder} has the type {name!r}. Choose another")
+        raise InputError(f"{kind.__name__}: type {name!r} belongs to {holder}. Choose another")
     known[name] = kind
     return kind
 
@@ -78,10 +78,10 @@ class Kinds(Mapping[str, Any]):
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:
             if len(points) > 1:
-                raise ImportError("two packages offer it. Uninstall either")
+                raise ImportError("two packages offer this type. Uninstall either")
             kind = register(points[0].load())
             if self._registered.get(name) is not kind:
-                raise ImportError(f"{kind} is not such a class, or has another type")
+                raise ImportError(f"{kind} is not of this family, or has another type")
         except Exception as error:  # of any kind: the code is another's
             packages = ", ".join(str(point.dist and point.dist.name) for point in points)
             text = f"{type(error).__name__}: {' '.join(str(error).split())}"

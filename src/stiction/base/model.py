@@ -167,11 +167,11 @@ def _path(value: Any) -> Path:
     usable = isinstance(text, str) and text != ""
     if usable and not text.isprintable():
         raise ValueError(
-            "must be a path without tabs and line breaks, which \\t and \\n mean in double quotes."
-            " Write / for \\, or put it in single quotes"
+            "must be a path without tabs and line breaks (\\t and \\n in double quotes). Write /"
+            " for \\, or put the path in single quotes"
         )
     if not usable or max(map(len, Path(text).parts), default=0) > 255:
-        raise ValueError("must be a path in UTF-8, each name at most 255 letters")
+        raise ValueError("must be a path in UTF-8 with names of at most 255 letters")
     return Path(text)
 
 
@@ -539,7 +539,7 @@ def _adapter(annotation: Any) -> pydantic.TypeAdapter[Any]:
     return pydantic.TypeAdapter(_instances(annotation))
 
 
-def check_memory(name: str, needed: float, advice: str = "take fewer") -> None:
+def check_memory(name: str, needed: float, advice: str = "Take fewer") -> None:
     """Raise an `InputError` if arrays need more memory (bytes) than this machine has."""
     try:
         there = float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
@@ -547,6 +547,6 @@ def check_memory(name: str, needed: float, advice: str = "take fewer") -> None:
         return
     if needed > there:
         raise InputError(
-            f"{name}: this takes {needed / 2**30:,.1f} GiB of memory, more than the"
-            f" {there / 2**30:,.1f} GiB of this machine: {advice}"
+            f"{name}: would take {needed / 2**30:,.1f} GiB of memory, more than the"
+            f" {there / 2**30:,.1f} GiB of this machine. {advice}"
         )

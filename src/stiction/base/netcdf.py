@@ -111,7 +111,7 @@ def _check(file: Any, content: bytes, unwanted: Collection[str]) -> list[str]:
 
 def _check_letters(letters: int, content: bytes) -> None:
     if letters > len(content):
-        raise InputError("its texts need more memory than the whole file. Write it again")
+        raise InputError("texts need more memory than the whole file. Write the file again")
 
 
 def _letters_in_attributes(item: Any, content: bytes) -> int:
@@ -124,7 +124,7 @@ def _letters_in_attributes(item: Any, content: bytes) -> int:
         count = math.prod(attribute.shape or ())
         if h5py.check_string_dtype(attribute.dtype):
             if count > 1 and count * len(content) > MAX_FILE_BYTES:
-                raise InputError(f"attribute {name!r} is a list of {count} texts. Remove it")
+                raise InputError(f"attribute {name!r} is a list of {count} texts. Delete it")
             letters += sum(map(len, np.ravel(item.attrs[name]).tolist()))
         else:
             letters += count
@@ -146,7 +146,7 @@ def _check_chunks(dataset: Any, made: Any) -> None:
     filters = [made.get_filter(number)[0] for number in range(made.get_nfilters())]
     if not {*filters} <= {SHUFFLE, DEFLATE, CHECKSUM} or filters.count(DEFLATE) > 1:
         raise InputError(
-            f"{dataset.name!r} is compressed with an unsupported filter. Write it with zlib"
+            f"{dataset.name!r} is compressed by an unsupported filter. Compress it by zlib"
         )
     if DEFLATE not in filters:
         return
@@ -155,7 +155,7 @@ def _check_chunks(dataset: Any, made: Any) -> None:
     values = math.prod(dataset.chunks)
     if len(chunks) * values > _padded_size(dataset):
         raise InputError(
-            f"{dataset.name!r} has more chunks than its shape. Write the file again"
+            f"{dataset.name!r} has more chunks than its shape allows. Write the file again"
         )
     size = values * dataset.id.get_type().get_size()
     for chunk in chunks:
@@ -165,4 +165,4 @@ def _check_chunks(dataset: Any, made: Any) -> None:
             inside = filters[: filters.index(DEFLATE)]
             data = zlib.decompressobj().decompress(data, size + CHECKSUM_BYTES + 1)
         if len(data) != size + CHECKSUM_BYTES * (CHECKSUM in inside):
-            raise InputError(f"{dataset.name!r} unpacks to another size than its chunks have")
+            raise InputError(f"chunks of {dataset.name!r} unpack to a wrong size")

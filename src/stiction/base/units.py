@@ -203,7 +203,7 @@ def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | No
         pairs = [magnitude_in_one_of(item, units) for item in value]
         if len({unit for _, unit in pairs}) > 1:
             raise InputError(
-                "holds quantities of several kinds, or numbers without a unit: give all of them in"
+                "holds quantities of several kinds, or numbers without a unit. Give all values in"
                 " the same unit"
             )
         return np.array([number for number, _ in pairs], dtype=np.float64), pairs[0][1]
@@ -232,7 +232,7 @@ def as_numbers(value: Any) -> Array:
     """
     if isinstance(value, np.ma.MaskedArray):
         if value.size and np.ma.getmaskarray(value).all():
-            raise InputError("has no value: its mask covers all entries")
+            raise InputError("has no values: its mask covers all entries")
         value = np.ma.filled(value.astype(np.float64), np.nan)
     try:
         given = np.asarray(value)
@@ -248,7 +248,7 @@ def as_numbers(value: Any) -> Array:
         kind = type(value).__name__ if given.ndim == 0 else f"elements of type {given.dtype}"
         text = str(given.flat[0]) if given.dtype.kind == "U" and given.size else ""
         read = (
-            ". st.read_profile(path) reads profiles, st.read_peaks(path) peaks"
+            ". Read files by st.read_profile(path) or st.read_peaks(path)"
             if Path(text).suffix
             else ""
         )
@@ -326,9 +326,9 @@ def check_measured(
     if quantity in POSITIVE and (wrong := np.ravel(values) <= 0.0).any():
         number = f"{shown[wrong][0]:.9g}"
         raise InputError(
-            f"{quantity} must be positive, is {number} in {_entry(wrong, lines)}"
-            f" ({np.count_nonzero(wrong)} such values). If it means that a value is missing, pass"
-            f" missing={number} to st.read_profile, or make it NaN"
+            f"{quantity} must be positive, but is {number} in {_entry(wrong, lines)}"
+            f" (wrong values: {np.count_nonzero(wrong)}). If {number} marks a missing value, pass"
+            f" missing={number} to st.read_profile, or write NaN"
         )
     for end in (known.min(), known.max()) if doubted and known.size else ():
         rest = known[known != end]
@@ -336,8 +336,8 @@ def check_measured(
         if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
             warn_user(
                 f"{quantity}: {end:.9g} occurs in {_entry(shown == end, lines)}"
-                f" ({known.size - rest.size} such values), and often means that a value is missing."
-                f" Pass missing={end:.9g}, or missing=()",
+                f" ({known.size - rest.size} in all), and often marks a missing value. Pass"
+                f" missing={end:.9g}, or missing=() to keep it",
                 AccuracyWarning,
             )
 
@@ -390,7 +390,7 @@ def profile_in_si(
     for dim, (places, _) in converted.items():
         if not np.isfinite(places).all():
             raise InputError(
-                f"{dim} must be finite, not as {_entry(~np.isfinite(places), lines)}"
+                f"{dim} must be finite, but is not in {_entry(~np.isfinite(places), lines)}"
             )
         profile = profile.assign_coords({dim: (value[dim].dims, places)})
     return profile

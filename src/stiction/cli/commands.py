@@ -143,7 +143,7 @@ def run(
     state, beginning = st.open_run(out).status(), f"part {part}: " if part else ""
     echo(f"{beginning}{state.done} of {state.samples} samples in {out}")
     if state.failures:
-        echo(f"{len(state.failures)} samples failed; the same command retries:", err=True)
+        echo(f"failed samples: {len(state.failures)}. Run the same command again:", err=True)
         _show_some(state.failures, "  ", err=True)
         raise typer.Exit(1)
 
@@ -172,7 +172,7 @@ def status(run: RunPath) -> None:
     _show_some(behind if len(points) > 1 else [], "  ")
     _show_some(state.damaged, "  damaged     ")
     if state.damaged:
-        echo("  run the study again to repair this")
+        echo("  run the study again to repair the damage")
     else:
         echo("  undamaged   all stored chunks match their checksums")
     if state.failures:
@@ -233,7 +233,7 @@ def report(
     echo(f"report: {path}")
     state = stored.status()
     if not state.complete:
-        echo(f"it shows {state.done} of {state.samples} samples", err=True)
+        echo(f"the report shows {state.done} of {state.samples} samples", err=True)
         raise typer.Exit(1)
 
 
@@ -256,7 +256,7 @@ def example(
         with file.open("xb") as new:
             new.write(text)
     except FileExistsError:
-        raise InputError(f"{file}: exists already. Choose another name") from None
+        raise InputError(f"{file}: already exists. Choose another name") from None
     echo(f"study: {file}")
 
 
@@ -319,8 +319,8 @@ def _cost(study: Any) -> dict[str, str]:
     seconds, size = costs.sum() * samples, sum(point.sample_bytes for point in points) * samples
     ends = " to ".join(dict.fromkeys((duration(min(costs)), duration(max(costs)))))
     return {
-        "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on the {cores}"
-        f" here ({ends} a sample, from a few samples)",
+        "time": f"about {duration(seconds)} on one core, {duration(seconds / cores)} on {cores}"
+        f" ({ends} a sample, measured on a few samples)",
         "size": f"about {size / 1e6:.3g} MB",
     }
 

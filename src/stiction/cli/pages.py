@@ -191,18 +191,18 @@ def write_design(
     page.table("Design", head, rows)
     page.text(f"Computed by {summary.notes[0]}.")
     page.text(
-        "The interval holds the error of the computation: sampling, and the list of equally likely"
-        " interfaces. Uncertainty of the parameters is in the force itself, which is for the mean"
-        " probability over all of them. Constants that were assumed are not in it: see below."
+        "The interval covers errors of the computation: sampling, and the choice of equally likely"
+        " interfaces. The force itself allows for uncertain parameters, because its probability is"
+        " the mean over the interfaces. Assumed constants are listed below and not covered."
     )
     if moves := moves_of(design):
         with paper_style():
             height = 1.2 + 0.3 * len(moves)
             figure = Figure(figsize=(0.75 * PAGE, height), layout="constrained")
             plot.sensitivities(design, ax=figure.subplots())
-            page.figure(figure, "What moves the design. The band is its interval.")
-        columns = ["source", "from", "to", "design at the first", "design at the second"]
-        page.table("What moves the design", columns, moves)
+            page.figure(figure, "Sensitivities. The band is the interval of the design.")
+        columns = ["source", "from", "to", "design at 'from'", "design at 'to'"]
+        page.table("Sensitivities", columns, moves)
     problem, source = design.experiment.problem, design.experiment.random.source
     page.table("Inputs", ["input", "value", "unit", "source"], _inputs(problem, sources))
     peaks = getattr(source, "peaks", None)
@@ -225,8 +225,8 @@ def write_design(
     method, seed = design.experiment.method, design.experiment.seed
     of_tests = f", seed of infer {source.seed}" if hasattr(source, "seed") else ""
     page.text(
-        f"To repeat: {versions()}, method {method!r}, seed {seed}{of_tests}. The force is"
-        " that of one friction surface of the interface above."
+        f"To repeat: {versions()}, method {method!r}, seed {seed}{of_tests}. The force acts"
+        " on one friction surface of the interface above."
     )
     page.write(path)
 

@@ -270,7 +270,7 @@ def _result(future: Future[Table], span: Span) -> Table:
     except Exception as error:
         if "pickle" in str(error):  # a PicklingError, AttributeError or TypeError
             raise InputError(
-                f"executor: its processes cannot be sent a part of the study: {error}. Define"
+                f"executor: no part of the study can be sent to a process: {error}. Define"
                 " functions with def at the top of a module, or leave out the executor"
             ) from error
         last = span.first + span.samples - 1
@@ -280,7 +280,7 @@ def _result(future: Future[Table], span: Span) -> Table:
         ) from error
     if table.versions != versions():
         raise WorkerError(
-            f"a worker has {table.versions}, the run has {versions()}. Install the same versions"
+            f"a worker has {table.versions}, but the run {versions()}. Install the same versions"
         )
     return table
 

@@ -315,7 +315,7 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
     now, before = here["samples"], there["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
-        differences.append(f"samples: {now} here, {before} there: a run can only grow")
+        differences.append(f"samples: {now} here, {before} there. A run can only grow")
     if differences:
         raise InputError(
             f"{path}: holds another study. Choose another folder, or make the study the same:\n"

@@ -198,7 +198,7 @@ def agreement(
     measured, error = peaks_and_error(peaks, unit, load_cell_error)
     if isinstance(prediction, Posterior):
         if load_cell_error:
-            raise InputError("load_cell_error: the posterior has its own. Leave it out")
+            raise InputError("load_cell_error: is part of the posterior. Leave it out")
         return _with_posterior(prediction, measured, replicates, rng)
     values = _predicted_peaks(prediction, measured)
     values = values + error * rng.standard_normal(values.size)
@@ -230,7 +230,7 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
     if int(prediction["arrested_events"].max()) > prediction.sizes["event"]:
         raise InputError(
             f"prediction: keeps {prediction.sizes['event']} of up to"
-            f" {int(prediction['arrested_events'].max())} events. Predict with at least so many"
+            f" {int(prediction['arrested_events'].max())} events. Predict with more events="
         )
     high = prediction[event].transpose("sample", "event").values
     low = high - prediction[drop].transpose("sample", "event").values
@@ -304,7 +304,7 @@ def _with_posterior(
     seen = np.concatenate(fitted.values)
     if np.isin(np.concatenate(measured.values), seen).all():
         raise InputError(
-            "peaks: the posterior was fitted to them. Compare peaks of further tests"
+            "peaks: the posterior was fitted to these peaks. Compare peaks of further tests"
         )
     kinds = [fitted.lengths.index(length) for length in measured.lengths]
     measured.refuse_far([posterior.predicted[kind] for kind in kinds])

@@ -374,7 +374,7 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
         yield "test", Table(tuple(columns), "arrays", np.arange(sizes[0]))
     else:
         raise InputError(
-            f"source: must be a path, a DataFrame or (travel, force). Got {describe(source)}"
+            f"source: must be a path, a DataFrame or (travel, force), got {describe(source)}"
         )
 
 
@@ -423,7 +423,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
     travel, force = readings.travel, readings.force
     threshold = _threshold(force, noise)[1]
     if readings.travel_unit == "m" and travel[0] - travel[-1] >= 0.9 * np.ptp(travel) > 0.0:
-        warn_accuracy(f"{readings.name}: the travel only falls. Its sign is changed")
+        warn_accuracy(f"{readings.name}: the travel only falls, so its sign is changed")
         readings = readings._replace(travel=-travel)
     clear = np.abs(force) > max(threshold, BOTH_SIGNS * float(np.abs(force).max()))
     marked, signs = np.flatnonzero(clear), np.sign(force)
@@ -437,7 +437,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
         begins = [np.flatnonzero(signs[:turn] != signs[turn])[-1] + 1 for turn in turns]
         return readings._replace(force=np.abs(force)).cut(begins, "stroke")
     if -force.min() > force.max():
-        warn_accuracy(f"{readings.name}: forces are negative. Their signs are changed")
+        warn_accuracy(f"{readings.name}: forces are negative, so their signs are changed")
         readings = readings._replace(force=-force)
     readings = _without_spikes(readings, threshold)
     force = readings.force
@@ -512,7 +512,7 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
     if noise > 0.0 and same < 0.1 and np.any(equal[2:] - equal[:-2] == 2):
         warn_accuracy(
             f"{name}: the {equal.size} largest readings are equal, {force[top]:.6g}, though the"
-            " record has noise. The load cell may have been saturated, and the peak be higher"
+            " record has noise. The load cell may have been saturated, so the peak may be higher"
         )
     first = float(np.median(force[:3]))
     if first > TARE * peak and split is None:

@@ -254,7 +254,7 @@ def _plans(
             raise InputError(unknown)
         free = [place for place, parameter in enumerate(names) if parameter not in known]
         if not free:
-            raise InputError(f"{path}: lists all parameters. Leave a parameter to the tests")
+            raise InputError(f"{path}: lists all parameters. Leave one unknown to the tests")
         plans[name] = dict(tests), free
     return plans
 
@@ -351,7 +351,7 @@ def _widths(
 ) -> xr.Dataset:  # fmt: skip
     """Return widths of intervals and design stresses after further measurements."""
     if any(levels for _, levels in plans.values()) and not tables.profiles.levels.size:
-        raise InputError("designs: profiles: need a fit, whose profiles give their length")
+        raise InputError("designs: profiles: need a fit, which gives the length of profiles")
     _, now = grid_of_profiles(tables.profiles, tables)
     rng = np.random.default_rng([simulation.seed, 8])
     simulation.meter.stage("simulated campaigns", len(plans) * repetitions)

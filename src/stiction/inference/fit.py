@@ -87,8 +87,8 @@ MIN_P_VALUE = 0.01
 ADVICE = {
     "marginal": "The values are far from its family. Compare families",
     "spectrum": "The periodogram is far from its family. Take another spectrum or a higher detrend",
-    "level": "Means of records scatter more than means of one field, which designs under the fit"
-    " leave out. Pass between=True if records are of different specimens",
+    "level": "Means of records scatter more than means of one field. Designs under the fit omit"
+    " this scatter. Pass between=True if records are of different specimens",
 }
 TOLD = 2.0
 """Difference of scores above which data distinguish two families."""
@@ -496,7 +496,7 @@ def _refitted(
         settings = [setting for setting in settings if setting.marginal != error.family]
         if not settings:
             raise
-        warn_accuracy(f"{error}: the family is left out. Such records are far from it")
+        warn_accuracy(f"{error}: the family is left out, as the records are far from it")
         return _refitted(settings, rows, count, seed, progress)
 
 
@@ -520,7 +520,7 @@ def _judged(
         p_values["level"] = fitted.chance_of_scatter(levels)
     doubts = _doubts(fitted, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
-        doubts.append(f"the family does not fit {failed} repetitions, which the intervals omit")
+        doubts.append(f"intervals omit the repetitions that no fit reached: {failed}")
     if fitted.setting.between:
         # The bootstrap scales records as if all came from one specimen,
         # so its means and scatter lack the scatter between specimens.
@@ -535,8 +535,8 @@ def _judged(
         low, high = ends["between"] = tuple(np.quantile(draws[SCATTER_KEY], TAILS).tolist())
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
-                f"{len(rows)} specimen(s) leave the scatter between specimens at {low:.2g} to"
-                f" {high:.2g}, mostly by its prior. Measure at least {FEW_SPECIMENS}, or state it:"
+                f"the scatter between specimens, {low:.2g} to {high:.2g}, follows mostly from the"
+                f" prior. Measure {FEW_SPECIMENS} specimens rather than {len(rows)}, or state it:"
                 " RandomInterface(fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
             )
     return {
@@ -565,8 +565,8 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     left = max(_power_at_cutoff(fitted, window) for window in set(fitted.setting.windows))
     if left <= noise**2:
         doubts.append(
-            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, where the field has"
-            f" {math.sqrt(left):.3g} left. The correlation length then depends on the family"
+            f"the noise ({noise:.3g}) hides the cut-off of the spectrum, beyond which the field"
+            f" scatters by {math.sqrt(left):.3g}. The correlation length then depends on the family"
         )
     doubts += [
         f"{name} {value:.3g} lies at an end of the searched range. Fix spectrum= or anisotropy="

@@ -205,8 +205,8 @@ def infer(
     several = bool(further) or problem.interface.is_plane
     if not (several or length is None or math.isclose(length, size)):
         raise InputError(
-            f"peaks: the specimens are {length:g} m long, but the problem {size:g} m. Pass the"
-            " problem of the tests. The posterior is valid for other problems, too"
+            f"peaks: the specimens are {length:g} m long, but the problem is {size:g} m. Pass"
+            " the problem of the tests. The posterior is valid for other problems, too"
         )
     with Meter("infer", show=progress) as meter:
         simulation = Simulation(method, samples, seed, workers, meter)
@@ -310,7 +310,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     if texts:
         notes.append(
             f"the posterior piles up at the ends of the prior: {', and '.join(texts)} within"
-            f" {PRIOR_END:.0%} of it. Check the unit of the peaks, or widen the prior"
+            f" {PRIOR_END:.0%} of its range. Check the unit of the peaks, or widen the prior"
         )
     # The local criterion may be inaccurate where the posterior lies,
     # not in all of the prior.
@@ -384,7 +384,7 @@ def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
     if len(likely.factor_laws[0]) > 1:
         raise InputError(
             "random: holds draws of mean and scatter between specimens, as a stored fit does. Pass"
-            " the fit itself, or, for the fields within alone, [one.strength for one in random]"
+            " the fit itself, or [draw.strength for draw in random] to use the fields alone"
         )
     members = likely.members
     refuse_conditioned(members)

@@ -201,8 +201,8 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
     groups = {magnitude_in_one_of(key, ["m"])[0]: values for key, values in groups.items()}
     if not all(key is None or (is_finite(key) and key > 0.0) for key in groups):
         raise InputError(
-            "peaks: the keys of a mapping must be lengths (m), such as {0.1: [...], 0.2: [...]}."
-            f" Got {describe(list(groups))}"
+            "peaks: the keys of a mapping must be lengths (m), such as {0.1: [...], 0.2: [...]},"
+            f" got {describe(list(groups))}"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
     values = tuple(_in_si(given, unit) for given in groups.values())
@@ -382,7 +382,7 @@ def _of_table(
         if len(stems) == labels.size and len({*stems}) < len({*labels}):
             warn_accuracy(
                 f"{names[0].label!r}: {labels[0]}, {labels[1]}, ... are read as slip loads of"
-                f" specimens {', '.join(dict.fromkeys(stems))}. Otherwise number the specimens"
+                f" specimens {', '.join(dict.fromkeys(stems))}. If this is wrong, number specimens"
             )
             labels = np.array(stems)
         if (count := len({*labels})) < MIN_PEAKS:
@@ -448,7 +448,7 @@ def _normal_forces(
     if (missing := np.flatnonzero(~(forces > 0.0))).size:
         raise InputError(
             f"normal: {column.label!r} has no positive force in line {table.lines[missing[0]]}"
-            f" ({missing.size} tests affected). Remove these tests, or give their forces"
+            f" (tests in all: {missing.size}). Remove these tests, or give their forces"
         )
     return forces
 
@@ -461,7 +461,7 @@ def _coefficients(values: Array, forces: Array, si: str, surfaces: int) -> Array
         raise InputError(
             f"normal: the median friction coefficient would be {typical:.3g}, from"
             f" {np.median(values):.4g} {si} over {surfaces} times {np.median(forces):.4g} {si}."
-            f" Slip factors lie between {SLIP_FACTORS[0]:g} and {SLIP_FACTORS[1]:g}. Check that the"
-            " two columns are not swapped, their units, and surfaces="
+            f" Slip factors lie between {SLIP_FACTORS[0]:g} and {SLIP_FACTORS[1]:g}. Check the"
+            " order of the two columns, their units, and surfaces="
         )
     return coefficients

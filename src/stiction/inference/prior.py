@@ -100,7 +100,7 @@ def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
         for name, field in interface.properties.items():
             if field.conditions is not None:
                 raise InputError(
-                    f"random: {name} is conditioned on another specimen. Pass it without `given`"
+                    f"random: {name} is conditioned on another specimen. Leave `given` out"
                 )
 
 
@@ -119,12 +119,12 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     if not isinstance(given, Mapping) or not given:
         raise InputError(
             "prior: must map parameters to distributions or ranges, such as"
-            f" {{'correlation_length': (1e-3, 1e-2)}}. Got {describe(given)}"
+            f" {{'correlation_length': (1e-3, 1e-2)}}, got {describe(given)}"
         )
     with prefixed("prior"):
         distributions = distributions_of(given)
     if not isinstance(random, RandomField | RandomInterface):
-        raise InputError("prior: needs one interface. Leave it out with a fit or a list")
+        raise InputError("prior: needs a single interface. Leave it out with a list or a fit")
     random = as_random_interface(random)
     refuse_conditioned([random])
     prior = Prior(problem, random, distributions)

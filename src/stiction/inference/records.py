@@ -85,8 +85,8 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     _doubt_lengths(records)
     if (again := len(records) - len({one.values.tobytes() for one in records})) > 0:
         warn_accuracy(
-            f"{again} of {len(records)} profiles repeat another profile, value by value. They count"
-            " as further measurements and make intervals too narrow. Leave them out"
+            f"{again} of {len(records)} profiles repeat another profile, value by value. They are"
+            " taken as measurements and make intervals too narrow. Leave them out"
         )
     return records
 
@@ -122,7 +122,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         spacings.append(spacing)
     shape = [number.max() + 1 for number in index]
     if np.unique(np.ravel_multi_index(index, shape)).size < index[0].size:
-        raise InputError("x and y repeat: a place of the map has two values. Keep one")
+        raise InputError("x and y repeat: a place of the map has two values. Keep either")
     rows = values.reshape(-1, values.shape[-1])
     full = np.full((rows.shape[0], *shape), np.nan)
     full[(slice(None), *index)] = rows
@@ -136,7 +136,7 @@ def _of_array(array: Array, interface: Interface | None) -> list[Record]:
     shape = interface.shape
     if shape not in (array.shape, array.shape[1:]):
         samples = f"(samples, {', '.join(map(str, shape))})"
-        raise InputError(f"must have shape {shape} or {samples}. Got {array.shape}")
+        raise InputError(f"must have shape {shape} or {samples}, got {array.shape}")
     return [Record(row, interface.spacings) for row in array.reshape(-1, *shape)]
 
 
@@ -170,7 +170,7 @@ def _checked(record: Record, quantity: str) -> Record:
         raise InputError(f"must be finite, but entry {first} is not")
     if values.size < MIN_RECORD_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
-            f"holds {values.size} measured points, too few for a spectrum. It needs at least"
+            f"holds {values.size} measured points, too few for a spectrum. A fit needs at least"
             f" {MIN_RECORD_POINTS}, {NARROWEST} in each direction, and ten correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():

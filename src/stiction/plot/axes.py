@@ -69,7 +69,7 @@ def problem_of(result: Any, problem: Problem | None = None) -> Problem:
         sizes = check("problem", problem, Problem).interface.shape
         shape = tuple(result.sizes[dim] for dim in ("x", "y") if dim in result.sizes)
         if shape not in ((), sizes):
-            raise InputError(f"problem: has {sizes} nodes, the result {shape}")
+            raise InputError(f"problem: has {sizes} nodes, but the result {shape}")
         return problem
     try:
         plain = json.loads(result.attrs["study"])["problem"]
@@ -77,7 +77,7 @@ def problem_of(result: Any, problem: Problem | None = None) -> Problem:
     except (KeyError, TypeError, ValueError, InputError):
         raise InputError(
             "problem: is not complete in the result, because a part exists in Python only or was"
-            " swept. Give problem=..."
+            " swept. Pass problem="
         ) from None
 
 

@@ -114,7 +114,7 @@ def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[n
     peaks = make_peaks(measured, str(variable.attrs.get("units", "1")))
     if peaks.unit != variable.attrs.get("units", "1"):
         raise InputError(
-            f"measured: peaks are in {peaks.unit}, {quantity} in {variable.attrs.get('units')}."
+            f"measured: peaks are in {peaks.unit}, but {quantity} in {variable.attrs.get('units')}."
             f" Draw quantity={peaks.variable!r}"
         )
     return np.concatenate(peaks.values)

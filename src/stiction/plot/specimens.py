@@ -242,7 +242,7 @@ def precursors(
     si = str(results[0][name].attrs["units"])
     if tests and (tests.unit, tests[0].travel_unit) != (si, "m"):
         raise InputError(
-            f"measured: curves are {tests.unit} over {tests[0].travel_unit}, the prediction"
+            f"measured: curves are {tests.unit} over {tests[0].travel_unit}, but the prediction"
             f" is {si} over m. Pass speed= to st.read_curve to turn time into travel"
         )
     interface = problem_of(results[0], problem).interface

@@ -72,9 +72,9 @@ def contradictions_of(
         most, least = initial[number].flat[node], strength[number].flat[node]
         further = int(over.any(axis=1).sum()) - 1
         problems.append(
-            f"strength: must be above initial_stress. It is not at {over[number].sum()} nodes of"
-            f" sample {number}, such as {interface.describe_node(node)}: {least:g} and {most:g} Pa"
-            f"{f', and in {further} more samples' * (further > 0)}. st.Rupture() accepts this"
+            f"strength: must be above initial_stress. At {interface.describe_node(node)} of sample"
+            f" {number} they are {least:g} and {most:g} Pa (nodes: {over[number].sum()}"
+            f"{f', further samples: {further}' * (further > 0)}). Only st.Rupture() accepts this"
         )
     finite = np.isfinite(strength)
     if np.max(strength, where=finite, initial=0.0) > MAX_STRENGTH_RATIO * strength.min():
@@ -84,8 +84,8 @@ def contradictions_of(
             problems.append(
                 f"strength: {strength[number].flat[node]:g} Pa at {interface.describe_node(node)}"
                 f" of sample {number} is more than {MAX_STRENGTH_RATIO:g} times the median,"
-                f" {middle[number].item():g} Pa. Check its sign, and where nothing breaks give a"
-                " smaller strength"
+                f" {middle[number].item():g} Pa. Check its sign, and give a smaller strength to"
+                " nodes that never break"
             )
     weakens = ((strength > residual) & finite).reshape(len(strength), -1).any(axis=1)
     if not weakens.all():
@@ -94,7 +94,7 @@ def contradictions_of(
         problems.append(
             "strength: must be above residual_strength at one node or more. In sample"
             f" {number} strength is {known.min():g} to {known.max():g} Pa, and residual_strength is"
-            f" {residual[number].min():g} to {residual[number].max():g} Pa: check their units"
+            f" {residual[number].min():g} to {residual[number].max():g} Pa. Check both units"
         )
     return problems
 
@@ -151,8 +151,8 @@ def check_resolution(problem: Any, weakening_rate: float) -> None:
     least = MIN_NODES_IN_NUCLEATION
     raise InputError(
         f"interface.nodes: must be {_finer(problem, resolution, least)} or more. The nucleation"
-        f" length {length:.3g} m spans {min(*resolution, least - 0.01):.3g} nodes, not {least}."
-        " Check the unit of interface.length (m)"
+        f" length, {length:.3g} m, spans {min(*resolution, least - 0.01):.3g} nodes, but must span"
+        f" {least}. Check the unit of interface.length (m)"
     )
 
 
@@ -165,7 +165,7 @@ def _check_extent(interface: Interface, resolution: Array) -> None:
         if width < (1.0 - 1e-9) * resolution[axis]:
             spacing = interface.spacings[axis]
             raise InputError(
-                f"interface.extent: its {width * spacing:.3g} m along {dim} are narrower than"
+                f"interface.extent: is {width * spacing:.3g} m wide along {dim}, less than"
                 f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen it"
             )
 
@@ -273,8 +273,8 @@ def doubt_strengths(
         initial = float(np.max(np.abs(problem.load.initial_stress)))
     if initial:
         text = (
-            f"initial_stress: its largest size, {initial:.4g} Pa, is"
-            f" {initial / strength:.2g} of the strength. Check its unit (Pa)"
+            f"initial_stress: its largest magnitude, {initial:.4g} Pa, is"
+            f" {initial / strength:.2g} times the strength. Check its unit (Pa)"
         )
         doubts.append(Doubt(text, initial / strength, *INITIAL))
     if doubt_units(doubts):

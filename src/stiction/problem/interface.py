@@ -205,14 +205,14 @@ class Interface(Listed):
                 f" got length = {self.length}, nodes = {self.nodes}"
             )
         if self.width is not None and self.is_plane:
-            raise InputError("width: a plane has its area. Leave the width out")
+            raise InputError("width: lengths of a plane give its area. Leave width out")
         if self.is_free and self.is_plane:
             raise InputError("ends: a plane is periodic. Only lines have free ends")
         if self.size > MOST_NODES:
             raise InputError(f"nodes: must be at most 2^24 in all, got {self.nodes}")
         if min(self.spacings) < SHORTEST:
             raise InputError(
-                f"length: nodes are {min(self.spacings):g} m apart. Check its unit"
+                f"length: nodes are {min(self.spacings):g} m apart. Check the unit"
             )
         if problem := self._wrong_extent():
             raise InputError(f"extent: {problem}")
@@ -236,7 +236,7 @@ class Interface(Listed):
                 )
         if (count := np.count_nonzero(self._inside)) < 2:
             return (
-                f"contains {count}, but must contain at least two nodes, which are"
+                f"contains {count}, but must contain at least two. Nodes are"
                 f" {self.spacing:.3g} m apart. Check its unit (m)"
             )
         return None

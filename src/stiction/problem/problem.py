@@ -153,10 +153,10 @@ class Problem(Listed):
         problems += self._place_profiles()
         if self.interface.is_plane and self.solid.plane != "strain":
             problems.append(
-                "solid.plane: solids of a plane interface are three-dimensional. Leave 'strain'"
+                "solid.plane: must be 'strain' for a plane interface, whose solids are not thin"
             )
         if self.interface.is_plane and self.mode != "II":
-            problems.append(f"mode: a plane has both modes. Leave 'II', got {self.mode!r}")
+            problems.append(f"mode: must be 'II' for a plane, got {self.mode!r}")
         if self.area is None and self.load.pressing_force is not None:
             problems.append(f"load.pressing_force: {NO_AREA}, or load.normal_pressure in Pa")
         problems += [f"friction: {text}" for text in contradictions(self.friction)]
@@ -179,7 +179,7 @@ class Problem(Listed):
             text = "interface.ends: free ends need a specimen. Give specimen=st.Blocks(...)"
             return [text] * interface.is_free
         if interface.is_plane:
-            return ["specimen: blocks meet on a line; give length and nodes one number each"]
+            return ["specimen: blocks meet on a line. Give one length and number of nodes"]
         if interface.ends == "periodic":
             return ["interface.ends: the ends of a specimen are free. Leave it out"]
         object.__setattr__(self, "interface", dataclasses.replace(interface, ends="free"))
@@ -191,7 +191,7 @@ class Problem(Listed):
         if isinstance(specimen, Slider):
             return problems + self._of_slider(specimen)
         if specimen.pressing == "glued" and np.shape(pressure):
-            problems.append("load.normal_pressure: glued blocks make the profile. Give a mean")
+            problems.append("load.normal_pressure: must be a mean, because blocks are glued")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
                 f"specimen.height: below two spacings of {interface.spacing:.3g} m. Take more nodes"
@@ -200,7 +200,7 @@ class Problem(Listed):
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:
             problems.append(
                 f"specimen.height: must be {MIN_HEIGHT_RATIO:g} to {MAX_HEIGHT_RATIO:g} times the"
-                f" length in mode II, is {high:.3g} times. Check the units, or shorten flat blocks"
+                f" length in mode II, got {high:.3g} times. Check the units, or shorten flat blocks"
             )
         return problems
 
@@ -231,15 +231,15 @@ class Problem(Listed):
             place = self.interface.describe_node(int(np.argmin(pressure)))
             raise InputError(
                 f"specimen.pressing: opens the interface at {place} ({pressure.min():.3g} of the"
-                " mean pressure). Press frictionless"
+                " mean pressure). Pass 'frictionless'"
             )
         assert self.specimen is not None  # else there is no drive
         machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
         blocks = 0.5 * depth * self.blocks.drive_stiffness  # of both, in series
         if machine > 0.0:
             text = (
-                f"specimen.drive.stiffness: {machine:.3g} N/m hardly differs from dead load, 0,"
-                f" next to the stiffness of the blocks, {blocks:.3g} N/m. Check its unit (N/m)"
+                f"specimen.drive.stiffness: {machine:.3g} N/m hardly differs from 0 (dead load),"
+                f" because the blocks have {blocks:.3g} N/m. Check its unit (N/m)"
             )
             doubt_units([Doubt(text, machine / blocks, (MIN_MACHINE_RATIO, math.inf))])
 

@@ -74,7 +74,7 @@ def named_profiles(given: Any) -> dict[str, Any]:
         raise InputError(unknown)
     profiles = {name: given[name] for name in given if name in known}
     if not {"strength", "friction_coefficient"} & {*profiles}:
-        raise InputError("strength: missing among the profiles")
+        raise InputError("strength: is missing in the profiles")
     return profiles
 
 
@@ -105,7 +105,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     problems = given_twice(problem, {*given, *quantities.values()}, "profiles")
     problems += [text for name in given for text in mistakes.get(name, ())]
     problems += [
-        f"{name}: must have one sample, or {len(strength)} as the strength, got {len(values)}"
+        f"{name}: must have 1 or {len(strength)} samples, as the strength, got {len(values)}"
         for name, values in rows.items()
         if strength is not None and values.ndim and len(values) not in (1, len(strength))
     ]
@@ -315,7 +315,7 @@ def _in_order(array: Any) -> Any:
         if index.has_duplicates:
             twin = index[index.duplicated()]
             raise InputError(
-                f"x repeats: there are two values at {twin[0]} m ({twin.size} such places). Keep"
+                f"x repeats: there are two values at {twin[0]} m ({twin.size} in all). Keep"
                 f" either, or pass skip= with the lines above the last record{OF_A_PLANE}"
             )
     array = array.unstack()

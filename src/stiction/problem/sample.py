@@ -316,7 +316,7 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
         raise InputError(f"must be positive, got {given}")
     if name == "friction_coefficient" and array.mean() >= FRICTION[1][1]:
         raise InputError(
-            f"its mean is {array.mean():.3g}. A strength needs .assign_attrs(units='Pa')"
+            f"its mean is {array.mean():.3g}. If it is a strength, use .assign_attrs(units='Pa')"
         )
     if name == "residual_strength" and least < 0.0:
         raise InputError(f"must not be negative, got {given}")
@@ -345,7 +345,7 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
     if problem.friction.scale is None and not {*SCALES} & {*names}:
         twice.append(
             f"problem.friction: give one of {', '.join(SCALES)}, or {owner}.{SCALES[0]} and so"
-            " on where it varies from sample to sample. Got none"
+            " on if it varies between samples"
         )
     pressed = problem.given_pressure is not None or "normal_pressure" in names
     if "friction_coefficient" in names and not pressed:
@@ -443,7 +443,7 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
 def accepted_again(problem: Any, sample: Sample, accept: Collection[str]) -> Sample:
     """Return a given `Sample`, or refuse a sample that another problem made."""
     if sample.problem != problem:
-        raise InputError("profiles: the sample was made by another problem. Make it anew")
+        raise InputError("profiles: the sample belongs to another problem. Call problem.sample")
     profiles = sample.strength, sample.residual_strength, sample.initial_stress
     if problems := contradictions_of(problem.interface, *profiles, "overstress" in accept):
         raise InputError(problems)

@@ -55,7 +55,7 @@ UNFIT_FOR_SLIDER = {
     "residual_strength": _NEEDS_COEFFICIENTS,
     "initial_stress": "follows from the pressing of a slider. Leave it out",
     "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
-    "extent": "all of a slider can slip. Leave it out",
+    "extent": "the whole slider can slip. Leave it out",
 }
 """What a slider does not take, by the last part of a key: as stresses,
 profiles or at all."""
@@ -149,11 +149,10 @@ def _beyond_side(drive: Any, height: float) -> list[str]:
     if low >= -1e-9 * height and high <= (1.0 + 1e-9) * height:
         return []
     width = 2.0 * min(drive.height, height - drive.height)
-    highest = height - 0.5 * drive.width
-    fitting = f"width {width:.6g}" if width > 0.0 else f"height {highest:.6g}"
+    name, most = ("width", width) if width > 0.0 else ("height", height - 0.5 * drive.width)
     return [
-        f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, the side from"
-        f" 0 to {height:g} m. The largest {fitting} m fits"
+        f"drive: the pusher reaches from {low:g} to {high:g} m above the interface, but the side"
+        f" is 0 to {height:g} m high. Give a {name} of at most {most:.6g} m"
     ]
 
 
@@ -312,7 +311,7 @@ class Slider(Listed):
         if self.thickness is None and 0.0 < self.drive.stiffness < math.inf:
             problems.append("thickness: is needed unless drive.stiffness is 0 or inf")
         if self.tilt and self.pressing == "plate":
-            problems.append("tilt: a plate does not rotate. Leave tilt out, or press softly")
+            problems.append("tilt: a plate does not rotate. Leave tilt out, or pass 'soft'")
         if problems:
             raise InputError(problems)
         return self
@@ -416,8 +415,8 @@ class Slider(Listed):
         least, ratio = residual.mean(axis=-1).max(), self.toppling_ratio(length)
         if least >= ratio:
             raise InputError(
-                f"specimen.drive.height: the slider topples. It takes a push of at most {ratio:.3g}"
-                f" times the normal force, and its residual friction is {least:.3g}. Push lower"
+                f"specimen.drive.height: the slider topples at a push of {ratio:.3g} times the"
+                f" normal force, but its residual friction is {least:.3g}. Lower the drive"
             )
         # Nodes without pressure hardly weaken.
         return np.maximum(-n * on_cells(rig.T_p[n:]), MIN_PRESSURE)

@@ -127,7 +127,7 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
     points = np.array([np.ravel(row) for row in rows], dtype=np.float64)
     if np.isinf(points).any() or np.isnan(points[:-1]).any():
         raise ValueError(
-            "coordinates must be finite; values must be finite, or NaN if not measured"
+            "coordinates must be finite. Values must be finite, or NaN if not measured"
         )
     points = points[:, ~np.isnan(points[-1])]
     if points.shape[1] == 0:
@@ -181,8 +181,8 @@ class Conditions:
                 f" ({', '.join(names)}), got {len(places)}"
             )
         problems = [
-            f"conditions.profile: {name} reaches from {row.min():g} to {row.max():g} m, the"
-            f" interface is {length:g} m long"
+            f"conditions.profile: {name} reaches from {row.min():g} to {row.max():g} m, but"
+            f" the interface is {length:g} m long"
             for name, row, length in zip(names, places, interface.lengths, strict=True)
             if row.min() < -1e-9 * length or row.max() > length * (1.0 + 1e-9)
         ]
@@ -300,14 +300,14 @@ class Conditioning(NamedTuple):
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 "conditions: the measured values are unlikely for this field (chi-square"
-                f" {self.misfit:.4g} for {self.points}). Check marginal, length and noise"
+                f" {self.misfit:.4g} for {self.points} values). Check marginal, length and noise"
             )
         if max(self.error) > MAX_POSTERIOR_ERROR:
             mean, deviation = self.error
             warn_accuracy(
-                "conditions: the field is approximate where it was measured: its mean is off by up"
-                f" to about {mean:.2g} of its standard deviation, which is off by"
-                f" {100.0 * deviation:.2g} %. Average neighbouring values, and give their noise"
+                "conditions: the field is approximate where it was measured, with errors up to"
+                f" about {mean:.2g} standard deviations in the mean, and {100.0 * deviation:.2g} %"
+                " in the standard deviation. Average neighbouring values, and give their noise"
             )
 
 
@@ -426,7 +426,7 @@ def conditioning_of(
             continue
         conditions.check(field.marginal, interface)
         shape = conditions.values.size, random.dimension(interface)
-        check_memory(f"{name}.conditions.profile", 24.0 * np.prod(shape), "give fewer places")
+        check_memory(f"{name}.conditions.profile", 24.0 * np.prod(shape), "Give fewer places")
         # z combines the property's own draws with the draws of
         # earlier properties.
         basis, phi = field.modes(interface).basis(conditions.places), np.zeros(shape)

@@ -103,7 +103,7 @@ def distributions_of(given: Mapping[str, Any]) -> dict[str, Any]:
             # A name and its full key are the same parameter.
             name = short_key(str(key))
             if name in distributions:
-                problems.append(f"{key} is given twice: it is the same parameter")
+                problems.append(f"{key} is given twice, under two names. Leave either out")
             distributions[name] = distribution_of(str(key), value)
         except InputError as error:
             problems += error.problems

@@ -156,7 +156,7 @@ class EquallyLikely:
             if (named := _named(member)) != first:
                 raise InputError(
                     "random: equally likely interfaces need the same properties, all as stresses or"
-                    f" coefficients: [0] has {first}, and [{number}] {named}"
+                    f" all as coefficients. [0] has {first}, but [{number}] has {named}"
                 )
 
     @property

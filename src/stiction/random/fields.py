@@ -123,7 +123,7 @@ class RandomField(Listed):
         """Return the modes of the field on an interface, or raise an `InputError` without modes."""
         if self.anisotropy is not None and not interface.is_plane:
             raise InputError(
-                f"anisotropy: got {self.anisotropy:g}, but it applies to planes only. Leave it out"
+                f"anisotropy: applies to planes only, got {self.anisotropy:g}. Leave it out"
             )
         return make_modes(self.spectrum, self.mean_mode, self.anisotropy or 1.0, interface)
 
@@ -139,12 +139,12 @@ class RandomField(Listed):
             Standard deviation of the measurement error, in this unit.
         """
         if self.conditions is not None:
-            raise InputError("profile: the field already has a profile. Combine both profiles")
+            raise InputError("profile: the field already has a profile. Combine both in one")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.quantity is not None):
             raise InputError(
                 f"profile: has the unit {stated}. Only a field with quantity='friction_coefficient'"
-                " takes coefficients (unit 1), and it does not take other units"
+                " takes coefficients (unit 1), and takes no other unit"
             )
         conditions: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=conditions)
@@ -362,7 +362,7 @@ class RandomInterface(Listed):
             if getattr(self.properties.get(name), "conditions", None) is not None:
                 problems.append(
                     f"between.{name}: scatters between specimens, but {name}.conditions were"
-                    " measured on a single specimen. Leave one of them out"
+                    " measured on a single specimen. Leave either out"
                 )
             # The field has the mean of the property, and the factor
             # only scatters about it.

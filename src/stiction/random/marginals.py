@@ -275,7 +275,7 @@ class TruncatedNormal(_ByMoments):
         solution = root(moments, [0.0, 0.0], tol=1e-12) if deviation**2 < room else None
         if solution is None or not np.abs(moments(solution.x)).max() < 1e-8:
             raise InputError(
-                f"cv: no normal distribution between low={self.low:g} and high={high:g} has the"
+                f"cv: no normal distribution between low={self.low:g} and high={high:g} has"
                 f" mean={self.mean:g} and cv={self.cv:g}. Lower cv, or take st.Lognormal"
             )
         return frozen(scipy.stats.truncnorm, *parameters(solution.x))

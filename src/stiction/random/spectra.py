@@ -329,7 +329,7 @@ class ExponentialSpectrum(_PowerOfWavenumber):
 
 def _refuse_to_write(function: Any) -> Any:
     name = getattr(function, "__name__", repr(function))
-    raise ValueError(f"spectrum.function is the Python function {name!r}, use a named spectrum")
+    raise ValueError(f"spectrum.function is the Python function {name!r}. Use a named spectrum")
 
 
 @model

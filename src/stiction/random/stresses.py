@@ -122,8 +122,8 @@ def check_residual(problem: Problem, profiles: Mapping[str, Array]) -> None:
     residual = profiles.get("residual_strength", problem.friction.residual(strength))
     share = float(np.mean(strength <= residual))
     text = (
-        f"strength: {100.0 * share:.3g} % of the nodes in the first {len(strength)} sample(s) lies"
-        " at or below the residual strength"
+        f"strength: {100.0 * share:.3g} % of the nodes lie at or below the residual strength"
+        f" (samples: {len(strength)})"
     )
     if share > MAX_SHARE:
         raise InputError(

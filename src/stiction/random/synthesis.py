@@ -218,8 +218,8 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
         modes = max(0.5 * math.pi * float(np.prod(largest)), rectangle / 8.0)
     if not modes <= MAX_MODES:
         raise InputError(
-            f"spectrum: has {modes:.10g} modes on this interface, at most {MAX_MODES} are"
-            " allowed. Truncate it earlier, or check the units of the lengths"
+            f"spectrum: has {modes:.10g} modes on this interface, more than the limit of"
+            f" {MAX_MODES}. Truncate it earlier, or check the units of the lengths"
         )
     if not interface.is_plane:
         return np.arange(math.floor(modes) + 1)[None, :]

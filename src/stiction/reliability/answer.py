@@ -310,7 +310,7 @@ class Answer(Result):
             rows.append(Row(name.replace("_", " "), value, interval.get(name, ()), si))
         rows += [
             Row("coefficient of variation", self.cv or math.nan),
-            Row("part of it by the list of interfaces", self.members_cv or math.nan),
+            Row("of which by choice of the interfaces", self.members_cv or math.nan),
             Row("90 % of interfaces are between", low, self.band),
             Row("95 % of interfaces have at most", high if math.isnan(low) else math.nan),
             Row("fraction that survives any stress", self.survived or math.nan),
@@ -325,7 +325,9 @@ class Answer(Result):
             title = "No stress has this probability"
         notes = [f"{self.algorithm}, {self.evaluations} evaluations: {self.reason}"]
         if moves := moves_of(self):
-            notes.append("interval: the error of the computation only. The design moves by:")
+            notes.append(
+                "interval: errors of the computation only. Sensitivities of the design:"
+            )
         for source, least, most, *designs in moves:
             ends = " to ".join(filter(None, (least, most)))
             notes.append(f"  {source}: {ends}: {' to '.join(filter(None, designs))}")

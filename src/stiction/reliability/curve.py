@@ -68,7 +68,7 @@ CURVE: dict[str, Variable] = {
         ("stress_high", "Pa", "upper end of the interval of the stress"),
         ("band_low", "1", "probability that 5 % of the interfaces do not exceed"),
         ("band_high", "1", "probability that 95 % of the interfaces do not exceed"),
-        ("members_cv", "1", "part of the coefficient of variation by the list of interfaces"),
+        ("members_cv", "1", "part of the coefficient of variation by the choice of interfaces"),
     )
 }
 CURVE["members"] = Variable("1", "probability of each interface", ("point", "member"))

@@ -284,7 +284,7 @@ def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> A
     reason = f"no interface slides at or below {low:.7g} Pa"
     if chance:
         reason = f"no interface carries more than {high:.7g} Pa"
-    reason += "" if certain else f", but for a probability below {doubt:g}"
+    reason += "" if certain else f", except with a probability below {doubt:g}"
     members = len(state.experiment.random.members)
     if state.several:  # another list might have other bounds
         doubt = max(doubt, binomial_interval(0, members)[1])

@@ -158,7 +158,7 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
         return None
     return (
         f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} take about"
-        f" {seconds / 3600.0:.1g} h. Allow them with max_evaluations, or count: algorithm='plain'"
+        f" {seconds / 3600.0:.1g} h. Allow them with max_evaluations, or pass algorithm='plain'"
     )
 
 
@@ -231,7 +231,7 @@ def with_enough_members(
         count = wanted_members(known, solution.members_cv, target_cv)
         if not count or spent + cost > budget:
             return experiment, solution, spent
-        meter.note = f"{count:,} interfaces, cv by the list {solution.members_cv:.2g}"
+        meter.note = f"{count:,} interfaces, cv by their choice {solution.members_cv:.2g}"
         larger = drawn_from(known.source, count, experiment.seed)
         # A posterior over a list has hardly more different members,
         # however many are drawn.
@@ -251,14 +251,14 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
     members = np.nan_to_num(estimate.members)
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
-    carried = f", and {count} of its {shares.size} different ones carry {CARRIED_SHARE:.0%}"
+    carried = f", and {count} of {shares.size} different ones carry {CARRIED_SHARE:.0%}"
     advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
     if random.source is not None:
         advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
     return [
-        f"the list of interfaces is a sample{f'{carried} of the mean' * bool(shares[-1])}. By this"
-        f" alone the coefficient of variation is {by_list:.2g} (target {target_cv:g}). {advice}, or"
-        " measure more"
+        f"the interfaces are a sample{f'{carried} of the mean' * bool(shares[-1])}. This choice"
+        f" alone gives a coefficient of variation of {by_list:.2g} (target {target_cv:g})."
+        f" {advice}, or measure more"
     ]
 
 
@@ -314,5 +314,5 @@ def exact_doubts(point: TailPoint) -> list[str]:
         f"of {chosen.size} samples in the tail {failed} fail by the {experiment.method.label} and"
         f" {failed_exactly} by {exact.label}. The probability by st.{type(exact).__name__}() is"
         f" {'about' if failed_exactly else 'below'} {there:.2g}, not {point.probability:.2g}."
-        " Use it"
+        " Use the exact method"
     ]

@@ -140,7 +140,7 @@ class Tail(NamedTuple):
         text = f"{self.spent} evaluations do not reach {goal}"
         if self.algorithm == "subset":
             chance = self.probability(self.reached)
-            text += f": they come down to {self.reached:.7g} Pa (P = {chance:.2g})"
+            text += f", but come down to {self.reached:.7g} Pa (P = {chance:.2g})"
         return f"{text}. Raise max_evaluations"
 
     @property
@@ -399,7 +399,7 @@ def sample_tail(
     # many of them.
     if auto and guide and _share_failing(repetitions[0]) < POOR:
         share = _share_failing(repetitions[0])
-        reason += f"; {share:.1%} of the failures by the {label} hold: a poor guide"
+        reason += f"; only {share:.1%} of the failures by the {label} are confirmed"
         guide, repetitions = None, _repetitions(state, goal, budget - spent)
         spent += sum(descent.evaluations for descent in repetitions)
     return Tail(repetitions, "subset" if guide is None else "two_level", reason, spent)

@@ -140,7 +140,7 @@ class StoredRun:
 
     def _checked(self, rows: Gathered) -> xr.Dataset:
         for name, text in self._store.damage.items():
-            self._store.warn(f"{name}: {text}; its samples are missing. Run the study again")
+            self._store.warn(f"{name}: {text}. Its samples are missing. Run the study again")
         attributes = self.study.attributes | (self._store.pilot or {})
         return rows.dataset(attributes, self.study.axes)
 
@@ -258,13 +258,13 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     names = [str(name) for name, values in result.data_vars.items() if "event" in values.dims]
     if not names:
         raise InputError(
-            "result: has no events; give the method events=, such as st.Equilibrium(events=20), or"
-            " take st.equilibrium_path or st.simulate_rupture"
+            "result: has no events. Give the method events=, as in st.Equilibrium(events=20), or"
+            " call st.equilibrium_path or st.simulate_rupture"
         )
     if "sample" in result.dims:
         most, kept = int(result["arrested_events"].max()), result.sizes["event"]
         if most > kept:
-            warn_accuracy(f"events: {kept} of up to {most} a sample are kept; raise events=")
+            warn_accuracy(f"events: {kept} of up to {most} a sample are kept. Raise events=")
     frame = _frame_of(result[names])
     return frame[frame["event_load (Pa)"].notna()].reset_index(drop=True)
 
@@ -286,7 +286,7 @@ def table_of(result: xr.Dataset) -> pd.DataFrame:
     if wide:
         warn_accuracy(
             f"{', '.join(wide)}: has several numbers for each sample and does not fit into a table."
-            " Export a .nc file to keep it, or a table of --events (in Python events=True)"
+            " Export a .nc file, or a table of --events (in Python events=True)"
         )
     return _frame_of(result.drop_vars(wide))
 

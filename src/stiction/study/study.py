@@ -277,7 +277,7 @@ class Study(_Parts):
         unused = [f"{name}: has no effect on given profiles" for name in ("reliability", "peaks")
                   if getattr(self, name) is not None]  # fmt: skip
         if self.samples > 1:
-            unused.append("samples: given profiles are a single sample")
+            unused.append("samples: must be 1, because profiles are given")
         if unused:
             raise InputError(unused)
         sample = Measured(self.problem, self.profiles, self.method)._sample
@@ -561,7 +561,7 @@ def open_run(path: Any) -> StoredRun:
         study = Study.from_dict(plain)
     except InputError as error:
         raise StoreError(
-            f"{place}: this installation cannot read its study: {'; '.join(error.problems)}. "
+            f"{place}: this installation cannot read its study: {'; '.join(error.problems)}."
             " Install the version that wrote it, or the package that defines the missing class"
         ) from None
     return StoredRun(store, study)

@@ -102,7 +102,7 @@ def read_axes(given: Any) -> list[Axis]:
             problems[f"{key}: is swept twice, by {' and '.join(inside)}"] = None
     points = math.prod(len(next(iter(axis.values()))) for axis in axes)
     if points > MOST_POINTS:
-        problems[f"makes {points} points, at most {MOST_POINTS} are allowed"] = None
+        problems[f"makes {points} points, more than the limit of {MOST_POINTS}"] = None
     if problems:
         raise InputError(problems)
     return axes

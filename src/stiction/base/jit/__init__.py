@@ -3,7 +3,7 @@
 import os
 
 if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
-    raise ImportError("NUMBA_DISABLE_JIT is set, but kernels must be compiled. Unset it")
+    raise ImportError("Kernels must be compiled. Unset NUMBA_DISABLE_JIT")
 
 from stiction.base.jit.decorators import ZERO as ZERO
 from stiction.base.jit.decorators import jit as jit

@@ -35,7 +35,7 @@ from stiction.base.files import kernel_folder
 NEWEST = (0, 68)
 """The newest numba with which the tests ran."""
 if numba.version_info.short > NEWEST:
-    raise ImportError(f"numba {numba.__version__} was not tried")
+    raise ImportError(f"numba {numba.__version__} was not tested")
 
 
 class _Locator(_CacheLocator):

@@ -133,7 +133,7 @@ def _stress_drops(problem: Problem) -> Array:
     """Return stress drops (2, nodes) at the nodes, Pa: without a load, and by a unit load."""
     if problem.interface.is_plane:
         raise InputError("problem: must have a line interface")
-    refuse_specimen(problem, "the theory of cracks between half-spaces", "use st.Equilibrium()")
+    refuse_specimen(problem, "the theory of cracks between half-spaces", "Use st.Equilibrium()")
     if problem.friction.residual_ratio is not None:
         raise InputError(
             "problem.friction.residual_ratio: the stress drop needs the residual strength in Pa."

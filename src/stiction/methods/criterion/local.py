@@ -53,8 +53,8 @@ COARSE_PLANE = (
 )
 COARSE_LINE = (
     12.0,
-    "if the strength varies within a quarter of it, the local criterion is off by about 0.8 %"
-    " (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
+    "if the strength varies within a quarter of this length, the local criterion is off by about"
+    " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
 )
 """Nodes in a nucleation length without a warning, and the error on
 coarser grids."""
@@ -155,7 +155,7 @@ class LocalCriterion(Listed):
         if friction.plateau:
             reasons.append(
                 "friction.strength: begins with a plateau, on which no patch is unstable, but the"
-                f" local criterion takes W from zero slip on{INSTEAD}"
+                f" local criterion assumes weakening from zero slip{INSTEAD}"
             )
         if friction.steepening > 1.0:
             reasons.append(
@@ -280,8 +280,8 @@ def _onset_of_specimen(problem: Problem, sample: Sample) -> dict[str, Array]:
             load[i], c, start[i] = weakest_window(excess[i], profile, W, windows, np.inf, work)
             if not np.isfinite(load[i]):
                 raise InputError(
-                    "interface.extent: no part of it becomes unstable by itself, so the local"
-                    " criterion does not hold; use st.Equilibrium()"
+                    "interface.extent: no part becomes unstable by itself, so the local"
+                    " criterion does not hold. Use st.Equilibrium()"
                 )
             width[i] = windows.widths[c]
             # 3. Under a dead load, slip does not change
@@ -371,7 +371,7 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     # A profile has one nucleation length.
     ((weakening_rate, _), *further_weakening_rates) = _weakening_rates(sample)
     if further_weakening_rates:
-        raise InputError("weakening_rate: differs between samples. Pass each sample alone")
+        raise InputError("weakening_rate: differs between samples. Pass a single sample")
     excess, profile = excess_of(sample), sample.load_profile
     windows = windows_of(problem, weakening_rate)
     samples = averages(interface, windows, excess, profile)

@@ -40,7 +40,7 @@ def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
         problem,
         rows.steepest_weakening_rate,
         15.0,
-        f"expect {expected} error in slip just after onset (3 % at 16 nodes, 0.6 % at 32). The"
+        f"expect an error of {expected} in slip after the onset (3 % at 16 nodes, 0.6 % at 32). The"
         " critical load is far less sensitive",
     )
 
@@ -54,8 +54,8 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
     steep = np.flatnonzero((state.slip > 0.0) & (steepest < W))
     if steep.size:
         warn_accuracy(
-            f"{steep.size} nodes slipped, the first at {interface.describe_node(steep[0])}, "
-            f"where the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
+            f"slip reached {interface.describe_node(steep[0])} (nodes in all: {steep.size}), where"
+            f" the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
             " for this grid. Take more nodes, or end the interface there (interface.extent)"
         )
     if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
@@ -79,7 +79,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
     if np.spacing(time) > 0.01 * step:
         raise InputError(
             f"loading_rate: the first slip would come after {time:.3g} s, too late to resolve "
-            f"steps of {step:.2g} s. Load faster (at this rate the onset hardly changes)"
+            f"steps of {step:.2g} s. Load faster, which hardly changes the onset"
         )
     scale = run.scale_at(float(value_at(run.setting.load, time)))
     if not scale > 0.0:
@@ -93,7 +93,7 @@ def at_first_slip(run: Run) -> RuptureState | None:
         )
         if rise > _MAX_RISE:
             raise InputError(text)
-        warn_accuracy(f"{text} (the onset would be resolved poorly)")
+        warn_accuracy(f"{text} to resolve the onset")
     return run.start(time)
 
 
@@ -112,8 +112,8 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 def warn_of_cut_events(cut: Iterable[bool]) -> None:
     """Warn about samples whose last event had not ended when their run did."""
     warn_of_samples(
-        "end_time: the last event had not ended when its run did in {samples}. Its moment,"
-        " energies and stress drops are values at this time (event_settled is 0). Raise end_time",
+        "end_time: the run ended during the last event in {samples}. Moment, energies and stress"
+        " drops of this event are values at end_time (event_settled is 0). Raise end_time",
         list(cut),
     )
 
@@ -126,9 +126,8 @@ def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
     excess = 100.0 * (found / np.array(in_equilibrium) - 1.0)
     warn_of_samples(
         "first_instability is up to {worst:.2g} % above the first instability in equilibrium in"
-        " {samples}: a jump that lowers the mean stress by less than 1e-4 of the stress scale was"
-        " not noticed, as happens if few nodes jump on a coarse grid, or the load rises too"
-        " fast. Take more nodes, load more slowly, or use st.Equilibrium()",
+        " {samples}. A jump that lowered the mean stress by less than 1e-4 of the stress scale was"
+        " missed. Take more nodes, load more slowly, or use st.Equilibrium()",
         excess > MISSED_PERCENT,
         excess,
     )

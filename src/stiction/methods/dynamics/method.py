@@ -153,9 +153,9 @@ class Rupture(Listed):
     def _consistent(self) -> Rupture:
         problems = []
         if self.loading_rate is not None and self.load_history is not None:
-            problems.append("loading_rate: give either loading_rate or load_history. Got both")
+            problems.append("loading_rate: give either loading_rate or load_history, got both")
         if self.stop == "time" and self.end_time is None:
-            problems.append("end_time: is needed with stop='time', in s. Got None")
+            problems.append("end_time: is needed in s with stop='time', got None")
         if problems:
             raise InputError(problems)
         return self
@@ -179,7 +179,7 @@ class Rupture(Listed):
             return specimens.refusals(self, problem)
         reasons = []
         if self.loading_rate is None and self.load_history is None:
-            reasons = ["loading_rate: give either loading_rate or load_history. Got neither"]
+            reasons = ["loading_rate: give either loading_rate or load_history, got neither"]
         return reasons
 
     def bounded_by_strength(self, problem: Problem, event: str) -> tuple[bool, bool]:
@@ -259,7 +259,7 @@ class Rupture(Listed):
             if ended is None:
                 step = state.now["step"]
                 raise InputError(
-                    f"max_steps: {self.max_steps} steps did not reach stop={self.stop!r}, only"
+                    f"max_steps: {self.max_steps} steps did not reach stop={self.stop!r}, but"
                     f" tau_0 = {step['load']:.6g} Pa with {step['weakened_nodes']} nodes at their"
                     " residual strength. Raise max_steps or the loading rate"
                 )

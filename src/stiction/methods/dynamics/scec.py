@@ -162,6 +162,6 @@ def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
             return names
     twins = [name for name, file in zip(stations, names, strict=True) if names.count(file) > 1]
     raise InputError(
-        f"run: the stations {', '.join(twins)} are not all at different nodes, which their files"
-        " are named after. Simulate with stations at nodes of their own"
+        f"run: some of the stations {', '.join(twins)} share a node, after which their files would"
+        " be named. Place each station at a different node"
     )

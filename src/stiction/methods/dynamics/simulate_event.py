@@ -78,7 +78,7 @@ def simulate_event(
     """Return an event of a specimen over time, by default the sliding event."""
     if save.to is not None or save.stations:
         raise InputError(
-            "save: leave 'to' and 'stations' out, as on specimens all is in memory"
+            "save: specimens keep results in memory. Leave 'to' and 'stations' out"
         )
     refuse_overstress(rows)
     search: RuptureSearch = method.search(problem)

@@ -79,7 +79,7 @@ def refusals(method: Any, problem: Problem) -> list[str]:
     # An option with its default value was not asked for.
     usual = type(method)()
     reasons = [
-        f"{name}: leave it out, it has no effect on a specimen, which is loaded slowly"
+        f"{name}: has no effect on a specimen, which is loaded slowly. Leave it out"
         for name, value in vars(method).items()
         if name not in OPTIONS and value != getattr(usual, name)
     ]
@@ -252,4 +252,4 @@ class RuptureSolver(OnsetSolver):
 def refuse_overstress(rows: Sample) -> None:
     """Raise an `InputError` for stress above the strength, which only half-spaces accept."""
     if np.any(rows.strength < rows.initial_stress):
-        raise InputError("initial_stress: on specimens, it must not be above the strength")
+        raise InputError("initial_stress: must not be above the strength of a specimen")

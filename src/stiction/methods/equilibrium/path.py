@@ -194,7 +194,7 @@ def equilibrium_path(
     check("problem", problem, Problem)
     blocks = isinstance(problem.specimen, Blocks)
     if method is not None and not (blocks and hasattr(method, "search")):
-        raise InputError("method: only st.Rupture(), and only for st.Blocks. Leave it out")
+        raise InputError("method: must be st.Rupture() for st.Blocks. Otherwise leave it out")
     rows = problem.sample(profiles)
     if rows.samples != 1:
         raise InputError(f"profiles: must be a single sample, got {rows.samples}")

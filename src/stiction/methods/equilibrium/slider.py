@@ -68,13 +68,13 @@ NODES_AT_ENDS = 16
 """Nodes in a nucleation length without a warning about the ends of the
 slider."""
 COARSE_ENDS = (
-    "stress is singular at the ends of the slider. At 17 nodes, twice as many move static friction"
-    " by up to 0.04 % and the first instability by up to 0.5 %"
+    "stress is singular at the ends of the slider. If 17 nodes are doubled, static friction changes"
+    " by up to 0.04 %, and the first instability by up to 0.5 %"
 )
 WARNINGS = (
     "the path was not followed to its end in {samples}: static friction is a lower bound",
     "the slider topples before it slides in {samples}: static friction is the force at which it"
-    " topples. Push lower",
+    " topples. Lower the drive",
     "no patch becomes unstable in {samples}: the machine is so stiff that the slider slides stably,"
     " and first_instability is NaN",
 )

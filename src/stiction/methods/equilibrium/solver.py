@@ -67,8 +67,8 @@ MIN_NODES = 8.0
 the expected error."""
 ERRORS_OF_COARSE_GRIDS = {  # by the number of dimensions
     1: "single onsets are off by 0.4 % at 9 nodes and 3 % at 4 if the correlation length is a"
-    " quarter of it, by 3 and 9 % if it is a tenth",
-    2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, by 0.5 % at 6 and 4",
+    " quarter of the nucleation length, and by 3 and 9 % if it is a tenth",
+    2: "single onsets are off by 0.15 % at 9 nodes along x and 6 along y, and by 0.5 % at 6 and 4",
 }
 MIN_PEAK_HEIGHT = 0.02
 """A peak that is hardly higher than the stress of sliding gets a
@@ -310,15 +310,15 @@ class OnsetSolver:
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
             f"the bounds of the first instability did not close to {self.search.widest_gap:g} of"
-            " the load in {samples}. They hold, but are up to {worst:.2g} of the load apart. Take"
-            " more nodes",
+            " the load in {samples}. The bounds hold, but are up to {worst:.2g} of the load apart."
+            " Take more nodes",
             ~unproved & ~(share <= self.search.widest_gap),
             share,
         )
         if self.problem.interface.is_plane:
             warn_of_samples(
                 "nodes reach a corner of the law or their residual strength before the first"
-                " instability in {samples}: it was found by following equilibria, to {worst:.2g}"
+                " instability in {samples}. It was found by following equilibria, to {worst:.2g}"
                 " of the load, and has no certificate",
                 unproved & np.isfinite(first),
                 share,
@@ -336,7 +336,7 @@ class OnsetSolver:
             ~known,
         )
         warn_of_samples(
-            "a slipping node stops before the first instability in {samples}: equilibria are no"
+            "a slipping node stops before the first instability in {samples}. Equilibria are no"
             " longer the least, so the first instability has no upper bound and certificate_gap is"
             " NaN",
             stopped & np.isfinite(first),

@@ -343,7 +343,7 @@ class PiecewiseWeakening(FrictionLaw):
         slip, strength = self.corners
         if slip.size != strength.size or slip.size < 2:
             given = f"{slip.size - 1} and {strength.size - 1}"
-            raise InputError(f"slip and strength: give a number for each corner, got {given}")
+            raise InputError(f"slip and strength: must have equal lengths, got {given}")
         if np.any(np.diff(slip) <= 0.0) or slip[-1] != 1.0:
             raise InputError(f"slip: must increase from above 0 to exactly 1, got {self.slip}")
         falls = -np.diff(strength)
@@ -480,14 +480,14 @@ def contradictions(law: FrictionLaw) -> list[str]:
     if not 0.0 < law.reach < np.inf:
         return [
             f"{name}: slip_at(0), or slip_at({NEARLY_RESIDUAL}) if that is infinite, must be"
-            f" positive and finite, got {law.reach:g}. Its f must fall with slip, from 1 towards 0"
+            f" positive and finite, got {law.reach:g}. Let f fall with slip, from 1 towards 0"
         ]
     try:
         u, f, slope = _examined(law)
     except Exception as error:  # of any kind: the code is another's
         lines = [line for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in lines if "pipeline" not in line), type(error).__name__)
-        return [f"{name}: numba cannot compile its f, which must return f and -f': {reason}"]
+        return [f"{name}: f must return f and -f', but numba cannot compile it: {reason}"]
     # The first violation is reported: the later checks may follow from
     # it. f states its slope too, which kernels need.
     rising = u[:-1][np.diff(f) > 1e-9]
@@ -495,15 +495,15 @@ def contradictions(law: FrictionLaw) -> list[str]:
     wrong = {
         f"f and -f' must be finite up to u = {u[-1]:.4g}": not np.isfinite([f, slope]).all(),
         f"f(0) must be 1, got {f[0]:g}": not abs(f[0] - 1.0) <= 1e-9,
-        f"f must fall from zero slip on, got -f'(0) = {slope[0]:g}; it sets the weakening rate":
+        f"f must fall from zero slip on, got -f'(0) = {slope[0]:g}, the weakening rate":
             not min(slope[0], law.initial_slope) > 0.0,
-        f"strength must not rise with slip, as beyond u = {rising.min(initial=u[-1]):.4g}; no"
-        " method follows a hump (begin at its top, with tau_p there)": rising.size,
-        f"the integral of f, area(inf), must be finite, got {law.integral:g}; let f end at 0":
+        f"strength must not rise with slip, but rises at u = {rising.min(initial=u[-1]):.4g}. Begin"
+        " at the top of the hump, with tau_p there": rising.size,
+        f"the integral of f, area(inf), must be finite, got {law.integral:g}. Let f end at 0":
             not 0.0 < law.integral < np.inf,
-        f"initial_slope is {law.initial_slope:.3g}, but {slope[0]:.3g} by its f":
+        f"initial_slope is {law.initial_slope:.3g}, but -f'(0) is {slope[0]:.3g}":
             not abs(law.initial_slope - slope[0]) <= near,
-        f"the integral of -f' is {fall:.3g}, but {1.0 - f[-1]:.3g} by its f":
+        f"the integral of -f' is {fall:.3g}, but f falls by {1.0 - f[-1]:.3g}":
             not abs(fall - 1.0 + f[-1]) <= near,
     }  # fmt: skip
     return [f"{name}: {text}" for text, is_so in wrong.items() if is_so][:1]

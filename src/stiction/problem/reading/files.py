@@ -132,8 +132,8 @@ def _table_of_text(content: bytes, options: Options, source: str) -> Table:
         cells = max(marks, len(content.split()))
         if cells > MAX_UNEVEN_CELLS:
             raise InputError(
-                f"has about {cells} cells in lines of different kinds, at most {MAX_UNEVEN_CELLS}"
-                " can be read. Remove remarks, and give each line the same number of cells"
+                f"has about {cells} cells in lines of different kinds, more than"
+                f" {MAX_UNEVEN_CELLS}. Remove remarks, and give each line the same number of cells"
             )
     return table_of(_lines(_text(content), options), options, source)
 
@@ -175,7 +175,7 @@ def _lines(text: str, options: Options) -> Grid:
     try:
         pairs = [*zip(lines, split, strict=True)]
     except (ValueError, csv.Error):
-        raise InputError("has a quotation mark that does not end in its line") from None
+        raise InputError("has a quotation that does not end in its line") from None
     rows = [Row(number, [cell.strip() for cell in cells]) for (number, _), cells in pairs]
     return Grid(rows, comments, separator)
 
@@ -219,12 +219,12 @@ def _check_line(number: int, line: str, separator: str) -> None:
     cells = line.rstrip(separator).split(None if separator == " " else separator)
     if len(cells) > MAX_COLUMNS:
         raise InputError(
-            f"line {number} has {len(cells)} columns, at most {MAX_COLUMNS} can be read. Write"
-            " each value of a profile into a line of its own"
+            f"line {number} has {len(cells)} columns, more than {MAX_COLUMNS}. Write each value"
+            " of a profile into a line of its own"
         )
     if (letters := max(map(len, cells), default=0)) > MAX_LETTERS:
         raise InputError(
-            f"line {number} has a cell of {letters} characters. At most {MAX_LETTERS} can be read"
+            f"line {number} has a cell of {letters} characters, more than {MAX_LETTERS}"
         )
 
 
@@ -276,7 +276,7 @@ def _sheet(content: bytes, options: Options) -> Grid:
     try:
         import openpyxl
     except ImportError:
-        raise InputError("needs openpyxl (pip install openpyxl), or save it as .csv") from None
+        raise InputError("needs openpyxl. Run pip install openpyxl, or save as .csv") from None
     with refuse_damage("a workbook"):
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             sizes = {part.filename: part.file_size for part in archive.infolist()}
@@ -290,7 +290,7 @@ def _sheet(content: bytes, options: Options) -> Grid:
         listed = ", ".join(map(repr, sheets))
         chosen = dict(enumerate(sheets.values())) | sheets
         if options.sheet not in chosen:
-            raise InputError(f"sheet: {options.sheet!r} is not one of {listed}")
+            raise InputError(f"sheet: must be one of {listed}, got {options.sheet!r}")
         rows = _cells_of(chosen[options.sheet], len(content))
     if len(sheets) > 1 and not any(any(map(NUMBER.match, row.cells)) for row in rows):
         raise InputError(

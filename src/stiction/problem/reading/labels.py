@@ -68,8 +68,8 @@ Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
 ]
 OF_A_PLANE = (
-    ". A map has columns or coordinates x and y, or is an array (nx, ny), as np.loadtxt(path).T"
-    " reads a matrix, and needs an interface of two lengths and two numbers of nodes"
+    ". A map needs columns or coordinates x and y, or an array (nx, ny), such as np.loadtxt(path).T"
+    " of a matrix, and an interface with two lengths and two numbers of nodes"
 )
 """Advice for two dimensions where a line was expected."""
 
@@ -160,8 +160,8 @@ def named(
     if hasattr(data, "to_xarray") and hasattr(data, "index"):
         if data.ndim == 1 or not all(isinstance(name, str) for name in data.columns):
             raise InputError(
-                "a table of pandas needs headings, such as x (mm) and strength (MPa). Give values"
-                " in their order by .to_numpy()"
+                "a table of pandas needs headings, such as x (mm) and strength (MPa). For values"
+                " in the order of nodes, pass .to_numpy()"
             )
         data = table_of_frame(data)
     if isinstance(data, Table):
@@ -175,13 +175,13 @@ def named(
         if hasattr(data, "data_vars"):
             array, read = _of_dataset(data, quantity, dims, value)
         elif value not in (None, data.name):
-            raise InputError(f"value: {value!r} is not the only variable, {data.name!r}")
+            raise InputError(f"value: must be the only variable, {data.name!r}, got {value!r}")
         if x is not None or {*array.coords} != {*dims}:
             array = _with_places(array, dims, x)
     # 2. The dimensions.
     array = _directed(array, dims)
     if len({*dims} & {*array.coords}) == 1 < len(dims):
-        raise InputError("has only one of the coordinates x and y. Give both or none")
+        raise InputError("has only one of the coordinates x and y. Give both")
     array.attrs |= {"read": read, "lines": getattr(data, "lines", ())}
     return array
 
@@ -363,7 +363,7 @@ def _directed(array: Any, dims: tuple[str, ...]) -> Any:
     clear = single or along in ([*dims], ["row"])
     if not clear or len(samples) > 1 or "y" in samples or len({*array.dims}) < array.ndim:
         raise InputError(
-            f"which dimensions run along the interface is not clear from ({', '.join(names)}). Call"
+            f"the dimensions ({', '.join(names)}) do not say which run along the interface. Call"
             f" them 'x', 'y' (across slip) and 'sample'{OF_A_PLANE * (len(dims) == 1)}"
         )
     array = array.drop_vars([name for name in array.coords if name not in dims])

@@ -296,8 +296,8 @@ def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[R
         if len(row.cells) < width:
             most = next(row.number for row in rows if len(row.cells) >= width)
             raise InputError(
-                f"line {row.number} has {len(row.cells)} columns, line {most} has {width}. Remove"
-                " the line, or give it the same number of cells"
+                f"line {row.number} has {len(row.cells)} columns, but line {most} has {width}."
+                " Remove the line, or give it the same number of cells"
             )
     return rows
 
@@ -315,7 +315,7 @@ def _check_pairs(columns: Sequence[Sequence[str]], first: Row) -> None:
     digits = re.compile(r"[+-]?\d+")
     if all(digits.fullmatch(cell) for cells in columns for cell in cells):
         raise InputError(
-            f"line {first.number}: {','.join(first.cells)!r} may be a number or two. Separate"
+            f"line {first.number}: {','.join(first.cells)!r} may be one number or two. Separate"
             " columns with ';', or write decimal points"
         )
 
@@ -407,7 +407,7 @@ def _headings(header: list[Row], width: int) -> list[tuple[str, str, str]]:
     number, names, _ = header[-1]
     if len(names) != width:
         raise InputError(
-            f"line {number} names {len(names)} columns, the numbers below it have {width}. Begin"
+            f"line {number} names {len(names)} columns, but the lines below have {width}. Begin"
             " comment lines with '#', or pass skip= with the number of lines above the headings"
         )
     # A row below the names may hold the units. LabVIEW writes them
