@@ -1,7 +1,7 @@
 """The system of Albertini, Karrer, Grigoriu and Kammer (2020), for examples and tests.
 
-It uses the public names of the package only. They are imported on first
-use, so that a `Problem` does not load random fields.
+This file uses only public names of the package, which are imported on
+first use, so that a `Problem` does not load random fields.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def strength(problem: st.Problem, correlation_ratio: Positive = 0.5) -> st.Rando
     Parameters
     ----------
     problem : Problem
-        A problem. Its nucleation length h_n sets the scale.
+        Problem whose nucleation length h_n sets the scale.
     correlation_ratio : float
         Ratio xi_0/h_n, positive, with xi_0 = 2 pi/lambda.
     """

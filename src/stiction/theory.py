@@ -1,4 +1,4 @@
-"""Theory of the local criterion and cracks: results that do not need an ensemble.
+"""Theory of the local criterion and of cracks: results without an ensemble.
 
 The exact mean and variance of the nucleation stress are computed here.
 """
@@ -117,10 +117,10 @@ def nucleation_statistics(problem: Problem, strength: RandomField) -> Nucleation
 
 
 def stationary(problem: Problem, strength: RandomField) -> tuple[float, float, float]:
-    """Return the unit of the strength (Pa), the load profile and initial stress if all are uniform.
+    """Return the unit of the strength (Pa), the load profile and the initial stress, all uniform.
 
     The unit of friction coefficients is the normal pressure. Raises an
-    `InputError` if any of them varies along the interface.
+    `InputError` if a value varies along the interface.
     """
     check_law(problem)
     refuse_specimen(problem, "this theory", "Sample the nucleation stress with st.monte_carlo")

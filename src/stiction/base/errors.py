@@ -16,7 +16,7 @@ _OURS = (
     "stiction", "pydantic", "dataclasses", "functools", "concurrent", "threading", "contextlib"
 )  # fmt: skip
 LISTED = 5
-"""Samples whose numbers a warning lists."""
+"""Number of samples that a warning lists at most."""
 _FIGURES = r"[-+]?\d+(?:,\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"(?<![\w.]){_FIGURES}(?: to {_FIGURES})?")
 """Numbers and ranges in a warning."""
@@ -53,23 +53,29 @@ def printable(text: str) -> str:
 
 
 class AccuracyWarning(UserWarning):
-    """A result is valid but less accurate than it could be. The message gives the error."""
+    """Warning: a valid result is less accurate than it could be.
+
+    The message gives the error.
+    """
 
 
 class UnitWarning(UserWarning):
-    """A value that no solid has. It is probably not in the assumed unit."""
+    """Warning: no solid has such a value, which is probably not in the assumed unit."""
 
 
 class RunError(RuntimeError):
-    """A run cannot continue. Stored results are kept, and the message gives the remedy."""
+    """Error: a run cannot continue.
+
+    Stored results are kept, and the message gives the remedy.
+    """
 
 
 class StoreError(RunError):
-    """A folder or file cannot be used or written."""
+    """Error: a folder or file cannot be used or written."""
 
 
 class WorkerError(RunError):
-    """Workers died or could not be reached."""
+    """Error: workers died or could not be reached."""
 
 
 def unknown(given: str, valid: Iterable[str]) -> str:
@@ -109,7 +115,7 @@ def warn_accuracy(message: str) -> None:
 
 
 class Warned(NamedTuple):
-    """A collected warning. It concerns samples if its `total` is above zero."""
+    """A collected warning, which concerns samples if its `total` is above zero."""
 
     text: str  # with {samples} and {worst} if it concerns samples
     category: type[Warning]
@@ -127,10 +133,7 @@ class Warned(NamedTuple):
         return self.text.format(samples=shown, worst=self.worst)
 
     def after(self, first: int) -> Warned:
-        """Return the warning with the numbers of its samples.
-
-        `first` is the first number.
-        """
+        """Return the warning with its samples numbered from `first`."""
         return self._replace(numbers=tuple(first + number for number in self.numbers))
 
     def unnumbered(self) -> Warned:

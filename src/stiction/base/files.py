@@ -118,7 +118,7 @@ def refuse_damage(kind: str) -> Iterator[None]:
 def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
     """Write a temporary file, sync it and rename it.
 
-    An old file stays until the new is complete.
+    The old file stays until then.
 
     From its first byte on, the new file has the
     permissions of the old file. The content is bytes, or a
@@ -237,7 +237,7 @@ def private_folder(folder: Path) -> Path:
 
 
 def _weakness(folder: Path) -> str:
-    """Return who, besides this user and root, could write to a folder, or ''."""
+    """Return why somebody besides this user and root could write to a folder, or ''."""
     inside = {
         Path(top) / name for top, *names in os.walk(folder) for name in (*names[0], *names[1])
     }
@@ -280,8 +280,8 @@ _IMPORT = re.compile(rb"^\s*(?:from|import) (stiction[\w.]*)(?: import (\w+))?",
 def _kernel_sources() -> dict[str, bytes]:
     """Return, by module, the text of every file that may hold a part of a kernel.
 
-    Files that refuse input hold no part of a kernel, unless they hold
-    one themselves: an edited message recompiles nothing.
+    A file that raises `InputError` is left out unless it defines a
+    kernel, so that an edited message recompiles nothing.
     """
     package = Path(__file__).parents[1]
     sources = {}
@@ -299,7 +299,7 @@ def kernel_folder(module: str, compiler: str) -> Path:
     """Return the folder for a module's kernels that a `compiler` (any name) compiled.
 
     numba treats a compiled kernel as current if the file of the kernel
-    has not changed. It does not notice changes of functions or
+    has not changed. Numba does not notice changes of functions or
     constants in other files. Therefore every state of the files that a
     module imports, directly or not, has a separate folder. Friction
     laws are resolved by type inside kernels and belong to every state.

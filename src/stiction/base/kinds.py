@@ -43,8 +43,9 @@ def register(kind: T) -> T:
 class Kinds(Mapping[str, Any]):
     """The classes of a family, by `type`: in the package, registered, and from entry points.
 
-    `places` ("module:name") lead to classes in the package. Like
-    classes of entry points, they are imported when they are named.
+    `places` ("module:name") lead to classes in the package. A class in
+    the package, or of an entry point, is imported when a file names its
+    type.
     """
 
     def __init__(self, family: str, places: Mapping[str, str] | None = None) -> None:

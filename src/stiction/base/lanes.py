@@ -1,7 +1,7 @@
 """Four numbers at once in a kernel, so that the source fixes the order of summation.
 
 A dot product is fast only if it is summed in the lanes of a vector
-unit. Left to the compiler (fast-math), the order changes with the
+unit. If the compiler chooses the order (fast-math), it changes with the
 inlined code, and a kernel that was just compiled then differs in its
 last bits from the same kernel loaded from disk. Here the lanes are
 written out: lane l sums the terms l, l + 4, l + 8, ..., for any width
@@ -49,13 +49,13 @@ def _place(context: Any, builder: Any, kinds: Any, array: Any, index: Any) -> An
 
 @intrinsic
 def zeros(typing_context: Any) -> Any:
-    """Four zeros."""
+    """Return four zeros."""
     return _lanes(), lambda context, builder, signature, values: _constant(0.0)
 
 
 @intrinsic
 def load(typing_context: Any, array: Any, index: Any) -> Any:
-    """Entries index to index + 3 of a contiguous float64 array."""
+    """Load entries index to index + 3 of a contiguous float64 array."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         place = _place(context, builder, signature.args, *values)
@@ -66,7 +66,7 @@ def load(typing_context: Any, array: Any, index: Any) -> Any:
 
 @intrinsic
 def multiply_add(typing_context: Any, first: Any, second: Any, total: Any) -> Any:
-    """first * second + total, of numbers or lane by lane, rounded once where the machine can."""
+    """Compute first * second + total for numbers or lanes, rounded once if the machine can."""
     lanes = isinstance(total, _Lanes)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -81,14 +81,14 @@ def multiply_add(typing_context: Any, first: Any, second: Any, total: Any) -> An
 
 @intrinsic
 def add(typing_context: Any, first: Any, second: Any) -> Any:
-    """first + second in every lane."""
+    """Add two vectors in every lane."""
     signature = _lanes(_lanes, _lanes)
     return signature, lambda context, builder, signature, values: builder.fadd(*values)
 
 
 @intrinsic
 def totals(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """The lane sums of four vectors, each (0 + 1) + (2 + 3), with half as many additions."""
+    """Return the lane sums of four vectors, each (0 + 1) + (2 + 3), with half as many additions."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         def chosen(first: Any, second: Any, lanes: list[int]) -> Any:
@@ -110,7 +110,7 @@ def totals(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
 
 @intrinsic
 def total(typing_context: Any, values: Any) -> Any:
-    """Sum of the four lanes: (0 + 2) + (1 + 3)."""
+    """Return the sum of the four lanes, (0 + 2) + (1 + 3)."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         place = ir.IntType(32)

@@ -55,7 +55,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 # -- kinds of values -----------------------------------------------------------------------------
 
 SI_NUMBER = "must be a number in SI units, such as 4e3, or a quantity of pint or astropy"
-"""What replaces a text such as '4 km'."""
+"""Advice for a text such as '4 km' in place of a number."""
 
 
 def as_number(value: Any) -> float:
@@ -86,7 +86,7 @@ def in_si(value: Any, name: str) -> Any:
 
 
 def as_count(value: Any) -> int:
-    """Return a whole number from any library as an int. 1e4 is a whole number."""
+    """Return a whole number from any library, such as 1e4, as an int."""
     if isinstance(value, numbers.Integral) and not isinstance(value, bool):
         return int(value)
     if isinstance(value, bool | np.ndarray) or not is_finite(value) or value % 1:
@@ -109,7 +109,7 @@ def is_finite(value: Any) -> bool:
 
 
 def is_unplaced(value: Any) -> bool:
-    """Return whether a profile has its own coordinates or units, which its problem resolves."""
+    """Return whether a profile has coordinates or units, which its problem converts."""
     return is_quantity(value) or any(hasattr(value, name) for name in ("dims", "to_xarray"))
 
 
@@ -222,12 +222,12 @@ Names: TypeAlias = Annotated[Sequence[str], BeforeValidator(_names), "tuple"]
 """A name or several, as a tuple."""
 HeldPath: TypeAlias = Annotated[Path, BeforeValidator(_path)]
 FilePath: TypeAlias = Annotated[str | Path, BeforeValidator(_path), "Path"]
-"""A path, which is a `Path` where the function or model begins."""
+"""A path, which the function or model receives as a `Path`."""
 Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Progress: TypeAlias = Annotated[Show, BeforeValidator(_show), "bool | Callable"]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
-"""Text in valid UTF-8. Pydantic looks at it only if its length is limited."""
+"""Text in valid UTF-8. Pydantic checks the encoding only if the length is limited."""
 Mode: TypeAlias = Literal["II", "III"]
 
 
@@ -253,7 +253,7 @@ def valid_keys(cls: Any) -> list[str]:
 
 
 MAX_MISTAKES = 100
-"""Mistakes of a call or a file that are explained."""
+"""Number of mistakes in a call or a file that are explained at most."""
 
 
 def explain(
@@ -289,10 +289,7 @@ def explain(
 
 
 def _steps_into(given: Any, steps: Sequence[int | str], missing: bool) -> Iterator[str]:
-    """Yield the steps that lead into a value.
-
-    Other steps of pydantic are members of unions.
-    """
+    """Yield the steps that lead into a value, without pydantic's steps into members of unions."""
     for step in steps:
         given = given.tolist() if isinstance(given, np.ndarray) else given
         keys = range(len(given)) if isinstance(given, list | tuple) else given
@@ -358,7 +355,7 @@ class Door:
 
 
 def _named_keys(cls: Any, given: Any, handler: Callable[[Any], Any]) -> Any:
-    """Validate a model. Only its class knows the names of its keys."""
+    """Validate a model, and name its keys in messages. Only its class knows the keys."""
     try:
         return handler(given)
     except pydantic.ValidationError as error:
@@ -378,10 +375,10 @@ class _Listing(ABCMeta):
 
 
 class Listed(metaclass=_Listing):
-    """Base of models whose `dir` and `help` show what users need only.
+    """Base of models whose `dir` and `help` show only the members that users need.
 
     `_shown` names the members of a class that users need, by default all.
-    Its other members are for other parts of the package.
+    Other members serve other parts of the package.
     """
 
     _shown: ClassVar[tuple[str, ...]]
@@ -476,7 +473,7 @@ def checked(function: Function) -> Function:
 
 
 class _Plain(str):
-    """An annotation that is shown as a name, without quotation marks."""
+    """Annotation that is shown as a name without quotation marks."""
 
     __repr__ = str.__str__
 

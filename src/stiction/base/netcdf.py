@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 MAX_OBJECTS = 1_000
 MAX_VALUES = 2**23
-"""Values of a file of fewer bytes than this. A larger file may hold one
-value per byte."""
+"""Number of values that a file of fewer bytes may hold. A larger file may hold a value per
+byte."""
 SHUFFLE, DEFLATE, CHECKSUM, VIRTUAL = 2, 1, 3, 3
 """HDF5's numbers of the accepted filters, and of the layout of virtual
 datasets."""
@@ -133,13 +133,13 @@ def _letters_in_attributes(item: Any, content: bytes) -> int:
 
 
 def _padded_size(dataset: Any) -> int:
-    """Return how many values all chunks hold. Chunks may extend beyond the array."""
+    """Return the number of values in all chunks, which may extend beyond the array."""
     sizes = zip(dataset.shape or (), dataset.chunks or dataset.shape or (), strict=True)
     return math.prod(-(-size // chunk) * chunk for size, chunk in sizes)
 
 
 def _check_chunks(dataset: Any, made: Any) -> None:
-    """Refuse chunks that unpack to a size other than that of their shape.
+    """Refuse chunks that unpack to another size than their shape.
 
     HDF5 has no limit for this size.
     """

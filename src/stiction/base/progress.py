@@ -20,7 +20,7 @@ Show: TypeAlias = bool | Callable[[int, int], None]
 gets (done, total)."""
 
 SILENCE = 1.0
-"""Seconds without a bar, because short work needs none."""
+"""Seconds before a bar appears, because short work needs no bar."""
 PIPE_INTERVAL, NOTEBOOK_INTERVAL = 10.0, 0.5
 """Seconds between lines in a pipe, at least, and between updates in a
 notebook."""
@@ -43,7 +43,10 @@ def duration(seconds: float) -> str:
 
 
 class Meter:
-    """Context manager for the progress of a computation. `total` is its size, if known."""
+    """Context manager for the progress of a computation.
+
+    `total` is its size, if known.
+    """
 
     def __init__(
         self, what: str, total: int | None = None, show: Show = True, *, unit: str = "samples"
@@ -116,7 +119,7 @@ class Meter:
                 _running.remove(self)
 
     def _write_line(self, last: bool = False) -> None:
-        """Write a line for a pipe if it is due: few lines, however long the work takes."""
+        """Write a line for a pipe if the last line was long ago."""
         if last or self.elapsed >= self._line_due:
             self._line_due = max(self.elapsed + PIPE_INTERVAL, 1.1 * self.elapsed)
             text = f"{_shown().what}: {_shown().text}\n"
@@ -126,7 +129,7 @@ class Meter:
 
 
 SILENT = Meter("", show=False)
-"""For work that nobody watches and nothing limits."""
+"""Meter for work that is not shown and has no limit."""
 
 _running: list[Meter] = []
 """Meters that are shown, the outermost first."""
@@ -138,7 +141,7 @@ def _shown() -> Meter:
 
 
 def _display() -> Any:
-    """Return what shows a running meter between `start` and `stop`, or None for a pipe."""
+    """Return the display of a running meter between `start` and `stop`, or None for a pipe."""
     with suppress(*GONE):
         if sys.stderr.isatty():
             return _bar()
@@ -179,5 +182,5 @@ class _Output:
         handle.update({}, raw=True)
 
     def stop(self) -> None:
-        """End, and leave an empty output."""
+        """Stop, and leave an empty output."""
         self._ended.set()

@@ -23,7 +23,7 @@ MAX_NUMBERS, MAX_ROWS = 10, 30
 
 
 class Row(NamedTuple):
-    """A row of a summary: a value in SI, an interval about it, their unit, and a remark."""
+    """Row of a summary: a value in SI, its interval and unit, and a remark."""
 
     name: str
     value: Any
@@ -33,7 +33,10 @@ class Row(NamedTuple):
 
     @property
     def texts(self) -> tuple[str, str, str, str, str]:
-        """Name, value, interval, unit and remark as text. The unit suits the value."""
+        """Return name, value, interval, unit and remark as text.
+
+        The unit suits the value.
+        """
         if not isinstance(self.value, int | float | np.number) or isinstance(self.value, bool):
             text = self.value if isinstance(self.value, str) else shown(self.value)
             return self.name, text, "", self.unit, self.remark
@@ -130,7 +133,7 @@ def _key(self: Any) -> tuple[Any, ...]:
 
 
 def _comparable(value: Any) -> Any:
-    """Return a value with which a given value is compared and hashed. NaN equals itself."""
+    """Return a form of a value for comparison and hashing, in which NaN equals itself."""
     if value is None or isinstance(value, str | float):
         return value if value == value else "nan"  # most are, and many calls contain hashes
     if isinstance(value, np.ndarray):
@@ -157,7 +160,10 @@ class Result:
         return self._summary().text
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the public fields as dicts, lists and numbers for JSON. NaN becomes None."""
+        """Return the public fields as dicts, lists and numbers for JSON.
+
+        NaN becomes None.
+        """
         return to_jsonable_python(_public(self), inf_nan_mode="null", fallback=_plain)
 
     __eq__, __hash__ = equal, hash_of

@@ -264,8 +264,8 @@ def stated_unit(array: Any) -> str:
 def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[Array, str]:
     """Return the values of a labelled array in SI, and their unit, the first that fits.
 
-    The unit is that of a quantity, of the caller, `given`, or of the
-    source.
+    The unit comes from a quantity, from the caller (`given`) or from
+    the source.
     """
     numbers, stated = array.data, stated_unit(array)
     if type(numbers) is not np.ndarray or numbers.dtype != np.float64:
@@ -309,11 +309,11 @@ um or nm."""
 def check_measured(
     values: Array, quantity: str, lines: Any = (), given: Any = None, doubted: bool = True
 ) -> None:
-    """Refuse measured values that mark an overload, or are not positive as their quantity is.
+    """Refuse measured values that mark an overload, or violate the sign of their quantity.
 
-    If they are `doubted`, warn about a number that is far from all
-    others and often means that a value is missing. In messages, values
-    are written as `given`, with their line in a table or their number.
+    With `doubted`, warn about a number that is far from all others and
+    often marks a missing value. In messages, values are written as
+    `given`, with their line in a table or their number.
     """
     shown = np.ravel(values if given is None else given)
     known = shown[np.isfinite(shown)]

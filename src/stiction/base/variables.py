@@ -24,7 +24,7 @@ class Variable:
 
     @property
     def wide(self) -> bool:
-        """Whether a sample has a value for each node, not just a number or a vector."""
+        """Whether a sample has a value for each node, rather than a number or a vector."""
         return not set(self.dims[1:]) <= {DIRECTION}
 
 
@@ -37,8 +37,8 @@ PROFILES: dict[str, Variable] = {
     "fracture_energy": Variable("J m-2", "fracture energy"),
     "normal_pressure": Variable("Pa", "normal pressure"),
 }
-"""Profiles that may be given or sampled. Their order numbers the
-streams of random draws, and never changes."""
+"""Profiles that may be given or sampled, in an order that numbers the streams of random draws and
+never changes."""
 FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 QUANTITIES = PROFILES | {
     "residual_ratio": Variable("1", "residual ratio"),
@@ -118,11 +118,10 @@ def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
 def forces(
     values: Mapping[str, Any], area: float | None, whole_area: float | None
 ) -> dict[str, Any]:
-    """Return the forces, N, for the stresses among some values.
+    """Return the forces, N, for the stresses among some values, or {} if the area is unknown.
 
-    Without an area, it is empty.
-
-    `area` can break, and `whole_area` is the whole interface, both in m².
+    `area` is the area that can break, and `whole_area` the area of the
+    whole interface, m².
     """
     if area is None or whole_area is None:
         return {}

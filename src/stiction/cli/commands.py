@@ -24,7 +24,7 @@ from stiction.base.errors import InputError, RunError, collect_warnings, printab
 from stiction.base.progress import Meter, duration, interrupted
 
 MAX_SHOWN_LINES = 12
-"""Points, failures or damaged chunks in a list."""
+"""Number of points, failures or damaged chunks that are printed at most."""
 StudyFile = Annotated[
     Path,
     Argument(metavar="STUDY.toml", help="`stiction example FILE` writes one to start from."),
@@ -43,10 +43,10 @@ Part = Annotated[
     str | None, Option(metavar="K/N", help="Compute the K-th of N parts, into one folder RUN.")
 ]
 TIMED_POINTS, TIMING_SECONDS, SLOW_SECONDS = 5, 0.2, 3.0
-"""Points of a sweep that `check` times, least processor time of the last batch at each, s, and
-estimate of the seconds of a sample above which it does not time."""
+"""Number of sweep points that `check` times, least processor time (s) of the last batch at a
+point, and estimated time of a sample (s) above which `check` does not time."""
 COMPARED_SAMPLES = 1_000
-"""Samples with which measured peaks are compared."""
+"""Number of samples with which measured peaks are compared."""
 
 
 # -- used by several commands ---------------------------------------------------------------------
@@ -218,7 +218,7 @@ def report(
 ) -> None:
     """Write a self-contained HTML page: figures, tables, failures, the study and versions.
 
-    The exit code is 0 if the run is complete. It is 1 if samples are missing from
+    The exit code is 0 if the run is complete, and 1 if samples are missing from
     the page.
 
     \b

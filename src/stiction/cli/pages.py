@@ -33,13 +33,13 @@ MOST_ROWS = 200
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 REPORTED = ("critical_stress", "first_instability", "friction_coefficient", "critical_force")
 MAX_SHOWN_VALUES = 8
-"""Values of an input that are listed."""
+"""Number of values of an input that are listed at most."""
 LIGHT = "positive entries"
-"""Words of doubts that are a matter of the grid, and come last."""
+"""Words in doubts that concern only the grid, and are listed last."""
 CONTROLS = {
     code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160))
 }
-"""Letters that steer terminals, because a terminal may print a page."""
+"""Replacements for characters that control terminals, because a terminal may print a page."""
 
 
 @dataclass
@@ -61,7 +61,7 @@ class Page:
         self.parts.append({"kind": "figure", "caption": caption, "data": data})
 
     def table(self, title: str, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-        """Add a table. Its numbers are shown with five digits."""
+        """Add a table, in which numbers are shown with five digits."""
         cells = [[shown(entry) for entry in row] for row in rows]
         self.parts.append({"kind": "table", "title": title, "columns": columns, "rows": cells})
 

@@ -58,7 +58,7 @@ class Driven:
 
     @cached_property
     def positive(self) -> float:
-        """Largest positive off-diagonal entry in K over the diagonal. 0 if within the error."""
+        """Largest positive off-diagonal entry in K over the diagonal, or 0 within the error."""
         off = self.stiffness - np.diag(np.diag(self.stiffness))
         diagonal, most = float(np.diag(self.stiffness).min()), float(off.max())
         return most / diagonal if most > max(self.error, POSITIVE_RTOL * diagonal) else 0.0

@@ -163,10 +163,7 @@ class ExponentialSum:
 
 
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
-    """Return times on [0, T_MAX].
-
-    They are dense at first, with random phases on later scales.
-    """
+    """Return times on [0, T_MAX], dense at first, with random phases on later scales."""
     rng = np.random.default_rng(seed)
     # The kernel oscillates with periods of up to 2 pi, so scatter the
     # times over a period.

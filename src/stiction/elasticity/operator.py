@@ -66,8 +66,7 @@ NEGATIVE_CURVATURE = 1
 EXHAUSTED = 2
 
 MAX_ITERATIONS = 3000
-"""Most iterations of conjugate gradients for a solution, or for an
-equilibrium."""
+"""Largest number of iterations of conjugate gradients for a solution or an equilibrium."""
 MIN_NORM = 1e-14
 """Smallest norm of a unit vector, less its parts along others, that is
 not round-off."""
@@ -76,10 +75,7 @@ Mask = NDArray[np.bool_]
 
 
 class Transform(NamedTuple):
-    """Shapes and axes for the transform on an interface.
-
-    It is read-only and shared by threads.
-    """
+    """Read-only shapes and axes for the transform on an interface, shared by threads."""
 
     shape: tuple[int, int]  # of a profile; (1, nodes) on a line, so that a kernel serves both
     half: tuple[int, int]  # of its real transform
@@ -107,7 +103,10 @@ def forward(transform: Transform, field: Array, spectrum: Array) -> None:
 
 @jit_inside
 def backward(transform: Transform, spectrum: Array, field: Array) -> None:
-    """Write the inverse transform of a spectrum to `field`. The spectrum is overwritten."""
+    """Write the inverse transform of a spectrum to `field`.
+
+    The spectrum is overwritten.
+    """
     if transform.first_axes.size == 0:
         c2r(spectrum, field, transform.last_axis, False, 1.0 / field.size, 1)
     else:
@@ -223,7 +222,10 @@ def add_scaled(target: Array, factor: float, source: Array) -> None:
 
 @jit
 def set_scaled(target: Array, factor: float, source: Array) -> None:
-    """Set `target` to factor * source. (Numba takes seconds to compile a slice on the left.)"""
+    """Set `target` to factor * source.
+
+    (Numba takes seconds to compile a slice on the left.)
+    """
     for i in range(target.size):
         target[i] = factor * source[i]
 

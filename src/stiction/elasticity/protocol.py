@@ -26,8 +26,7 @@ from numpy.typing import NDArray
 from stiction.base.arrays import Array
 
 ANYWHERE = -1
-"""In place of the first node of a window that may begin anywhere on a
-periodic interface."""
+"""First node of a window that may begin anywhere on a periodic interface."""
 SMALLEST_EIGENVALUE = 0.5788869418506
 """lambda_0 in the nucleation length h_n = 2 lambda_0 G*/W (Uenishi and
 Rice, 2003)."""
@@ -92,7 +91,7 @@ NONE = Windows(np.empty(0), _NO_NODES, _NO_NODES, np.empty((1, 1)))
 class CircularEntries(NamedTuple):
     """K of a periodic line, Pa/m: the first column (n,), and the odd entries three times in a row.
 
-    With the strip, products need no index arithmetic.
+    With the repeated entries, products need no index arithmetic.
     """
 
     column: Array
@@ -120,11 +119,11 @@ class Elasticity(Protocol):
 
     @property
     def half_spaces(self) -> HalfSpaces | None:
-        """The half-spaces, which give the symbol of K. `None` for blocks, which have no symbol."""
+        """The half-spaces, which give the symbol of K, or `None` for blocks."""
 
     @property
     def relief(self) -> float:
-        """Relief h of the load per mean of p d, Pa/m. 0 without a machine."""
+        """Relief h of the load per mean of p d, Pa/m, or 0 without a machine."""
 
     @property
     def positive(self) -> float:

@@ -47,7 +47,7 @@ def entry(entries: Any, i: int, j: int) -> float:
 
 
 def mean_relief(entries: Any, profile: Array, slip: Array) -> float:
-    """Return the amount, Pa, by which slip lowers the mean stress. 0 under a dead load."""
+    """Return the amount, Pa, by which slip lowers the mean stress, or 0 under a dead load."""
     raise NotImplementedError
 
 

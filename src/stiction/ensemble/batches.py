@@ -49,16 +49,16 @@ POINT: str = "_point"
 NUMBER: str = "_sample"
 """Names of the columns with the numbers of the point and of the sample."""
 PIECE_SECONDS = 0.5
-"""Duration of a piece of work."""
+"""Duration of a piece of work, s."""
 MAX_PIECE_BYTES = 16 * 2**20
-"""Largest size of the values of a piece of work."""
+"""Largest size of the values of a piece of work, bytes."""
 WORKER_COUNT_SECONDS = 1.0
 """Seconds between counts of the workers. A longer wait cannot be
 interrupted on Windows."""
 
 
 class Span(NamedTuple):
-    """Samples first to first + samples - 1 at one point."""
+    """Samples `first` to `first` + `samples` - 1 at a sweep point."""
 
     point: int
     first: int
@@ -101,7 +101,7 @@ class Table(NamedTuple):
 def _columns(
     point: int, first: int, values: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[Any]]:
-    """Return the values of consecutive samples at a point with the numbers of both."""
+    """Return the values of consecutive samples at a point, with their numbers."""
     count = len(next(iter(values.values()), ()))
     return {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
 
@@ -199,7 +199,10 @@ def piece_size(
 
 
 def workers_of(executor: Executor, workers: int) -> int:
-    """Return the current number of workers in an executor. Workers of Dask come and go."""
+    """Return the current number of workers in an executor.
+
+    Workers of Dask come and go.
+    """
     client = getattr(executor, "_client", None)
     if client is not None:
         return max(1, sum(client.nthreads().values()))

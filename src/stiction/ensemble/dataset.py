@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
 GridAxes: TypeAlias = Mapping[str, Coordinates]
-"""Coordinates of each dimension of a sweep, first the one with the name
-of the dimension."""
+"""Coordinates of each dimension of a sweep. The first has the name of the dimension."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
@@ -60,7 +59,7 @@ class Gathered:
         self._types: dict[str, np.dtype[Any]] = {}
 
     def misfit(self, table: Table) -> str:
-        """Return why a table cannot belong to these points, or '' if it can."""
+        """Return a message about a table that cannot belong to these points, or ''."""
         pairs = [failure[:2] for failure in table.failures]
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
         # Numbers of failures may be anything in a stranger's file, so
@@ -103,7 +102,7 @@ class Gathered:
 
     @property
     def onsets(self) -> NDArray[Any]:
-        """Critical stress, Pa, with shape (points, samples). NaN without a value."""
+        """Critical stress, Pa, with shape (points, samples), or NaN without a value."""
         return self._arrays.get("critical_stress", np.full(self.done.shape, np.nan))
 
     @property

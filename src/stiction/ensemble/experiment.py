@@ -45,16 +45,14 @@ from stiction.random.stresses import (
 )
 
 CHECKED_NODES = 1 << 14
-"""About the number of sampled nodes whose strength is compared with the
-residual strength."""
+"""Approximate number of sampled nodes whose strength is compared with the residual strength."""
 MOST_NUMBERS = 1 << 20
-"""Most nodes or draws of the samples of a plane that are solved at
-once: 8 MiB per profile."""
+"""Most nodes or draws of samples of a plane that are solved at once: 8 MiB per profile."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A problem, its random properties and a method, which are checked together once.
+    """A problem, its random properties and a method, checked together once.
 
     Sample i depends only on the experiment and i, not on the batch. An
     `InputError` lists all mistakes.
@@ -225,10 +223,7 @@ class Experiment:
 
 
 class Measured(Experiment):
-    """An experiment with given profiles in place of random properties.
-
-    It has a single sample.
-    """
+    """An experiment with the given profiles of a single sample in place of random properties."""
 
     def __post_init__(self) -> None:
         problems = refusals(self.problem, self.method)

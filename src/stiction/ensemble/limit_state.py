@@ -82,7 +82,7 @@ class LimitState:
 
     @cached_property
     def guide(self) -> Self | str:
-        """The same limit state by the first stage of the method, or the reason why not."""
+        """The same limit state by the first stage of the method, or the reason against it."""
         experiment, method = self.experiment, self.experiment.method
         name = optional_member(method, "first_stage")
         if name is None:
@@ -151,7 +151,7 @@ class LimitState:
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
-        """Bounds, Pa, of the stress at which any sample slides. Infinite if unknown."""
+        """Bounds, Pa, of the stress at which any sample slides, infinite if unknown."""
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
@@ -200,7 +200,7 @@ class LimitState:
 
 
 def weakest_first(state: LimitState) -> LimitState:
-    """Return the same limit state, with equally likely interfaces sorted, the weakest first.
+    """Return the same limit state, with its equally likely interfaces sorted, the weakest first.
 
     Neighbours are then alike, and a chain moves from one interface to
     the next as it goes down. The order is the order of a low quantile
@@ -260,7 +260,7 @@ def solve_part(state: LimitState, draws: Array) -> Table:
 def limit_state(problem: Problem, random: AnyRandom, method: MethodObject) -> LimitState:
     """Make a function that maps standard normal draws to the stress at onset.
 
-    External reliability codes can call it. Failure below a stress s is
+    External reliability codes can call this function. Failure below a stress s is
     ``limit_state(draws) < s``.
 
     Parameters

@@ -39,7 +39,7 @@ Samples: TypeAlias = Annotated[Count, Field(le=10**10)]
 MAX_SHOWN_FAILURES = 3
 """Number of failures that a warning lists."""
 LONG_RUN_SECONDS = 3600.0
-"""Estimated seconds above which a run says so before it begins."""
+"""Estimated seconds of a run above which a warning states the time."""
 MAX_FAILED_FROM_START = 16
 """Failed items after which a run without any solved item is given up."""
 
@@ -58,7 +58,7 @@ def check_run(points: Sequence[Experiment]) -> None:
 
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
-    """Warn, before it begins, about an ensemble that takes hours."""
+    """Warn about an ensemble that takes hours, before it begins."""
     # Points of a sweep may take different times for a sample.
     counts = missing.sum(axis=1)
     seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
@@ -191,7 +191,7 @@ def monte_carlo(
         one of them.
     method : LocalCriterion, Equilibrium or Rupture
     samples, seed : int
-        How many samples, and the seed. `RandomField.sample` and
+        Number of samples, and seed. `RandomField.sample` and
         `RandomInterface.profiles` draw sample i alone: ``first=i``.
     keep : str or tuple of str
         Random fields whose profiles are kept, such as ``"strength"``.
@@ -204,7 +204,7 @@ def monte_carlo(
         kernels release the interpreter lock.
     executor : concurrent.futures.Executor, optional
         Any object with a method `submit`, such as a process pool or a
-        Dask executor. It replaces the threads.
+        Dask executor, which replaces the threads.
     progress : bool or callable
         True shows progress on standard error after a second. A callable
         receives (done, total).

@@ -31,7 +31,7 @@ from stiction.methods.protocol import optional_member
 SAMPLES_ON_LINE, SAMPLES_ON_PLANE = 32, 8
 """Number of first samples, and of weakest samples."""
 MAX_RANKED_SAMPLES = 1000
-"""First samples among which the weakest are found."""
+"""Number of first samples among which the weakest are found."""
 MAX_PILOT_POINTS = 8
 """Most points of a sweep that have a pilot."""
 
@@ -125,7 +125,7 @@ def onsets_of(experiment: Experiment, numbers: NDArray[np.int64], workers: int) 
 def pilot_doubt(
     experiment: Experiment, comparison: Mapping[str, Any], where: str = ""
 ) -> str | None:
-    """Return a warning if a difference exceeds 1 %."""
+    """Return a warning if a difference from the exact onset exceeds 1 %."""
     differences = {
         f"the {comparison[f'{name}_samples']} {text}{where}": (
             comparison[f"{name}_bias"], comparison[f"{name}_scatter"]

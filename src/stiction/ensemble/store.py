@@ -52,7 +52,7 @@ FORMAT = 6
 STUDY, PILOT_FILE, CHUNKS = "study.json", "pilot.json", "chunks"
 NAME = re.compile(r"[0-9a-f]{32}\.npz")
 SAVE_SECONDS = 10.0
-"""Seconds of computing whose samples make a chunk."""
+"""Seconds of computing after which samples are stored as a chunk."""
 SAVE_BYTES = 32 * 2**20
 MAX_JSON_BYTES = 64 * 2**20
 """Largest size of the description of a study or of a pilot."""
@@ -66,9 +66,7 @@ class Damaged(StoreError):
 
 
 class Store:
-    """The folder of a run.
-
-    It holds the samples of a study, which is given in plain form.
+    """The folder of a run, with the samples of a study in plain form.
 
     After reading, `damage` holds the defects of damaged chunks by name.
     `seconds` (on one core) and `versions` describe the intact chunks.
@@ -257,7 +255,10 @@ def _table_in(data: bytes) -> tuple[str, Table]:
 
 
 def _read(file: Path, max_bytes: int) -> bytes:
-    """Return the content of a file. A file that exists but cannot be read may be intact."""
+    """Return the content of a file.
+
+    A file that exists but cannot be read may be intact.
+    """
     try:
         return read_regular(file, max_bytes=max_bytes, follow_links=False)
     except InputError as error:

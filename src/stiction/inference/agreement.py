@@ -56,7 +56,7 @@ from stiction.inference.peaks import Peaks, peaks_and_error, title_of
 from stiction.inference.posterior import Posterior
 
 POSTERIOR_POINTS, LAW_VALUES = 1000, 400
-"""Draws that represent a posterior, and number of values in the table of
+"""Number of draws that represent a posterior, and of values in the table of
 a distribution."""
 RANGE_MARGIN = 0.25
 """Fraction of the range of predicted peaks that is added to it on either
@@ -173,14 +173,14 @@ def agreement(
     Warns
     -----
     AccuracyWarning
-        If samples of the prediction have no peak. They are left out.
+        If samples of the prediction have no peak, and are left out.
 
     Notes
     -----
     A p-value of 0.3 means: if the prediction is right, three of ten
-    campaigns with as many tests differ from it at least as much. It
-    does not mean that the prediction is right. With few tests, only
-    large errors are found.
+    campaigns with as many tests differ from the prediction at least as
+    much. A large p-value does not prove the prediction. With few tests,
+    only large errors are found.
 
     Examples
     --------

@@ -65,12 +65,13 @@ LOCATION_PARAMETERS = ("mean", "marginal.mean", "marginal.loc")
 SIDES = {"marginal.low": -1.0, "marginal.high": 1.0}
 """Side of the mean on which a bound lies."""
 MIN_WIDTH = 1e-3
-"""Least width of an interval, over its upper end. A narrower one is
-replaced by the whole range."""
+"""Least width of an interval over its upper end.
+
+The whole range replaces a narrower interval.
+"""
 
 HELD_RTOL = 1e-6
-"""Distance of a shape from its limit, over the limit, within which it
-is held there."""
+"""Relative distance of a shape from its limit below which the limit counts as reached."""
 
 
 class Refits(NamedTuple):
@@ -191,7 +192,7 @@ class Scale(NamedTuple):
 
 
 def scale_of(name: str, repeated: Sequence[Refits]) -> Scale:
-    """Return the scale of a parameter. It is linear if an estimate is negative."""
+    """Return the scale of a parameter, which is linear if an estimate is negative."""
     least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
     return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
@@ -257,7 +258,10 @@ def held(fit: BestFit, shapes: Sequence[str]) -> bool:
 
 
 def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[float, float]]:
-    """Return limits for parameters. Bounds of the marginal must lie outside all values."""
+    """Return limits for parameters.
+
+    Bounds of the marginal must lie outside all values.
+    """
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
     # Noise may move values beyond the bounds, which lie outside the

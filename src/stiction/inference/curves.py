@@ -82,25 +82,26 @@ FORCE_UNITS, TRAVEL_UNITS = ("N", "Pa", "1"), ("m", "s")
 MIN_READINGS = 8
 """Fewest readings of a test."""
 MAX_BACKWARD_SHARE = 0.05
-"""Largest fraction of its range by which travel may go back. A larger
-one begins another cycle."""
+"""Largest fraction of its range by which travel may go back.
+
+A new cycle goes back further.
+"""
 ROUND_OFF = 1e-12
 """Fraction of the largest force below which differences of readings are
 round-off."""
 MIN_DROP_SHARE = 1e-6
 """Fraction of the peak below which a fall is round-off if there is no noise."""
 MAX_SPIKES_SHARE = 0.01
-"""Fraction of readings above which spikes are no errors of single readings."""
+"""Fraction of readings above which spikes do not count as errors of single readings."""
 MIN_FITTED = 12
 """Fewest readings at the peak to which a parabola is fitted."""
 TARE = 0.05
-"""Fraction of the peak that the first readings may have."""
+"""Largest ratio of the first readings to the peak without a doubt about the tare."""
 HIGH, LOW, MAX_RETURNS = 0.8, 0.7, 3
 """A test falls below LOW of its peak and returns above HIGH of it fewer
 times than this. A record of stick-slip does so in each cycle."""
 BOTH_SIGNS = 0.2
-"""Fraction of the largest force that a force of the other sign reaches
-in a reciprocating test."""
+"""Least size of forces of the other sign in a reciprocating test, over the largest force."""
 Split = Literal["cycles", "strokes", "tables"]
 
 
@@ -235,7 +236,7 @@ def read_curve(
     """Read force against travel or time. Find the peak, precursors and plateau of each test.
 
     A column is read if its heading, or the caller, says that it is the wanted
-    quantity. If several columns could be it, an error lists them.
+    quantity. If several columns could be the quantity, an error lists them.
 
     Parameters
     ----------
@@ -253,7 +254,7 @@ def read_curve(
     unit, travel_unit : str, optional
         Units of force and travel if the source states no units.
     speed : float, optional
-        Speed of the crosshead, m/s. It turns time into travel.
+        Speed of the crosshead, m/s, which turns time into travel.
     noise : float, optional
         Standard deviation of a load-cell reading, in SI. By default it is estimated
         from neighbouring readings, which needs a load cell without a filter.
@@ -337,7 +338,7 @@ class Readings(NamedTuple):
     lines: Array
 
     def part(self, rows: Any, label: str = "") -> Readings:
-        """Return some of the readings, and add a label to the name."""
+        """Return a part of the readings, and add a label to the name."""
         return Readings(self.name + label, *self[1:3], *(array[rows] for array in self[3:]))
 
     def cut(self, begins: Any, word: str) -> list[Readings]:
@@ -396,10 +397,7 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
 
 
 def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
-    """Yield the label of each test in a table, and a mask of its rows.
-
-    A single test has none.
-    """
+    """Yield the label of each test in a table, and a mask of its rows. A lone test has no label."""
     numbers = [c for c in named(table.columns, TESTS) if role_of(c) == "specimen"]
     if len(numbers) == 1 and np.isfinite(numbers[0].values).all():
         for label in dict.fromkeys(numbers[0].values.tolist()):

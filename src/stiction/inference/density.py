@@ -56,7 +56,7 @@ cell, and of v."""
 
 
 class Densities(NamedTuple):
-    """Densities of the standardised v at nodes."""
+    """Densities of the standardised v at the nodes of the parameter grid."""
 
     onsets: Array  # (nodes, samples), of the same samples at every node
     bound: Array  # least possible onset, (nodes,)

@@ -2,8 +2,8 @@
 
 Problem. Two questions are answered. With a prior of parameters theta:
 how much information about each parameter will a design, such as ten
-tests, give? It is the mean over campaigns of the divergence of the
-posterior from the prior,
+tests, give? The information is the mean over campaigns of the
+divergence of the posterior from the prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
@@ -84,14 +84,14 @@ from stiction.problem.problem import Problem
 from stiction.random.spectra import Share
 
 CAMPAIGN_GRID_POINTS = 8_000
-"""Points of the grid of each posterior."""
+"""Number of points in the grid of each posterior."""
 MIN_BOX_WIDTH = 1e-12
 """Width of a box, as a fraction of the prior, below which rounding hides
 the posterior."""
 MAX_FIELDS = 12
-"""Fields within a specimen that represent all of them."""
+"""Number of fields within a specimen that represent all fields."""
 WIDTH_DRAWS = 2_000
-"""Draws of a posterior for an interval."""
+"""Number of draws from a posterior for an interval."""
 USUAL_DESIGNS = {f"{n} tests": n for n in (5, 10, 20, 40)} | {
     f"{n} profiles": {"profiles": n} for n in (2, 5, 10)
 }
@@ -297,7 +297,10 @@ def _information(
 
 
 def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
-    """Return the numbers of further tests and profiles. The first design is the present."""
+    """Return the numbers of further tests and profiles.
+
+    The first design is the present.
+    """
     plans = {"now": (0, 0)}
     for name, design in designs.items():
         table = _as_table(name, design, "profiles")

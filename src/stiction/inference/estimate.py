@@ -295,14 +295,14 @@ def bands(group: Observed, expected: Array) -> Array:
 class Goodness(NamedTuple):
     """How well a family of marginals fits: its best member, and two measures of the fit.
 
-    `distance` is Kolmogorov's distance. `score` is the score
-    (step 4) minus the score of the best family: 0 for the best
-    family, negative for others. Differences below 2 do not
-    distinguish families. `weight` is the fraction of fields that
-    `FieldFit.interfaces` draws from the family. It is
-    proportional to the likelihood of these fields. Because the
-    fields scatter about the estimate, their log likelihood is on
-    average below the maximum by half a unit for each parameter.
+    `distance` is Kolmogorov's distance. `score` is the score (step 4)
+    minus the score of the best family: 0 for the best family, negative
+    for others. Differences below 2 do not distinguish families.
+    `weight` is the fraction of fields that `FieldFit.interfaces` draws
+    from the family. The weight is proportional to the likelihood of
+    these fields. Because the fields scatter about the estimate, their
+    log likelihood is on average below the maximum by half a unit for
+    each parameter.
     """
 
     marginal: Any

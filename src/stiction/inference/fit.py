@@ -81,7 +81,7 @@ from stiction.random.fields import RandomField, RandomInterface
 
 USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
-"""Correlation lengths that a record must hold to constrain parameters well."""
+"""Number of correlation lengths that a record needs to constrain parameters well."""
 MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
@@ -99,7 +99,7 @@ EVENLY = 0.5 * (math.sqrt(5.0) - 1.0)
 USUAL_STRENGTH = 1e4
 """Least strength of a usual solid, Pa."""
 INTERVAL_DRAWS = 4000
-"""Draws of the posterior for intervals."""
+"""Number of draws from the posterior for intervals."""
 
 
 def _families(given: Any) -> list[Family]:
@@ -161,7 +161,7 @@ class FieldFit(WithFactors, Result):
         Number of points without a value, which are left out, and total
         number of points.
     doubts : tuple of str
-        Reasons not to trust the fit. Empty if there are no such reasons.
+        Reasons not to trust the fit, if any.
     """
 
     field: RandomField
@@ -181,7 +181,7 @@ class FieldFit(WithFactors, Result):
 
     @property
     def specimens(self) -> int:
-        """Number of specimens whose scatter was fitted. 0 without `between`."""
+        """Number of specimens whose scatter was fitted, or 0 without `between`."""
         return self._levels.size if self._families else 0
 
     @property
@@ -253,8 +253,8 @@ class FieldFit(WithFactors, Result):
     ) -> Prediction | None:
         """Return the prediction for a problem with constants changed by full key.
 
-        `None` if records are of one specimen, for which there is no
-        posterior of mean and scatter.
+        The result is `None` if records are of a single specimen, which
+        has no posterior of mean and scatter.
         """
         if not self._families:
             return None
@@ -381,7 +381,8 @@ def fit_field(
     noise : bool or float
         Whether to estimate white, normal measurement noise, or its known standard deviation.
     anisotropy : bool or float
-        For maps, the correlation length along y over that along x. True estimates it.
+        For maps, the ratio of correlation lengths along y and x. True estimates the
+        ratio.
     between : bool, str or sequence of str
         Whether records come from different specimens, each of which has a factor with mean 1
         and the coefficient of variation ``between``. Names choose its

@@ -74,7 +74,7 @@ from stiction.random.equally_likely import AnyRandom, Source, as_random, specime
 from stiction.random.stresses import mean_in_stress
 
 LIKELY_FIELDS = 60
-"""Fields within a specimen that represent all likely fields."""
+"""Number of fields within a specimen that represent all likely fields."""
 LITTLE_INFORMATION = math.log(4.0 / 3.0)
 """Information on the scatter, nats, below which its prior controls the
 result: a uniform range would shrink by less than a quarter."""
@@ -140,7 +140,7 @@ def infer(
         Families of the factor between specimens, as in `fit_field`. By
         default of the fit, or all.
     method : LocalCriterion, Equilibrium or any other
-        Method that computes the onset. It may be left out if `random` is None.
+        Method that computes the onset. May be left out if `random` is None.
     load_cell_error : float
         Standard error of a peak, in `unit` (SI if `Peaks` are given).
     unit : str
@@ -296,7 +296,7 @@ def _grown(box: Array, u: Array | None) -> Array:
 
 
 def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
-    """Return the limitations of the posterior, with draws u (draws, parameters)."""
+    """Return notes on the limitations of a posterior with draws u (draws, parameters)."""
     prior, notes = likelihood.prior, []
     texts = [
         f"the {side} end of {name}, {end:g}, holds {np.mean(near):.0%} of the draws"

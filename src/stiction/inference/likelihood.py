@@ -107,7 +107,10 @@ def make_axes(
 
 
 def nodes_of(axes: Sequence[Axis], reference: Array) -> Array:
-    """Return the parameters (nodes, parameters). Scaling parameters are at `reference`."""
+    """Return the parameters (nodes, parameters).
+
+    Scaling parameters are at `reference`.
+    """
     steps = np.array(list(itertools.product(*(axis.values for axis in axes))))
     result = np.tile(reference, (len(steps), 1))
     result[:, [axis.parameter for axis in axes]] = steps
@@ -143,9 +146,7 @@ def experiments_at(
 
 
 def of_length(problem: Problem, length: float | None) -> Problem:
-    """Return the problem for specimens with a given length, m.
-
-    None means its own length.
+    """Return the problem for specimens with a length, m. None means the length of the problem.
 
     The node spacing is the spacing of the problem.
     """
@@ -277,7 +278,7 @@ class Likelihood:
     def __call__(self, u: Array) -> Array:
         """Return the log likelihood at points u (points, parameters).
 
-        It is -inf outside the simulated box.
+        The result is -inf outside the simulated box.
         """
         inside = np.all((u >= self.box[0]) & (u <= self.box[1]), axis=1)
         result = np.full(u.shape[0], -np.inf)
@@ -413,8 +414,9 @@ def moved(
     At coarse nodes, `few` are onsets by the method and `known` are
     onsets by the local criterion for the same samples, both with shape
     (nodes, few). The difference between their quantiles, divided by the
-    standard deviation, changes little between nodes. It is interpolated
-    between the nodes `index` around each point, with weights `weight`.
+    standard deviation, changes little between nodes. The ratio is
+    interpolated between the nodes `index` around each point, with
+    weights `weight`.
     """
     mean, spread = known.mean(axis=1, keepdims=True), known.std(axis=1, keepdims=True)
     standardised = (np.sort(known) - mean) / spread
@@ -431,7 +433,7 @@ def moved(
 
 
 def effective_samples(alike: float, many: int, few: int) -> float:
-    """Return how many independent samples contain as much information as the moved onsets."""
+    """Return the number of independent samples with as much information as the moved onsets."""
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 
 

@@ -207,7 +207,7 @@ class Family:
         return self.fixed.get("low", -math.inf), self.fixed.get("high", math.inf)
 
     def check(self, values: Array) -> None:
-        """Refuse values that the family cannot have."""
+        """Refuse values that are impossible in the family."""
         low, high = self.bounds
         if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
@@ -245,7 +245,7 @@ def multiplied(marginal: Any, factor: float) -> Any:
 
 
 def family_table(given: Any) -> dict[str, Any]:
-    """Return a name or a table as a table {type, ...}."""
+    """Return a table {type, ...} for a name or a table."""
     if isinstance(given, Mapping):
         return dict(given)
     if not isinstance(given, str):

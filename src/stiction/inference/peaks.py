@@ -59,7 +59,7 @@ from stiction.problem.reading.labels import (
 from stiction.problem.reading.tables import Options, table_of_frame
 
 MIN_PEAKS = 3
-"""Fewest different peaks in all: of two numbers, one may be a mistake."""
+"""Least number of different peaks, because one of two numbers may be a mistake."""
 MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks above which their unit must be
 wrong."""
@@ -75,7 +75,7 @@ SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
 """Beginnings of the heading of a column that says which specimen was
 tested."""
 SLIP_FACTORS = (0.05, 1.0)
-"""Range of slip factors. Swapped columns or units lead far beyond it."""
+"""Range of slip factors. Swapped columns or units lead far beyond this range."""
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
 """Variable of a method that each unit measures."""
 
@@ -119,8 +119,8 @@ class Peaks(Result):
     def standards(self) -> dict[str, float]:
         """Mean, standard deviation, and values by EN 1990 and EN 1090-2, of all slip loads.
 
-        `stiction.inference.standards` has the formulas. They are from
-        memory, and not yet compared with the printed standards.
+        `stiction.inference.standards` has the formulas, which are from
+        memory and not yet compared with the printed standards.
         """
         return standards_of(np.concatenate((self.loads or self).values))
 
@@ -221,7 +221,7 @@ def si_of(unit: str) -> str:
 
 
 def factor_of(unit: str, peaks: Any = None) -> float:
-    """Return the factor that converts a unit of peaks to SI. It is 1 if they are in SI already."""
+    """Return the factor that converts a unit of peaks to SI, or 1 for peaks in SI."""
     if isinstance(peaks, Peaks | Curves):
         return 1.0
     with prefixed("unit"):
@@ -229,7 +229,7 @@ def factor_of(unit: str, peaks: Any = None) -> float:
 
 
 def _in_si(given: Any, unit: str) -> Array:
-    """Return peaks for one specimen type in SI. A unit that the values carry is used."""
+    """Return peaks for a specimen type in SI, from the unit of the values or the given unit."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
     if si_of(stated or unit) != si_of(unit):
@@ -265,9 +265,9 @@ def read_peaks(
     """Read the peaks of repeated tests from a text file or a workbook (.xlsx).
 
     A column is read if its heading, or the caller, says that it is the
-    wanted quantity. If several columns could be it, an error lists
-    them. First plot the peaks in the order of the tests. Peaks that
-    drift are not a sample from one distribution.
+    wanted quantity. If several columns could be the quantity, an error
+    lists them. First plot the peaks in the order of the tests. Peaks
+    that drift are not a sample from one distribution.
 
     Parameters
     ----------
@@ -454,7 +454,7 @@ def _normal_forces(
 
 
 def _coefficients(values: Array, forces: Array, si: str, surfaces: int) -> Array:
-    """Return friction coefficients, and refuse those that swapped columns or units would give."""
+    """Return friction coefficients, and refuse coefficients as from swapped columns or units."""
     coefficients = values / (surfaces * forces)
     typical = float(np.median(coefficients))
     if not SLIP_FACTORS[0] <= typical <= SLIP_FACTORS[1]:

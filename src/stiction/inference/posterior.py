@@ -88,7 +88,10 @@ class PosteriorGrid:
         return float(np.log(mass.size / np.ptp(self.box[:, axis])) - entropy(mass))
 
     def draws(self, count: int, seed: int) -> Array:
-        """Draw u (count, parameters) from the posterior. Draws are uniform within cells."""
+        """Draw u (count, parameters) from the posterior.
+
+        Draws are uniform within cells.
+        """
         rng = np.random.default_rng(seed)
         cells = rng.choice(self.mass.size, size=count, p=self.mass.ravel())
         places = np.stack(np.unravel_index(cells, self.mass.shape), axis=1)
@@ -148,10 +151,10 @@ class Posterior(WithFactors, Result):
         Logarithm of the density of the peaks under the prior, for the
         comparison of models.
     monte_carlo_error : float
-        Standard error of a posterior mean due to the finite
-        number of simulated samples, over the posterior
-        standard deviation. It is about the square root of
-        the ratio of measured to simulated peaks.
+        Standard error of a posterior mean due to the finite number of
+        simulated samples, over the posterior standard deviation. The
+        ratio is about the square root of the ratio of measured to
+        simulated peaks.
     method : str
         Method that computed the onset.
     peaks : Peaks
@@ -283,7 +286,7 @@ class SpecimenPosterior(Posterior):
         Posterior probability for each distribution between specimens.
     agreement : Agreement or None
         Agreement of the peaks with the prediction from the profiles
-        alone. `None` without profiles.
+        alone, or `None` without profiles.
     """
 
     grid: FactorGrid = field(repr=False, compare=False)
@@ -312,9 +315,7 @@ class SpecimenPosterior(Posterior):
 
     @checked
     def interfaces(self, count: Count, seed: Number = 0) -> list[RandomInterface]:
-        """Return equally likely random interfaces.
-
-        They are draws from the posterior.
+        """Return equally likely random interfaces, drawn from the posterior.
 
         Parameters
         ----------
@@ -339,7 +340,7 @@ class SpecimenPosterior(Posterior):
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What was stated and not measured, in words."""
+        """Sentences about assumptions that were stated and not measured."""
         profiles, texts = self.grid.profiles, []
         if profiles.whole:
             texts.append(
@@ -365,7 +366,7 @@ class SpecimenPosterior(Posterior):
     def prediction(
         self, problem: Problem, method: Any, changes: Mapping[str, float], workers: int | None
     ) -> Prediction:
-        """Return the prediction for a problem, with constants changed by full key.
+        """Return the prediction for a problem with constants changed by full key.
 
         The strength is inferred again with the changed constants. A
         constant of the tests changes if it has the same value as in the

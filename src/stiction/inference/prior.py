@@ -1,4 +1,4 @@
-"""The prior: unknown parameters, their distributions before the tests, and those that scale."""
+"""The prior: unknown parameters, their distributions before the tests, and scaling parameters."""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence

@@ -47,7 +47,7 @@ CORRELATED = 2.5
 """Standard deviations by which neighbours must be more correlated than
 white noise."""
 USUAL_LENGTH = (1e-5, 1e3)
-"""Lengths of records, m, beyond which their unit is doubted."""
+"""Range of the length of a record, m, outside which its unit is doubted."""
 JUMPING = 10.0
 """Difference of a dropout from its neighbours, in robust standard
 deviations of differences."""
@@ -64,7 +64,10 @@ class Record(NamedTuple):
 
 
 def records_of(profiles: Any, interface: Interface | None, quantity: str) -> list[Record]:
-    """Return all profiles as records. See `stiction.fit_field`. Errors name the profile."""
+    """Return all profiles as records.
+
+    See `stiction.fit_field`. Errors name the profile.
+    """
     several = isinstance(profiles, list | tuple)
     several = several and not (profiles and all(map(_is_scalar, profiles)))
     records: list[Record] = []
@@ -191,7 +194,7 @@ def _checked(record: Record, quantity: str) -> Record:
 
 
 def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) -> None:
-    """Refuse records of white noise: their correlation length is shorter than the spacing.
+    """Refuse records of white noise, whose correlation length is shorter than the spacing.
 
     Take the sum of products v_i v_(i+j) over all lags j up to k,
     divided by the variance. For white noise it has mean 0, and a

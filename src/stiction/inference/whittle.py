@@ -70,7 +70,7 @@ TRIED = {
     "anisotropy": [0.5, 1.0, 2.0],
     "noise_share": [0.0, 0.01, 0.1, 0.4],
 }
-"""Values of the coarse grid of step 5."""
+"""Values of each parameter on the coarse grid of step 5."""
 FLOOR = 1e-3
 """Floor as a fraction of the highest power, which is averaged over
 records and neighbours."""
@@ -81,18 +81,16 @@ them to 1e-4."""
 OF_SPECTRUM = ("correlation_length", "exponent", "anisotropy")
 """Parameters of a spectrum, by their keys."""
 AT_END = 1e-3
-"""Largest distance of an estimate at an end of a range, as a fraction
-of the range."""
+"""Distance from an end of a range, over the range, below which an estimate is at the end."""
 LOG_STEP = 1e-4
 SETTLED = 1e-3
-"""Gain of log likelihood below which scoring ends. A standard error is
-worth one half."""
+"""Gain of log likelihood below which scoring ends. A standard error costs one half."""
 LONGEST = 1.5
 """Longest step of scoring, on the scale of the search."""
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the fractions of the variance in Hermite orders 0, 1, ... The last one is the rest."""
+    """Return the fractions of the variance in Hermite orders 0, 1, ..., and the rest."""
     shares = hermite_coefficients(marginal, MAP_STEP, MAP_ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
@@ -250,7 +248,7 @@ class Whittle(NamedTuple):
     observed: Sequence[Observed]
 
     def of(self, expected: Sequence[Array]) -> float:
-        """Return the log likelihood. It is -inf if an expectation is negative (step 4)."""
+        """Return the log likelihood, -inf if an expectation is negative (step 4)."""
         value = 0.0
         for group, e in zip(self.observed, expected, strict=True):
             lifted = e + group.floor
@@ -332,7 +330,7 @@ class Whittle(NamedTuple):
     ) -> tuple[float, float]:
         """Return the variance of the noise, which may be negative, and its standard error.
 
-        The error assumes independent ordinates. It is too small, but
+        The error assumes independent ordinates, and is too small, but
         proportional to the true error.
         """
         model, (_, information) = state[0], self.score(at, state)

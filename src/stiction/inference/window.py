@@ -52,7 +52,7 @@ ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of
 the record."""
 EDGE = 2.0
-"""Modes over which a spectrum fades out at its end. The likelihood
+"""Number of modes over which a spectrum fades out at its end. The likelihood
 would move in steps with the correlation length if the end were
 sharper."""
 LEFT_OUT = 1e-4

@@ -1,9 +1,9 @@
 """Compute the onset of given profiles by any method, and check approximate methods.
 
 `onset`, `monte_carlo`, `infer` and failure probabilities check
-approximate methods, such as the local criterion, by solving some
-samples also with the exact method. `exact_counterpart` returns the
-exact method. `may_differ` returns whether the check is needed. `doubt`
+approximate methods, such as the local criterion: they also solve some
+samples by the exact method. `exact_counterpart` returns the exact
+method. `may_differ` returns whether the check is needed. `doubt`
 returns a warning.
 """
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
-"""Most samples that `onset` also solves by the exact method, and the
-seconds for them."""
+"""Largest number of samples that `onset` also solves by the exact method, and the seconds for
+these samples."""
 MAX_DIFFERENCE = 0.01
 """Mean or scatter of the difference, over the exact onset, above which
 there is a warning."""

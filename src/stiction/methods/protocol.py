@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 BATCH_SECONDS, MAX_BATCH_SAMPLES = 0.5, 512
-"""Seconds of work in a batch, and most samples in it."""
+"""Seconds of work in a batch, and largest number of samples."""
 
 Values = dict[str, NDArray[Any]]
 Solver = Callable[[Sample], Mapping[str, NDArray[Any]]]
@@ -65,7 +65,7 @@ class Method(Protocol):
     def variables(self, problem: Problem) -> Mapping[str, Variable]:
         """Return the variables in the solver's results. Each has 'sample' as first dimension.
 
-        They include all variables in `stiction.extensions.onset_variables`.
+        The variables include all variables in `stiction.extensions.onset_variables`.
         """
 
     def seconds_per_sample(self, problem: Problem) -> float:
@@ -82,7 +82,7 @@ class OptionalMembers:
     """Optional members of a method, with their defaults."""
 
     accepts: ClassVar[tuple[str, ...]] = ()
-    """Special profiles that it takes: "overstress", see
+    """Special profiles that the method accepts: "overstress", see
     `Problem.sample`."""
     first_stage: ClassVar[str | None] = None
     """Type of a faster method with similar onsets, for the first search
@@ -112,7 +112,7 @@ class OptionalMembers:
         return False, False
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
-        """Return why this method cannot guide another method, whose `first_stage` it is, or `None`.
+        """Return a reason if this `first_stage` cannot guide another method, or `None`.
 
         `varying` contains the names of the properties that differ
         between samples.
@@ -122,8 +122,8 @@ class OptionalMembers:
     def may_differ(self, problem: Problem, sample: Sample, stress: Array) -> bool:
         """Return whether to compare the onsets of samples (Pa) with the onsets by `exact_method`.
 
-        Return False if a quick test finds that they differ by less than
-        1 %.
+        The result is False if a quick test finds that the onsets differ
+        by less than 1 %.
         """
         return True
 
@@ -160,7 +160,7 @@ MethodObject = Annotated[Method, SkipValidation, BeforeValidator(as_method), "Me
 
 
 def prepared(problem: Problem, method: Method) -> Solver:
-    """Return the solver of a method. It checks values, and adds friction coefficients."""
+    """Return the solver of a method, which checks values and adds friction coefficients."""
     solver = method.prepare(problem)
     variables = method.variables(problem)
     # Other layers read these variables from any method.

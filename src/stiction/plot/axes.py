@@ -1,4 +1,4 @@
-"""Axes, which are given or new, units of their scales, and the problem of a result."""
+"""Given or new axes, units of their scales, and the problem of a result."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +21,7 @@ from stiction.problem.problem import Problem
 if TYPE_CHECKING:
 
     class FigureAxes(Axes):
-        """Axes on a whole figure, which can be saved, rather than a part of a figure."""
+        """Axes on a whole figure, which can be saved, rather than on a part of a figure."""
 
         figure: Figure  # type: ignore[assignment,unused-ignore]
 else:

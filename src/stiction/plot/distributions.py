@@ -32,8 +32,7 @@ from stiction.statistics import quantiles as estimate_quantiles
 
 MAX_CURVES = 6
 FEWEST = 20
-"""Values above which a density is estimated. Fewer values are marked
-separately."""
+"""Least number of values for a density. Fewer values are marked separately."""
 DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
 """Probability in place of zero on a logarithmic scale."""
@@ -56,7 +55,7 @@ def monte_carlo(
         if there is a pressure, else `critical_stress`.
         `critical_position` is drawn as a histogram.
     measured : Peaks, Curves or array, optional
-        Peaks from tests, in SI or with a unit. They are marked separately.
+        Peaks from tests, in SI or with a unit, which are marked separately.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on. By default new axes are made.
 
@@ -300,7 +299,7 @@ def failure_curve(curve: xr.Dataset, *, ax: Axes | None = None) -> FigureAxes:
 
 @checked
 def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
-    """Draw the sensitivities of a design. The widest is at the top.
+    """Draw the sensitivities of a design, with the largest at the top.
 
     Parameters
     ----------
@@ -312,8 +311,8 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     Returns
     -------
     matplotlib.axes.Axes
-        Each bar connects the designs at both ends of a range, and its
-        dot is the design at the second end. The line is the design, and
+        Each bar connects the designs at both ends of a range, and a dot
+        marks the design at the second end. The line is the design, and
         the band is its interval.
 
     Raises

@@ -192,7 +192,7 @@ def onset(
     Returns
     -------
     matplotlib.axes.Axes
-        With a second scale of friction coefficients if there is a pressure.
+        If there is a pressure, a second scale shows friction coefficients.
 
     Raises
     ------
@@ -241,10 +241,7 @@ def onset(
 
 
 def strength_of(problem: Problem, strength: Any) -> Array:
-    """Return profiles (samples, *shape), Pa.
-
-    Coefficients are multiplied by the pressure.
-    """
+    """Return profiles (samples, *shape) in Pa, with coefficients multiplied by the pressure."""
     if is_coefficient(strength) and problem.given_pressure is not None:
         coefficient = rows_of(problem.interface, strength, "friction_coefficient")
         return np.asarray(coefficient * problem.normal_pressure)
@@ -254,7 +251,10 @@ def strength_of(problem: Problem, strength: Any) -> Array:
 def chosen_row(
     rows: Array | None, results: Mapping[str, xr.Dataset], sample: int
 ) -> dict[str, xr.Dataset]:
-    """Return one sample of results, which must have as many samples as given rows of a profile."""
+    """Return a sample of each result.
+
+    Results must have as many samples as the profile has rows.
+    """
     by_sample = {
         name: result if "sample" in result.dims else result.expand_dims("sample")
         for name, result in results.items()

@@ -18,12 +18,11 @@ from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style
 
 SHOWN = 100
-"""Repetitions, or simulated records, from which a band is drawn that
-contains 90 % of them."""
+"""Number of repetitions, or simulated records, from which a 90 % band is drawn."""
 LAGS = 2.5
-"""Correlation lengths that the panel of the correlation shows."""
+"""Number of correlation lengths in the panel of the correlation."""
 PER_OCTAVE = 4
-"""Bands of wavenumbers in an octave."""
+"""Number of bands of wavenumbers in an octave."""
 
 
 @checked
@@ -108,8 +107,8 @@ def _pooled_correlation(lag: Array, observed: list[Observed], powers: list[Array
 
     Records are weighted by their size.
 
-    A record counts at lags up to half its length, because its period
-    repeats lags beyond.
+    A record counts at lags up to half its length, because a periodic
+    record repeats longer lags.
     """
     total, variance = np.zeros(lag.size), np.zeros(lag.size)
     for (window, records, *_), power in zip(observed, powers, strict=True):

@@ -31,16 +31,16 @@ data by frame."""
 FRAME_TIME = 50
 """Milliseconds that a film shows each frame."""
 DECADES = 7.0
-"""Drawn decades of slip rate below the largest."""
+"""Number of decades below the largest slip rate that are drawn."""
 BEFORE = 0.11
-"""Drawn time before the onset, in units of L/c_s."""
+"""Time before the onset that is drawn, in units of L/c_s."""
 FILMED_RATE = 1e-3
-"""Slip rate, over the largest of a run, from which its frames are in a film."""
+"""Slip rate above which a frame is in a film, over the largest slip rate of the run."""
 FRONT_SHARE = 0.9
 """Fraction of the nodes that the front has reached at the last of its
 contours."""
 STRENGTH = LinearSegmentedColormap.from_list("strength", ["0.85", "0.25"])
-"""Greys of strength. White is where nothing breaks."""
+"""Greys of strength. Nodes that cannot break are white."""
 KEEP = ". Keep them with simulate_rupture(save=st.Save(['slip_rate', 'shear_stress']))"
 
 
@@ -97,9 +97,9 @@ def film(
     path : path
         Ends in .gif.
     frames : int
-        Maximum number of frames. They are evenly spaced over the frames
-        of the run from the first to the last slip that is faster than
-        a thousandth of the fastest, so that creep is left out.
+        Maximum number of frames. The frames are evenly spaced between
+        the first and the last slip that is faster than a thousandth of
+        the fastest, so that creep is left out.
     progress : bool or callable
         As in `stiction.monte_carlo`.
 
@@ -150,7 +150,7 @@ def film(
 
 
 def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
-    """Return the times of a run, s, and in words the event at time zero, such as the onset."""
+    """Return the times of a run, s, and the name of the event at time zero, such as the onset."""
     onset = float(run["onset_time"])
     if np.isfinite(onset):
         return run[times].values - onset, " since the onset"
@@ -158,7 +158,10 @@ def _since_onset(run: xr.Dataset, times: str = "time") -> tuple[Array, str]:
 
 
 def _masked_by_decade(slip_rate: Array, decades: float) -> tuple[Any, LogNorm]:
-    """Return slip rates, masked if they are decades below the largest, and their colours."""
+    """Return slip rates and their colours.
+
+    Rates many decades below the largest are masked.
+    """
     top = max(float(slip_rate.max()), 1e-12)
     low = top * 10.0**-decades
     return np.ma.masked_less(slip_rate, low), LogNorm(low, top)
@@ -220,7 +223,7 @@ def _draw_front(axes: Axes, run: xr.Dataset, problem: Problem) -> None:
 
 
 def _clock(figure: Figure, run: xr.Dataset) -> tuple[Any, str, list[str]]:
-    """Return text at the top of a figure, and its content in each frame: time and mean stress."""
+    """Return the text at the top of a figure, and its content by frame: time and mean stress."""
     since, begin = _since_onset(run)
     late = since[since > 0.0]
     factor, unit = unit_for("s", late if late.size else since)

@@ -23,7 +23,7 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Pusher, Slider
 
 N_ARROWS = 7
-"""Arrows of a pressure on the top of a slider."""
+"""Number of arrows for the pressure on top of a slider."""
 
 
 def specimen(
@@ -48,9 +48,9 @@ def specimen(
     -------
     (2,) or (3,) array of matplotlib.axes.Axes
         The specimen, and below it the profiles along the interface. For
-        blocks, the profiles are the shear and the pressure of the drive.
-        A slider is drawn to scale, with its shear, pressure and slip at
-        the first instability. It needs a strength (friction coefficients).
+        blocks, the profiles are the shear and the pressure of the drive. A
+        slider, which needs a strength (friction coefficients), is drawn to
+        scale, with its shear, pressure and slip at the first instability.
 
     Examples
     --------
@@ -101,7 +101,7 @@ def specimen(
 
 
 def _draw_blocks(axes: Axes, problem: Problem, scale: float) -> None:
-    """Draw two blocks, and arrows for the drive. Heights have a separate scale."""
+    """Draw two blocks, and arrows for the drive. The heights have a separate scale."""
     blocks, length = problem.specimen, problem.interface.measure * scale
     assert blocks is not None  # `problem.blocks` has refused it
     height, drive = blocks.height * scale, blocks.drive
@@ -207,9 +207,9 @@ def precursors(
     problem : Problem, optional
         Needed only if the result does not hold it.
     measured : Curves, optional
-        From `stiction.read_curve`. They are drawn over the prediction,
-        with their precursors. Marks at the upper edge of the lower panel
-        show the travel at which these precursors begin.
+        From `stiction.read_curve`. The curves are drawn over the
+        prediction, with their precursors. Marks at the upper edge of the
+        lower panel show the travel at which these precursors begin.
 
     Returns
     -------

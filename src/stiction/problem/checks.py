@@ -1,4 +1,4 @@
-"""Whether profiles, units and nodes fit a problem.
+"""Checks that profiles, units and nodes fit a problem.
 
 Each check takes values in SI. The steps of a sample are:
 
@@ -24,19 +24,16 @@ from stiction.problem.interface import Interface
 from stiction.problem.specimen import Blocks
 
 MAX_STRENGTH_RATIO = 1e8
-"""Strength of a node over the median beyond which others are lost in
-round-off."""
+"""Strength of a node over the median above which other strengths are lost in round-off."""
 BARRIER = 10.0
-"""A node is a barrier where tau_p - tau_r is above so many times its
-lower quartile, by rank, of nodes that weaken."""
+"""Factor by which tau_p - tau_r of a barrier exceeds the lower quartile, by rank, of nodes that
+weaken."""
 MIN_NODES_IN_NUCLEATION = 4
-"""Nodes in a nucleation length."""
+"""Least number of nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
-"""Nodes in a nucleation length below which a unit is doubted. Hundred
-times more are needed."""
+"""Nodes in a nucleation length below which a unit is doubted. At least 4 are needed."""
 MIN_LENGTHS_IN_LINE = 4.0
-"""Nucleation lengths: on shorter lines free ends change the mean onset
-by more than about 1 %."""
+"""Nucleation lengths in a line below which free ends change the mean onset by over 1 %."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end of two equal blocks over the length
 in the middle."""
@@ -60,7 +57,7 @@ measures 1e-10 m."""
 def contradictions_of(
     interface: Interface, strength: Array, residual: Array, initial: Array, overstress: bool
 ) -> list[str]:
-    """Return why profiles (samples, *shape), Pa, with valid values do not fit together.
+    """Return messages about profiles (samples, *shape), Pa, that contradict each other.
 
     With `overstress`, the initial stress may exceed the strength.
     """
@@ -100,7 +97,7 @@ def contradictions_of(
 
 
 def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Array) -> float:
-    """Return the largest of some weakening rates, Pa/m, among nodes that may break.
+    """Return the largest weakening rate, Pa/m, among nodes that may break.
 
     Arrays have shape (samples, *shape). Barriers do not count: with a
     uniform critical slip they weaken steeply but never slip.
@@ -121,7 +118,7 @@ def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Ar
 
 
 def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[float, ...]:
-    """Return how many nodes of a `Problem` span h_n, in each direction.
+    """Return the number of nodes of a `Problem` that span h_n, in each direction.
 
     The weakening rate (Pa/m) is the steepest at any slip, as everywhere
     in this file.

@@ -27,7 +27,7 @@ from stiction.base.model import (
 Mask = NDArray[np.bool_]
 
 FEWEST_NODES, MOST_NODES = 8, 2**24
-"""Nodes in each direction, and in all."""
+"""Least number of nodes in each direction, and largest number in all."""
 SHORTEST = 1e-30
 """Spacing of nodes, m, below which squares and ratios leave the range
 of numbers."""
@@ -219,7 +219,7 @@ class Interface(Listed):
         return self
 
     def _wrong_extent(self) -> str | None:
-        """Return what is wrong with the extent, or None if the extent is valid."""
+        """Return a message if the extent is invalid, or None."""
         extent, ends = self.extent, self._ends
         if extent is None:
             return None
@@ -243,7 +243,10 @@ class Interface(Listed):
 
     @property
     def _ends(self) -> tuple[tuple[float, float], ...] | None:
-        """Ends of the extent along each direction, m. None if there is no extent, or for a mask."""
+        """Ends of the extent along each direction, m.
+
+        None if there is no extent, or for a mask.
+        """
         extent = self.extent
         if isinstance(extent, Ellipse):
             pairs = zip(extent.centre, extent.semi_axes, strict=True)
@@ -254,7 +257,7 @@ class Interface(Listed):
 
     @property
     def _inside(self) -> Mask:
-        """Mask of the nodes in the extent, with shape (*shape). It includes nodes on the border."""
+        """Mask of the nodes in the extent, also on its border, with shape (*shape)."""
         extent, grid = self.extent, np.meshgrid(*self.coordinates.values(), indexing="ij")
         if isinstance(extent, np.ndarray):
             return extent
@@ -278,7 +281,10 @@ class Interface(Listed):
 
     @cached_property
     def is_held(self) -> bool:
-        """Whether some nodes cannot break. An extent of all nodes is the same as no extent."""
+        """Whether some nodes cannot break.
+
+        An extent of all nodes is the same as no extent.
+        """
         return self.extent is not None and not self.breakable.all()
 
     def mean(self, profiles: Array) -> Array:
@@ -293,7 +299,10 @@ class Interface(Listed):
 
     @property
     def reach(self) -> float:
-        """Longest side of the part that can break, m. The whole interface reaches over a period."""
+        """Longest side of the part that can break, m.
+
+        For the whole interface it is a period.
+        """
         if not self.is_held:
             return max(self.lengths)
         sides = [
@@ -314,7 +323,7 @@ class Interface(Listed):
 
     @property
     def embedding(self) -> Interface:
-        """The periodic interface for random fields. It is twice as long if the ends are free."""
+        """Periodic interface for random fields, twice as long if the ends are free."""
         if not self.is_free:
             return self
         return Interface(2.0 * self.measure, 2 * self.size)
@@ -351,7 +360,7 @@ class Interface(Listed):
 
     @cached_property
     def measure(self) -> float:
-        """Length of a line (m), area of a plane (m²)."""
+        """Length of a line (m), or area of a plane (m²)."""
         return math.prod(self.lengths)
 
     @property
@@ -399,8 +408,8 @@ class Interface(Listed):
     def wave_vectors(self) -> tuple[Array, ...]:
         """Components of the wave vectors in `transform`, rad/m.
 
-        They broadcast to the shape of a transformed profile: (n//2 + 1,) on a line, (nx,
-        1) and (1, ny//2 + 1) on a plane.
+        The components broadcast to the shape of a transformed profile: (n//2 + 1,) on a
+        line, (nx, 1) and (1, ny//2 + 1) on a plane.
         """
         *first, last = (2.0 * np.pi / length for length in self.lengths)
         along = last * np.arange(self.shape[-1] // 2 + 1)

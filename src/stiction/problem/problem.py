@@ -38,11 +38,9 @@ if TYPE_CHECKING:
     from stiction.elasticity.rig import Rig
 
 MIN_MACHINE_RATIO = 1e-4
-"""Stiffness of a machine over that of its blocks below which it is
-probably in another unit."""
+"""Machine stiffness over block stiffness below which the unit is probably wrong."""
 MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
-"""Height of blocks over their length between which their response takes
-seconds and below 1 GB."""
+"""Height of blocks over length between which the response takes seconds and less than 1 GB."""
 NO_AREA = (
     "a force needs the area of the interface: give the thickness of the specimen, or"
     " interface.width of a line (m)"
@@ -61,7 +59,7 @@ class Load(Listed):
         the mean stress.
     initial_stress : float or (nodes,) array
         tau_i, Pa, below the peak strength everywhere. `Rupture` also
-        takes nodes at which it is higher, which break at once.
+        accepts nodes with a higher value, which break at once.
     normal_pressure : float or (nodes,) array, optional
         Pa, positive on average. Every onset then has a
         `friction_coefficient`.
@@ -172,7 +170,7 @@ class Problem(Listed):
         return self
 
     def _of_specimen(self) -> list[str]:
-        """Let the interface end with the specimen, and return what does not fit a specimen."""
+        """Let the interface end with the specimen, and return messages about unsuitable inputs."""
         interface, specimen = self.interface, self.specimen
         pressure: Any = self.load.normal_pressure
         if specimen is None:
@@ -205,7 +203,7 @@ class Problem(Listed):
         return problems
 
     def _of_slider(self, slider: Slider) -> list[str]:
-        """Return what does not fit a slider."""
+        """Return messages about inputs that do not fit a slider."""
         load: Any = self.load
         interface = self.interface
         given = {
@@ -282,7 +280,7 @@ class Problem(Listed):
 
     @property
     def has_machine(self) -> bool:
-        """Whether an elastic machine drives the specimen. Slip then lowers its force."""
+        """Whether an elastic machine, which loses force by slip, drives the specimen."""
         return self.specimen is not None and self.specimen.drive.stiffness > 0.0
 
     def released_stress(self, slip: Array) -> Array:
@@ -293,7 +291,7 @@ class Problem(Listed):
         return self.interface.inverse_transform(symbol * self.interface.transform(slip))
 
     def relief(self, slip: Array) -> float:
-        """Return by how much a slip (m, flattened) lowers the mean stress, Pa.
+        """Return the decrease of the mean stress, Pa, by a slip (m, flattened).
 
         A machine with finite stiffness loses force when the interface
         slips, and nodes beyond the extent take over stress. The mean
@@ -367,7 +365,10 @@ class Problem(Listed):
 
     @cached_property
     def effective_modulus(self) -> float:
-        """Static modulus G*, Pa, for the plane state and the mode. On a plane, G* along x."""
+        """Static modulus G*, Pa, for the plane state and the mode.
+
+        On a plane, G* along x.
+        """
         if isinstance(self.specimen, Slider):
             return self.specimen.effective_modulus(self.solid)
         return self.solid.effective_modulus(self.mode)
@@ -413,7 +414,7 @@ class Problem(Listed):
             'friction_coefficient', or a DataArray with the unit 1, is
             multiplied by the pressure.
         accept : collection of {"overstress"}
-            Accepts an initial stress above the strength.
+            "overstress" allows an initial stress above the strength.
 
         An `InputError` lists every invalid name, shape and value. An
         `AccuracyWarning` gives the fraction of nodes without weakening.

@@ -180,7 +180,7 @@ def read_profile(
     """Read a profile along the interface from a file or a labelled array, in SI units.
 
     A column is read if its heading, or the caller, says that it is the wanted
-    quantity. If several columns could be it, an error lists them.
+    quantity. If several columns could be the quantity, an error lists them.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def read_profile(
         as columns.
     x, value : str or int, optional
         Heading, name or number (from 0) of the column, coordinate or variable. By
-        default `value` is the column called as the quantity, tau_p, shear strength,
+        default `value` is the column named after the quantity, tau_p, shear strength,
         COF, Reibzahl, ... or the only column with numbers besides x, specimens and
         times, and `x` is the column called x, position, travel, Weg, ... or the only
         column in a unit of length. If two columns have no headings, the first is x.
@@ -208,7 +208,7 @@ def read_profile(
         Map from heights (m) to strengths (Pa): ``lambda h: 1e6 + 5e11 * h``.
     missing : float, str or sequence of them, optional
         Numbers and words that mark a missing value, such as ``-9999`` or ``"Bad"``.
-        Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always do.
+        Empty cells, ``nan``, ``n/a``, ``-``, ``***`` and ``#N/A`` always mark it.
     decimal : {".", ","}, optional
         Decimal mark of a text file, needed if it could also separate thousands.
     skip : int
@@ -326,7 +326,7 @@ def _in_order(array: Any) -> Any:
 
 
 class ProfileFile(NamedTuple):
-    """A profile file named in a study file. It is read when the interface is known."""
+    """A profile file named in a study file, which is read when the interface is known."""
 
     path: Path
     options: dict[str, Any]

@@ -40,7 +40,10 @@ from stiction.problem.specimen import Slider
 TOLERANCE = 0.02
 """Fraction of the spacing by which rounding in a file may move a point."""
 LARGEST = 1e100
-"""Of a profile, in SI units; sums and products of larger numbers overflow."""
+"""Largest value of a profile, in SI units.
+
+Sums and products of larger values overflow.
+"""
 GIVE_PRESSURE = "Give load.normal_pressure (Pa) or load.pressing_force (N)"
 REPLACED = {
     "residual_strength": ("friction.residual_strength", "friction.residual_ratio"),
@@ -109,7 +112,7 @@ class Sample(Result, _Profiles):
         return tuple(range(-self.load_profile.ndim, 0))
 
     def part(self, some: slice) -> Sample:
-        """Return some samples of the batch."""
+        """Return a selection of the samples."""
         profiles = {name: rows for name, rows in self._asdict().items() if name in PROFILES}
         return self._replace(**{name: rows[some] for name, rows in profiles.items()})
 
@@ -375,9 +378,7 @@ def constants_of(problem: Any, strength: Any) -> dict[str, Any]:
 def own_sample(
     problem: Any, profiles: Mapping[str, Array], accept: Collection[str] = ()
 ) -> Sample:
-    """Return a sample from arrays by name that the package made.
-
-    They are in SI units.
+    """Return a sample from arrays in SI units, by name, that the package made.
 
     Only values are checked here, because some samples may not fit
     the problem. The caller checks the resolution, and the nodes

@@ -57,8 +57,7 @@ UNFIT_FOR_SLIDER = {
     "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
     "extent": "the whole slider can slip. Leave it out",
 }
-"""What a slider does not take, by the last part of a key: as stresses,
-profiles or at all."""
+"""Advice about inputs that a slider does not accept, by the last part of the key."""
 
 
 @model(kw_only=True)
@@ -72,8 +71,8 @@ class Platen(Listed):
         N/m. 0 is a dead load (the force is controlled).
         ``float("inf")`` is a rigid machine (the travel is controlled).
     mass : float
-        Mass of the platen and the grip that move with a block, kg. It
-        counts in ruptures with inertia only.
+        Mass of the platen and the grip that move with a block, kg. The
+        mass matters only in ruptures with inertia.
     """
 
     stiffness: Stiffness = 0.0
@@ -98,7 +97,7 @@ class Pusher(Listed):
     side : {"left", "right", "both"}
         The trailing side, from which slip is driven. Two pushers (of
         blocks only) each apply half the force. This is the shear of a lap
-        joint. Its bending, and its change of pressure, are not modelled.
+        joint. Bending, and the change of pressure, are not modelled.
     stiffness : float
         Machine stiffness between the grips of the two blocks, or
         behind the slider, N/m (see `Platen`).
@@ -142,7 +141,7 @@ def _only(*kinds: type) -> Callable[[Any], Any]:
 
 
 def _beyond_side(drive: Any, height: float) -> list[str]:
-    """Return why a pusher does not fit the side of a body with a height (m), or an empty list."""
+    """Return messages about a pusher that does not fit the side of a body with a height (m)."""
     if not isinstance(drive, Pusher):
         return []
     low, high = drive.height - 0.5 * drive.width, drive.height + 0.5 * drive.width
@@ -229,7 +228,7 @@ class Blocks(Listed):
 
 @model(kw_only=True)
 class Base(Listed):
-    """The body on which a slider lies. It is at least as long as the slider.
+    """The body on which a slider lies, at least as long as the slider.
 
     Parameters
     ----------
@@ -277,9 +276,9 @@ class Slider(Listed):
         A uniform pressure on the top face, or a rigid frictionless plate
         that moves down without rotation.
     tilt : float
-        Linear part of the soft pressure over its mean, in [-1, 1]. It is
-        positive towards the leading end: the pressure is
-        mean (1 + tilt (2 x/L - 1)), with x from the trailing end.
+        Linear part of the soft pressure over its mean, in [-1, 1],
+        positive towards the leading end: the pressure is mean (1 + tilt
+        (2 x/L - 1)), with x from the trailing end.
 
     Examples
     --------
@@ -368,7 +367,7 @@ class Slider(Listed):
         return float(2.0 * a / (a**2 - b**2))
 
     def misfits(self, length: float, spacing: float, solid: Solid, mode: Mode) -> list[str]:
-        """Return why a slider does not fit an interface (m) and a material, or an empty list."""
+        """Return messages about a slider that does not fit an interface (m) and a material."""
         problems, base = [], self.base
         if mode != "II":
             problems.append("mode: a slider is sheared in its plane. Leave 'II'")

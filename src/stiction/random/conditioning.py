@@ -361,10 +361,7 @@ def _estimate_error(
 
 
 def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
-    """Step 3: return the regression, with b and p.
-
-    They are reduced if they have no posterior.
-    """
+    """Step 3: return the regression, with b and p, which are reduced if they have no posterior."""
     scale = np.sqrt(np.maximum(np.abs(precision), MIN_SCALE))
     left, singular, right = svd(phi * scale[:, None], full_matrices=False)
     kept = singular > MIN_SINGULAR_VALUE

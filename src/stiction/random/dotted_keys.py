@@ -85,7 +85,7 @@ def full_key(key: str) -> str:
 
 
 def short_key(key: str) -> str:
-    """Return the one key under which a parameter is printed. `full_key` is its inverse."""
+    """Return the key under which a parameter is printed. `full_key` is its inverse."""
     short = full_key(key).removeprefix("random.")
     for begin in ("strength.spectrum.", "strength."):
         rest = short.removeprefix(begin)

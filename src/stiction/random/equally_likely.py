@@ -67,10 +67,10 @@ class WithFactors:
     def with_between(self, between: Mapping[str, Any]) -> Self:
         """Return the source for new specimens, in which constants scatter between specimens.
 
-        Scatter that was already present in the tests explains a part of
-        their scatter, and is stated before `infer` in
-        ``RandomInterface(between=)``. Scatter that only new joints have
-        is stated here.
+        Scatter of constants that was already present in the tests
+        explains a part of the scatter of the peaks. State such scatter
+        before `infer`, in ``RandomInterface(between=)``. State here the
+        scatter that only new joints have.
 
         Parameters
         ----------
@@ -138,10 +138,9 @@ class EquallyLikely:
     """One random interface, or several that are equally likely: the random input of every method.
 
     If there are several, the first draw of a sample selects the member.
-    The other draws are the same for all members: a property and a mode
-    have one draw. If a sample changes its member, its profiles keep
-    their form. A single member has no such draw, and its draws are
-    those of the interface.
+    All members use the same draw for a property and a mode, so that the
+    profiles of a sample keep their form if its member changes. A single
+    member needs no such first draw.
     """
 
     members: tuple[RandomInterface, ...]

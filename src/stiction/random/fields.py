@@ -75,8 +75,8 @@ class RandomField(Listed):
         Albertini et al. (2020), the mean of z is the same in every
         sample, which is harmless on long interfaces only.
     anisotropy : float, optional
-        On a plane, the correlation length along y over that along x, which
-        the spectrum gives. By default 1.
+        On a plane, the correlation length along y over the correlation
+        length along x, which the spectrum gives. By default 1.
     quantity : {"friction_coefficient"}, optional
         Declares that the field holds friction coefficients, which are
         multiplied by the normal pressure.
@@ -129,7 +129,7 @@ class RandomField(Listed):
 
     @checked
     def given(self, profile: Any, *, noise: Positive) -> RandomField:
-        """Return the field conditioned on measured values. It remains random at other places.
+        """Return the field conditioned on measured values, which stays random at other places.
 
         Parameters
         ----------
@@ -409,11 +409,11 @@ class RandomInterface(Listed):
 
     @property
     def linked(self) -> Array:
-        """Matrix of whether two properties are correlated, directly or through others."""
+        """Matrix that says whether two properties are correlated, directly or through others."""
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
-        """Return how many standard normal draws a sample has."""
+        """Return the number of standard normal draws in a sample."""
         return int(layout(self, interface)[-1].columns.stop)
 
     @checked

@@ -160,7 +160,7 @@ def from_normal(marginal: Any, z: Array) -> Array:
 
 
 class Standard(NamedTuple):
-    """Distribution of scipy from 0 at scale 1. Its table serves all multiples."""
+    """Distribution of scipy from 0 at scale 1, whose table serves all multiples."""
 
     family: Any
     shapes: tuple[float, ...]

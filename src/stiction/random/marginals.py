@@ -285,8 +285,9 @@ class TruncatedNormal(_ByMoments):
 class ScipyMarginal(Marginal):
     """Continuous `scipy.stats` distribution, given by its name and parameters.
 
-    A distribution without a name in scipy is kept `frozen`. It cannot
-    be written to a study file, and it equals only itself.
+    A distribution without a name in scipy is kept `frozen`. Such a
+    distribution cannot be written to a study file, and equals only
+    itself.
     """
 
     type: str

@@ -334,7 +334,7 @@ def _refuse_to_write(function: Any) -> Any:
 
 @model
 class CustomSpectrum(SpectralDensity):
-    """User-defined spectrum: any g(k), up to a factor. It cannot be used in study files.
+    """User-defined spectrum for Python only: any g(k), up to a factor.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ class Modes:
         return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
-        """Return how many nodes leave at most a given fraction unresolved, in equal proportions."""
+        """Return node counts, in equal proportions, that leave at most a fraction unresolved."""
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
         # Refinement of the present grid that resolves each mode.
@@ -233,7 +233,7 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
 
 
 def block_of(dimensions: int) -> int:
-    """Return how many samples use the same generator, on a line (1 dimension) or a plane (2)."""
+    """Return the number of samples per generator, on a line (1 dimension) or a plane (2)."""
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 

@@ -22,7 +22,7 @@ from stiction.ensemble.experiment import Experiment
 from stiction.reliability.tail import TailPoint
 
 ESTIMATED = ("stress", "probability", "cv", "members_cv", "members")
-"""Attributes of an answer that a `TailPoint` has."""
+"""Attributes that an answer takes from a `TailPoint`."""
 UNSEEN_CONFIDENCE = 0.95
 """Confidence with which a weaker batch would have been seen."""
 
@@ -42,13 +42,13 @@ class Answer(Result):
         ``force`` (N) and ``friction_coefficient`` of a design.
     cv : float
         Coefficient of variation of the probability: estimated standard
-        error over the estimate. It is infinite without a failure, and
-        zero if the answer is exact.
+        error over the estimate, infinite without a failure, and zero if
+        the answer is exact.
     members_cv : float
-        Part of `cv` that arises because a list of equally
-        likely interfaces is only a sample of the interfaces
-        that may be true. The squares of this part and the
-        sampling error add up. 0 for a single interface.
+        Part of `cv` that arises because a list of equally likely
+        interfaces is only a sample of the interfaces that may be true,
+        or 0 for a single interface. The squares of this part and of the
+        sampling error add up.
     evaluations, first_stage_evaluations : int
         Samples solved by the method, and samples solved only by its
         less expensive first stage.
@@ -61,20 +61,21 @@ class Answer(Result):
         the reason for this choice.
     members : (members,) array
         For a list of equally likely interfaces, the probability for
-        each interface. NaN if fewer than three samples of an interface
-        slide below the stress. Their mean is `probability`, the
-        predictive probability, on which a decision should rest.
+        each interface, or NaN if fewer than three samples of an
+        interface slide below the stress. The mean over all interfaces
+        is `probability`, the predictive probability, on which a
+        decision should rest.
     survived : float
         Fraction of plain samples in which the event does not happen at any
         stress. With a stiff machine, an interface may stay stable and
         carry any load.
     warnings : tuple of str
-        Reasons not to trust the answer. Empty if there are no such reasons.
+        Reasons not to trust the answer, if any.
     doubts : tuple of str
         Doubts of the fit or posterior behind the answer.
     normal_pressure, friction_coefficient : float
-        Mean pressure, Pa, and `stress` over
-        it. NaN without a normal pressure.
+        Mean pressure, Pa, and `stress` over this pressure. Both are NaN
+        without a normal pressure.
     area, force : float
         Interface area, m², and `stress` times the area, N. NaN
         if the area is unknown: give ``Blocks(thickness=...)``, or
@@ -95,14 +96,14 @@ class Answer(Result):
     characteristic_stress, confidence : float
         Given by `design_stress` if specimens were counted: stress, Pa,
         below which 5 % of the specimens slide, with this confidence (EN
-        1990: 75 %). It is a quantile over equally likely interfaces.
-        NaN if specimens were not counted.
+        1990: 75 %): a quantile over equally likely interfaces. NaN if
+        specimens were not counted.
     partial_factor, reliability_index : float
         `characteristic_stress` over `stress`, and minus the quantile of
         the normal distribution at the probability.
     of_stress : bool
-        True if the stress is estimated, as in `design_stress`. False if
-        the probability is.
+        True if the stress is estimated, as in `design_stress`, and
+        false if the probability is estimated.
     quantity : str
         First quantity of the printed answer: 'stress', 'force' or
         'friction_coefficient', as requested. For `design_stress` it is
@@ -199,7 +200,7 @@ class Answer(Result):
 
     @property
     def reliability_index(self) -> float:
-        """Index beta: a standard normal variable is below -beta with this probability."""
+        """Reliability index beta: a normal variable is below -beta with this probability."""
         return -float(ndtri(self.probability))
 
     @property
@@ -336,7 +337,7 @@ class Answer(Result):
 
 
 def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
-    """Return what moves a design: each source, its ends, and the design at both ends, in words.
+    """Return the sensitivities of a design in words: source, ends, and the design at both ends.
 
     A distribution between specimens has a single design.
     """
@@ -356,7 +357,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
 
 
 def unseen_batch(specimens: int) -> list[str]:
-    """Return a sentence on the batch that so many specimens cannot exclude with 95 % confidence."""
+    """Return a sentence on the weak batch that a number of specimens cannot exclude (95 %)."""
     if not specimens:
         return []
     unseen = 1.0 - (1.0 - UNSEEN_CONFIDENCE) ** (1.0 / specimens)

@@ -66,13 +66,13 @@ SPECIMENS_PER_SAMPLE = 128
 CHARACTERISTIC = 0.05
 """Fraction of the specimens below the characteristic value."""
 FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
-"""Samples that are solved at first, and most samples in a later step."""
+"""Number of samples that are solved at first, and largest number in a later step."""
 COUNT_MARGIN = 1.1
 """Factor on the number of samples, because the error so far is itself
 an estimate."""
 SUBSET_EVALUATIONS = 50.0
-"""Evaluations of subset simulation for a coefficient of variation of 1,
-over log10(P)^2. It was fitted to measured costs."""
+"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2, fitted
+to measured costs."""
 LONG_LIST, LIST_COST = 100, 5.0
 """Number of interfaces above which a list is long, and cost of an
 evaluation in chains over a long list, over the cost of an evaluation in
@@ -88,7 +88,7 @@ def binomial_interval(failures: int, samples: int) -> tuple[float, float]:
 
 
 class Counted(NamedTuple):
-    """Failures among samples. If the last failure ended the count, it is not included."""
+    """Failures among samples, without the last failure if it ended the count."""
 
     failures: int
     samples: int
@@ -123,10 +123,7 @@ class Counted(NamedTuple):
 
 @dataclass(frozen=True)
 class Redrawn:
-    """Draws of plain samples that begin with `first`.
-
-    They are drawn again to save memory.
-    """
+    """Draws of plain samples from `first` on, which are drawn again to save memory."""
 
     state: LimitState
     seed: int
@@ -309,8 +306,8 @@ def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:
 def count_tail(state: LimitState, goal: Goal, budget: int) -> tuple[Counts | None, bool]:
     """Count failures up to the goal (steps 7 and 8), and return whether the count is enough.
 
-    It is not enough if chains cost less. Without a long list and
-    factors there is no count.
+    The count is not enough if chains cost less. Without a long list and
+    factors nothing is counted.
     """
     long_list = len(state.experiment.random.members) > LONG_LIST
     if not (long_list or _expands(state)):

@@ -70,7 +70,7 @@ from stiction.reliability.solving import (
 from stiction.reliability.tail import FREQUENT, Goal, TailPoint, sample_tail
 
 SAMPLES_PER_END = 300
-"""Samples that are solved at each end of a range."""
+"""Number of samples that are solved at each end of a range."""
 USUAL_SHARE = 0.1
 """Fraction of a constant below and above its value if no range is stated."""
 CONSTANTS = (
@@ -79,8 +79,7 @@ CONSTANTS = (
     "load.pressing_force", "solid.shear_modulus", "specimen.height", "specimen.drive.stiffness",
     "specimen.drive.height",
 )  # fmt: skip
-"""Dotted keys of the constants that may be assumed, if they are numbers
-in a problem."""
+"""Dotted keys of constants that may be assumptions, if they are numbers in a problem."""
 FAMILY = "distribution between specimens"
 
 
@@ -230,7 +229,7 @@ def _quantile(
 
 
 def ranges_of(problem: Any, source: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the range of each constant that may be assumed, by full key."""
+    """Return the range of each constant that may be an assumption, by full key."""
     values = {f"problem.{key}": value_at(problem, key) for key in CONSTANTS}
     values |= getattr(source, "assumed", {})
     ranges = {
@@ -247,7 +246,7 @@ def ranges_of(problem: Any, source: Any, stated: Mapping[str, Any]) -> dict[str,
 
 
 class _Counted(NamedTuple):
-    """Prediction by samples, for interfaces that cannot predict by themselves."""
+    """Prediction from samples, for interfaces without a prediction of their own."""
 
     counts: Counts
     kinds: Array  # family of the factor of each interface

@@ -71,7 +71,7 @@ from stiction.reliability.tail import (
 PILOT_SAMPLES = 1_000
 """Number of plain samples by which the algorithm is chosen."""
 NEGLIGIBLE_PROBABILITY = 1e-15
-"""Probability of failing, or of holding, below which no sample is drawn."""
+"""Probability of failing, or of surviving, below which no sample is drawn."""
 DOUBTFUL = 0.02
 """Fraction of the mean strength below which a stress is probably in
 another unit."""
@@ -81,7 +81,7 @@ or MPa for Pa."""
 SHOWN_PROFILES = 20
 """Number of failing profiles in an answer."""
 COVERED = 0.8
-"""Fraction of the failures below which the first stage leads to a warning."""
+"""Fraction of the failures that the first stage must find to avoid a warning."""
 QUANTITIES = {"stress": "Pa", "force": "N", "friction_coefficient": "1"}
 """Units of the quantities in which a stress may be given."""
 
@@ -135,7 +135,7 @@ def failure_probability(
         result explains the choice of 'auto'.
     target_cv : float
         Coefficient of variation to reach, including the part due to the
-        list of interfaces.
+        choice of interfaces.
     max_evaluations : int, optional
         Largest number of samples to solve. The default takes about a
         quarter of an hour on one core, but is at most 2,000,000

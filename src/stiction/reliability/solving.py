@@ -1,4 +1,4 @@
-"""What every call of this folder does: budget, number of interfaces, checks and doubts."""
+"""Steps of every call in this folder: budget, number of interfaces, checks and doubts."""
 
 from __future__ import annotations
 
@@ -48,8 +48,10 @@ CHAIN_EVALUATIONS, PATIENCE_SECONDS = 20_000, 900.0
 and longest time of evaluations on one core, s, unless `max_evaluations`
 allows more."""
 LIST_SHARE, SAMPLING_SHARE = 0.6, 0.8
-"""Parts of the target for the errors by the list of interfaces and by
-sampling. Squares add up."""
+"""Parts of the target for the errors by choice of interfaces and by sampling.
+
+Squares add up.
+"""
 REQUEST_MARGIN, CARRIED_SHARE = 1.2, 0.9
 """Margin on the wanted number of members, and fraction of the mean that
 a warning reports."""
@@ -62,7 +64,7 @@ EXACT_CHECKS = (8, 64)
 """Fewest and most samples of an approximate method that are solved
 exactly as a check."""
 CHECK_SECONDS = 10.0
-"""Seconds of one core for this check."""
+"""Seconds of one core for the check by exact solutions."""
 F = TypeVar("F", "Answer", TailPoint)
 
 
@@ -122,9 +124,9 @@ def exact_tail(state: LimitState) -> Tail:
 def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
     """Return a doubt if the distributions between specimens lead to very different stresses.
 
-    The number of specimens is that for which the likelihoods of the two
-    families differ by `ODDS` on average, by the divergence of one
-    family from the other.
+    The doubt states the number of specimens for which the likelihoods
+    of the two families differ by `ODDS` on average. It follows from the
+    divergence of one family from the other.
     """
     stresses = {name: law.quantile(probability, name) for name in law.families}
     low, high = (pick(stresses, key=stresses.__getitem__) for pick in (min, max))
@@ -143,7 +145,7 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
 
 
 def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
-    """Return the most evaluations in all rounds of a call."""
+    """Return the largest number of evaluations in all rounds of a call."""
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return max_evaluations or int(
         min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))
@@ -151,7 +153,7 @@ def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return why chains of samples take too long with this method, or None."""
+    """Return a message if chains of samples take too long with this method, or None."""
     seconds, method = CHAIN_EVALUATIONS * experiment.seconds, experiment.method
     fast = seconds <= PATIENCE_SECONDS and not optional_member(method, "counted_only")
     if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
@@ -218,7 +220,7 @@ def with_enough_members(
     max_evaluations: int | None,
     solve: Callable[[Experiment, Meter, int], F],
 ) -> tuple[Experiment, F, int]:
-    """Return a solution with enough members for the error due to the list, and all evaluations.
+    """Return a solution with enough members for the error due to their choice, and all evaluations.
 
     A source draws more members until the error is small enough, or
     another round would need more evaluations than are left.
@@ -242,7 +244,7 @@ def with_enough_members(
 
 
 def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> list[str]:
-    """Return a warning if the list makes the estimate less precise than `target_cv`."""
+    """Return a warning if the choice of interfaces leaves the estimate above `target_cv`."""
     by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
@@ -285,7 +287,7 @@ def exact_doubts(point: TailPoint) -> list[str]:
 
     Warn if more or fewer samples fail.
 
-    These are low samples on both sides of the stress.
+    The checked samples are low samples on both sides of the stress.
     Failures are counted, because in a tail a small change of stress may
     multiply the probability.
     """

@@ -134,10 +134,10 @@ class Below(NamedTuple):
 class Descent(NamedTuple):
     """A finished repetition: populations, from all samples down to the rarest level.
 
-    It is complete if it reached the threshold or the requested
-    probability. With two levels, it has one population: the samples to
-    which the guide leads, with their exact values. `last` and `walked`
-    describe walks among failures (see `two_level`).
+    A repetition is complete if it reached the threshold or the
+    requested probability. With two levels, it has one population: the
+    samples to which the guide leads, with their exact values. `last`
+    and `walked` describe walks among failures (see `two_level`).
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -152,10 +152,7 @@ class Descent(NamedTuple):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Lowest and highest finite value.
-
-        If there is no finite value, plus and minus infinity.
-        """
+        """Lowest and highest finite value, or plus and minus infinity if no value is finite."""
         lowest, plain = self.populations[-1].values, self.populations[0].values
         low = float(lowest.min(initial=math.inf))
         return low, float(plain.max(where=plain < math.inf, initial=-math.inf))
@@ -174,10 +171,7 @@ class Descent(NamedTuple):
         return [level for level in self.populations if level.ceiling >= value]
 
     def probability(self, value: float) -> float:
-        """Return the estimate of P(function < value) (step 6).
-
-        Zero without a sample below.
-        """
+        """Return the estimate of P(function < value) (step 6), zero without a sample below."""
         rarest = self._holders(value)[-1]
         return math.exp(rarest.log_probability) * _share(rarest.values < value) / self.last
 
@@ -204,7 +198,7 @@ class Descent(NamedTuple):
     def around(self, value: float) -> tuple[Population, NDArray[np.int64]]:
         """Return a population, and its samples on both sides of a value, in correct proportions.
 
-        They are the lowest samples of the population, twice as many as
+        The samples are the lowest of the population, twice as many as
         lie below the value. If more than half of a population lies
         below the value, a less rare population is used.
         """

@@ -61,10 +61,9 @@ end of the interval."""
 GUIDE_PILOT_SAMPLES = 500
 """Number of plain samples by which a guide is judged."""
 LEAST_SHARE_PICKED = 0.9
-"""Fraction of the weakest of them that a guide must pick."""
+"""Fraction of the weakest plain samples that a guide must pick."""
 RESOLVED = 3
-"""Fewest samples that determine the probability of one of the equally
-likely interfaces."""
+"""Least number of samples that determine the probability of an interface of a list."""
 POOR = 0.02
 """Least fraction of failures among the samples of a guide."""
 
@@ -85,8 +84,8 @@ OF_CURVES = Sizes(4, 2_000, 2_000)
 class Goal(NamedTuple):
     """Quantity to find in a tail: the probability below a stress, or the stress at a probability.
 
-    The default of the other number cannot be reached, so it never stops
-    the sampling.
+    The default of the number that is not sought cannot be reached, so
+    it never stops the sampling.
     """
 
     cv: float  # coefficient of variation to reach
@@ -169,7 +168,7 @@ class Tail(NamedTuple):
         return float(sum(self._parts(stress)))
 
     def cv(self, stress: float) -> float:
-        """Return the coefficient of variation. It is infinite if no sample is so low."""
+        """Return the coefficient of variation, infinite if no sample is below the stress."""
         parts = self._parts(stress)
         if not parts.any():
             return math.inf
@@ -183,9 +182,9 @@ class Tail(NamedTuple):
         """Return the probability for each of the equally likely interfaces.
 
         The probability is NaN if fewer than `RESOLVED` samples of an
-        interface are so low. For plain samples, it is the fraction among
-        the samples of the interface, because their number is random and
-        causes most of the error near P = 1.
+        interface are below the stress. For plain samples, it is the
+        fraction among the samples of the interface, because their number
+        is random and causes most of the error near P = 1.
         """
         in_chains, seen, low, plain = np.zeros((4, count))
         plain_weight = 0.0
@@ -208,7 +207,7 @@ class Tail(NamedTuple):
         return np.where(seen >= RESOLVED, np.minimum(chances, 1.0), np.nan)
 
     def members_cv(self, stress: float, kinds: Array) -> float:
-        """Return the coefficient of variation due to the list, which is a sample of interfaces.
+        """Return the coefficient of variation due to the list of interfaces, which is a sample.
 
         Members with the same number in `kinds` are one entry of the
         list. An entry has the fraction w of the list and the fraction p of
@@ -288,19 +287,19 @@ class TailPoint:
 
     @cached_property
     def members_cv(self) -> float:
-        """Part of `cv` due to the list of interfaces. 0 for a single interface."""
+        """Part of `cv` due to the choice of interfaces, or 0 for a single interface."""
         if not self.state.several:
             return 0.0
         return self.tail.members_cv(self.stress, self.state.experiment.random.kinds)
 
     @cached_property
     def cv(self) -> float:
-        """Coefficient of variation due to sampling and to the finite list of interfaces."""
+        """Coefficient of variation due to sampling and to the choice of interfaces."""
         return math.hypot(self.sampling_cv, self.members_cv)
 
     @cached_property
     def members(self) -> Array:
-        """Probability of each equally likely interface. Empty for a single interface."""
+        """Probability of each equally likely interface, or empty for a single interface."""
         if not self.state.several:
             return np.zeros(0)
         lows, highs = np.array(self.state.bounds_of_members()).T
@@ -357,7 +356,7 @@ def repeat_until_precise(
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return how much of the weakest fiftieth of samples is in the weakest tenth by the guide."""
+    """Return the fraction of the weakest fiftieth of samples in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())

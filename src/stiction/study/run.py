@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 OVERHEAD = 2**16
 """Bytes of a NetCDF file apart from its arrays."""
 FEWEST_BLOCKS = 8
-"""Blocks in a part, if there are enough, so that parts take about the
-same time."""
+"""Least number of blocks in a part, if there are enough, so that parts take similar times."""
 
 
 def _part(value: Any) -> tuple[int, int]:
@@ -50,10 +49,7 @@ PartOfRun: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return a mask (points, samples) of the samples in a part.
-
-    Parts take blocks in turn.
-    """
+    """Return a mask (points, samples) of the samples in a part. Blocks go to the parts in turn."""
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine = np.arange(total) // block % of == number - 1
@@ -222,9 +218,9 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        Columns are named ``name (unit)``. They hold the sweep and the
-        sample, if there are any, the number of the event in its sample,
-        and the variables of the event (see `equilibrium_path`).
+        Columns, named ``name (unit)``, hold the sweep and the sample,
+        if there are any, the number of the event in its sample, and the
+        variables of the event (see `equilibrium_path`).
 
     Raises
     ------
@@ -272,9 +268,9 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
 def table_of(result: xr.Dataset) -> pd.DataFrame:
     """Return a table with a column for each variable, and a row for each sample and point.
 
-    Columns are named ``name (unit)``. They hold swept keys, the sample
-    number and results. Curves of equally likely interfaces are left
-    out, but their band is included.
+    Columns, named ``name (unit)``, hold swept keys, the sample number
+    and results. Curves of equally likely interfaces are left out, but
+    their band is included.
     """
     result = result.drop_dims("member", errors="ignore")
     wide = sorted(

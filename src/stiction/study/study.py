@@ -69,12 +69,14 @@ MAX_TOML_BYTES, MAX_TOML_WORDS, MAX_DOTS = 2**21, 2**18, 64
 """Bytes of a study file, bytes apart from lists of numbers, and dots in
 a line of those bytes."""
 SHOWN_KEYS = 10
-"""Keys in a message about a file that is no study."""
+"""Number of keys in a message about a file that is no study."""
 _NUMBERS = re.compile(rb"(?:[^=#]{1,200}=)?([\s\d.,eE+_\[\]-]*)")
 """A line that holds numbers, or a key and numbers."""
 MOST_WRITTEN = 8
-"""Random interfaces that a study file holds itself; more of them are in
-a file next to it."""
+"""Number of random interfaces that a study file may hold.
+
+More are in a file next to it.
+"""
 
 
 def _method(given: Any) -> Any:
@@ -109,7 +111,10 @@ becomes an interface."""
 
 
 def _profiles_of(given: Any, info: pydantic.ValidationInfo) -> Any:
-    """Return profiles. In a study file, a profile may be a file or a table {file, ...}."""
+    """Return profiles.
+
+    In a study file, a profile may be a file or a table {file, ...}.
+    """
     read = (info.context or {}).get("read")
     if not isinstance(given, Mapping) or read is None:
         return given
@@ -122,7 +127,10 @@ ProfilesOfStudy: Any = Annotated[Any, BeforeValidator(_profiles_of), "mapping of
 
 
 def _peaks_of(given: Any) -> Any:
-    """Return peaks. A study in plain form holds them as a table {unit, values, lengths}."""
+    """Return peaks.
+
+    A study in plain form holds them as a table {unit, values, lengths}.
+    """
     if not isinstance(given, Mapping) or "values" not in given:
         return make_peaks(given)
     lengths = given.get("lengths", [None] * len(given["values"]))
@@ -176,7 +184,10 @@ class Question:
         return {name: value for name, value in vars(self).items() if value is not None}
 
     def check(self, point: Experiment) -> None:
-        """Refuse a question that a sweep point cannot answer. Doubt a demand in another unit."""
+        """Refuse a question that a sweep point cannot answer.
+
+        Doubt a demand in another unit.
+        """
         for name in QUANTITIES.keys() & self._given:
             state = LimitState(point, name == "friction_coefficient")
             with prefixed("reliability", "."):
@@ -229,7 +240,7 @@ class Study(_Parts):
         (Pa) or ``friction_coefficient`` to carry, or the
         ``probability`` of a design, with ``target_cv``.
     peaks : Peaks or as of `stiction.infer`, optional
-        Peaks of further tests, with which `stiction reliability` compares
+        Peaks of further tests, which `stiction reliability` compares with
         its prediction. In a study file, the name of a file for `read_peaks`.
     title : str
 
@@ -289,7 +300,10 @@ class Study(_Parts):
 
     @property
     def points(self) -> list[Point]:
-        """The sweep points, in order. Without a sweep, there is one point without values."""
+        """The sweep points, in order.
+
+        Without a sweep, there is one point without values.
+        """
         keys = [key for axis in self.sweep for key in axis]
         steps = itertools.product(*(zip(*axis.values(), strict=True) for axis in self.sweep))
         return [
@@ -445,7 +459,7 @@ class Study(_Parts):
 
 
 def _check_toml(content: bytes) -> None:
-    """Refuse text that Python's parser would need long for, such as keys with a thousand parts."""
+    """Refuse text that Python's parser would read slowly, such as keys with a thousand parts."""
     words = 0
     for line in content.split(b"\n"):
         match = _NUMBERS.fullmatch(line)
@@ -483,7 +497,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) -> Study:
     """Build a study from plain dictionaries.
 
-    Its files lie in `folder`, and their paths are appended to `files`.
+    Files that the study names are in `folder`, and their paths are appended to `files`.
     """
     check("study", given, dict)
     if given and not {*keys_of(Study)} & {*given}:

@@ -1,4 +1,7 @@
-"""Sweeps over values of keys. Axes are combined, and the keys on an axis vary together."""
+"""Sweeps over values of keys.
+
+Axes are combined, and the keys on an axis vary together.
+"""
 
 import dataclasses
 import math
@@ -18,11 +21,10 @@ from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.random.dotted_keys import SHORT_KEYS, full_key
 
 SWEPT = "problem", "random", "method", "seed"
-"""Keys of a study that a sweep, or the keys below them, may change."""
+"""Keys of a study that a sweep may change, together with the keys below them."""
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
-"""Keywords of xarray's `sel` and `isel`, by which no dimension of that
-name can be selected."""
+"""Keywords of xarray's `sel` and `isel`, which cannot be names of dimensions."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""
@@ -167,7 +169,10 @@ def grid_axes(
 
 
 def _labels(values: Sequence[Any]) -> NDArray[Any]:
-    """Return numbers as given, and names for other values. Repeated names get a number."""
+    """Return numbers unchanged, and names for other values.
+
+    Repeated names get a number.
+    """
     if all(isinstance(value, numbers.Real) and not isinstance(value, bool) for value in values):
         return np.array(values)
     texts = [value if isinstance(value, str) else _text(value) for value in values]

@@ -25,8 +25,7 @@ with contextlib.suppress(Exception):  # it was deleted, or numba is not one that
 logger = logging.getLogger("stiction")
 
 ZERO: Any = np.int64(0)
-"""A zero that is not a literal: numba compiles a kernel again for each
-literal it is given."""
+"""Zero as a variable, because numba compiles a kernel again for each literal."""
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
@@ -46,10 +45,10 @@ def _foreign_classes(kind: Any) -> set[Any]:
 
 
 def _parts(value: Any) -> Iterator[str]:
-    """Yield what a compiled function depends on, with the functions and constants that it names.
+    """Yield the parts of a compiled function, and the functions and constants that it names.
 
-    A TypeError says that it names something else, which may change
-    without being noticed.
+    A TypeError says that the function names something else, which may
+    change without being noticed.
     """
     value = getattr(value, "py_func", value)
     if isinstance(value, tuple):
@@ -69,7 +68,7 @@ def _parts(value: Any) -> Iterator[str]:
 
 
 def _state_of(classes: Iterable[Any]) -> str | None:
-    """Return a digest of external friction laws. None if they may change unnoticed."""
+    """Return a digest of external friction laws, or None if the laws may change unnoticed."""
     state = hashlib.sha256()
     for law in sorted(classes, key=str):
         try:
@@ -85,9 +84,9 @@ def _state_of(classes: Iterable[Any]) -> str | None:
 class _Guard:
     """A cache that keeps code compiled for an external friction law, by the state of the law.
 
-    Such a law is part of the kernels that are compiled for it. numba
-    would not notice that the law was edited, and could not read its
-    index where the law's module is missing.
+    An external law is part of the kernels that are compiled for the
+    law. Numba would not notice that the law was edited, and could not
+    read the index of its cache if the law's module is missing.
     """
 
     def __init__(self, cache: Any, function: Callable[..., Any]) -> None:
@@ -99,10 +98,7 @@ class _Guard:
         return getattr(self._cache, name)
 
     def _cache_of(self, signature: Any) -> Any:
-        """Return the cache for types of arguments.
-
-        None if compiled code must not be kept.
-        """
+        """Return the cache for types of arguments, or None if compiled code must not be kept."""
         foreign = _foreign_classes(signature)
         if not foreign:
             return self._cache
@@ -122,7 +118,7 @@ class _Guard:
         return compiled
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep a compiled form."""
+        """Store a compiled form."""
         if cache := self._cache_of(signature):
             cache.save_overload(signature, data)
 

@@ -4,7 +4,7 @@
    place and time (`_Locator`).
 2. A function that only other kernels call is a draft (`_Draft`). A
    draft is stored, but becomes machine code only as a part of the
-   kernels that call it. They also take over its environment
+   kernels that call it. These kernels also take over its environment
    (`Cache.save_overload`).
 3. Options are compared by those that were set (`_Flags`).
 4. Kernels that make no arrays count no references (`OPTIONS`).
@@ -97,7 +97,10 @@ class Cache(FunctionCache):
 
 
 class _Flags(Flags):
-    """Options of a compilation, compared by those that were set: numba compares all."""
+    """Options of a compilation.
+
+    Only options that were set are compared, but numba compares all.
+    """
 
     def values(self) -> dict[str, Any]:
         given: dict[str, Any] = self._values
@@ -149,10 +152,12 @@ class _InsideCompiler(_Compiler):
 
 OPTIONS: dict[str, Any] = {"_nrt": False, "no_cfunc_wrapper": True, "pipeline_class": _Compiler}
 ALLOCATING: dict[str, Any] = OPTIONS | {"_nrt": True}
-"""For kernels that make arrays: others count no references, and so
-compile faster."""
+"""Options of kernels that make arrays.
+
+Other kernels count no references and compile faster.
+"""
 INSIDE: dict[str, Any] = OPTIONS | {
     "no_cpython_wrapper": True,
     "pipeline_class": _InsideCompiler,
 }
-"""For drafts."""
+"""Options of drafts."""

@@ -69,7 +69,7 @@ def griffith_length(
     Returns
     -------
     float or (k,) array
-        Length, m. Infinite if there is no such length.
+        Length, m, infinite if there is no such length.
 
     Raises
     ------

@@ -56,8 +56,8 @@ COARSE_LINE = (
     "if the strength varies within a quarter of this length, the local criterion is off by about"
     " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
 )
-"""Nodes in a nucleation length without a warning, and the error on
-coarser grids."""
+"""Number of nodes in a nucleation length above which there is no warning, and error on coarser
+grids."""
 INSTEAD = ". Use st.Equilibrium() or st.Rupture()"
 
 OF_PLANES = {
@@ -174,17 +174,17 @@ class LocalCriterion(Listed):
 
         The onset is bounded from below because the weights are
         positive, except with a machine, because the criterion neglects
-        the slip of other patches. It is bounded from above because load
-        <g, p> <= <g, tau_p - tau_i> at each position. Averaged over all
-        positions between half-spaces, this is load <p> <= <tau_p -
-        tau_i>. An interface that ends has no bounds.
+        the slip of other patches. The onset is bounded from above
+        because load <g, p> <= <g, tau_p - tau_i> at each position.
+        Averaged over all positions between half-spaces, this is load
+        <p> <= <tau_p - tau_i>. An interface that ends has no bounds.
         """
         # Nodes beyond an end take over stress, but do not count in means.
         everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
-        """Return why the length of patches differs between samples, or `None`."""
+        """Return a reason if the length of patches differs between samples, or `None`."""
         W = problem.friction.uniform_weakening_rate
         if isinstance(problem.specimen, Slider):
             return "the pressure under a slider changes with the push"
@@ -330,11 +330,11 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
     """Return the nucleation stress tau_n(x) of strength profiles.
 
     tau_n is the load tau_0 at which an isolated patch of length h_n
-    centred at x becomes unstable. It is the average of tau_p - tau_i
-    over h_n, with the critical slip-rate profile as weight, divided by
-    the same average of the load profile (Uenishi and Rice, 2003, Eq.
-    14; Albertini et al., 2020, Eq. 9). On a plane tau_n is the minimum
-    over five ellipses.
+    centred at x becomes unstable: the average of tau_p - tau_i over
+    h_n, with the critical slip-rate profile as weight, divided by the
+    same average of the load profile (Uenishi and Rice, 2003, Eq. 14;
+    Albertini et al., 2020, Eq. 9). On a plane tau_n is the minimum over
+    five ellipses.
 
     Parameters
     ----------

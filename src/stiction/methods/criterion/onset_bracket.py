@@ -45,8 +45,8 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MAX_OPERATIONS = 4e9
-"""Most operations on a sample before it counts as undecided: cubes of
-the nodes that move and squares of all nodes, summed over steps."""
+"""Operations on a sample above which it counts as undecided: cubes of the number of moving nodes
+and squares of the number of nodes, summed over steps."""
 FROZEN_STEPS = 4
 """Steps with frozen strengths before Newton's method is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9
@@ -108,9 +108,7 @@ def _least_difference(
 def slides(
     column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> bool | None:
-    """Return whether a line slides under a load because it has no equilibrium.
-
-    `None` if undecided.
+    """Return whether a line slides under a load without equilibrium, or `None` if undecided.
 
     Parameters
     ----------
@@ -171,9 +169,7 @@ def slides(
 def _unstoppable_nodes(
     column: Array, peak: Array, residual: Array, weakening_rate: Array, load: Array
 ) -> float:
-    """Return the length, in nodes, of an unstoppable crack.
-
-    Infinite without a stress drop.
+    """Return the length, in nodes, of an unstoppable crack, infinite without a stress drop.
 
     Griffith's length is 4 G* E/(pi D^2), with the largest fracture
     energy E and the smallest stress drop D. Between half-spaces, K_0 is

@@ -268,7 +268,7 @@ def ellipse_window(
 ) -> Window | None:
     """Return the smallest unstable ellipse with an aspect, or `None` if it meets its images.
 
-    See steps 1 to 3 in the docstring of the module.
+    See steps 1 to 3 at the top of the file.
     """
     spacings = np.divide(half_spaces.lengths, shape)
     column = np.fft.irfft2(half_spaces.symbol(shape), shape)

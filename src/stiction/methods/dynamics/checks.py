@@ -1,4 +1,4 @@
-"""Errors and warnings for a run: coarse grids, fast loading, and loads that reverse."""
+"""Errors and warnings for a run: coarse grids, fast loading and reversed loads."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -110,7 +110,7 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
 
 
 def warn_of_cut_events(cut: Iterable[bool]) -> None:
-    """Warn about samples whose last event had not ended when their run did."""
+    """Warn about samples whose run ended during the last event."""
     warn_of_samples(
         "end_time: the run ended during the last event in {samples}. Moment, energies and stress"
         " drops of this event are values at end_time (event_settled is 0). Raise end_time",
@@ -134,7 +134,7 @@ def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
 
 
 def rise_in_crossing(run: Run, result: Any) -> tuple[float, float]:
-    """Return the load rise while shear waves cross the nucleation length, and its rate.
+    """Return the rise of the load while shear waves cross the nucleation length, and its rate.
 
     The rise is a fraction of the stress scale, and the rate is in Pa/s.
     Both are zero without arrested events.

@@ -22,7 +22,7 @@ relevant fall is
 
     fall = min(max <tau> - <tau>, Z <V> - Z <V> at the maximum).     (2)
 
-It counts only if the mean strength of all nodes has fallen as much as
+The fall counts only if the mean strength of all nodes has fallen as much as
 <tau> ever did since the maximum. Slipping nodes carry their strength,
 and static stress transfer only takes load off them (the sum of K d over
 them is not negative). So the sum of (1) over them says that Z <V> grows
@@ -41,7 +41,7 @@ Algorithm, after each step of a run (`observe`)
    equally slow at the maximum. The unstable patch is faster only just
    after the maximum.
 3. An instability ends when <tau> rises above the maximum at which it
-   began. It was arrested if a node slipped faster than
+   began. The instability was arrested if a node slipped faster than
    `Thresholds.unstable_slip_rate`, which the waves of an earlier
    instability do not reach. The present <tau> is the next maximum.
    (Explicit steps also end an instability when the interface is calm
@@ -171,7 +171,10 @@ def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
 
 @jit_inside
 def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
-    """Update the maximum and the instabilities. Return the drop of the mean stress, Pa."""
+    """Update the maximum and the instabilities.
+
+    Return the drop of the mean stress, Pa.
+    """
     step, maximum, event, results = now.step, now.maximum, now.event, now.results
     # 1. The fall by waves.
     below = maximum.stress - step.whole_stress

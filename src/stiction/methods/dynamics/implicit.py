@@ -79,7 +79,7 @@ _JUST_BELOW, _JUST_ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 
 
 class _Attempt(NamedTuple):
-    """A step that is tried."""
+    """A step that may be taken."""
 
     size: float  # h, s
     time: float  # at its end, s

@@ -105,7 +105,7 @@ from stiction.methods.dynamics.state import (
 )
 
 ENTRIES = 64
-"""Entries in a block of the memory, which a pass takes together."""
+"""Number of entries in a block of the memory, which a pass processes together."""
 TWO_ROWS, THREE_ROWS, FOUR_ROWS = 2 * ENTRIES, 3 * ENTRIES, 4 * ENTRIES
 """Numbers in two, three and four rows of a block."""
 CACHE_LINE = 64

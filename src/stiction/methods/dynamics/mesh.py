@@ -101,10 +101,7 @@ class Mesh(NamedTuple):
 
 
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
-    """Return the mesh for a problem's block.
-
-    Its step is `courant` times the stability limit.
-    """
+    """Return the mesh for a problem's block. The step is `courant` times the stability limit."""
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
 
@@ -234,7 +231,7 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return each row's fraction of a uniform traction. The interface takes no part."""
+    """Return each row's fraction of a uniform traction, zero for the interface."""
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
@@ -245,9 +242,9 @@ def _covered(heights: Array, middle: float, width: float) -> Array:
 
 
 def _limit(c: float, c_s: float, mesh: Mesh, correction: Array, viscous: float) -> float:
-    """Return the largest stable step, s, with the speeds c and c_s of the fastest waves and shear.
+    """Return the largest stable step, s, given the speeds of the fastest waves (c) and shear (c_s).
 
-    It holds for mesh, viscosity and correction together.
+    The step is stable for mesh, viscosity and correction together.
     """
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     # Bound of the squared frequency of an element, then of the

@@ -84,7 +84,7 @@ class Rupture(Listed):
     loading_rate : float, optional
         d tau_0/dt, Pa/s. Between half-spaces, give this or `load_history`.
     end_time : float, optional
-        Latest end of a run, s. A warning counts the events that it cuts.
+        Latest end of a run, s. A warning counts the events that are cut short.
     load_history : (times, values), optional
         tau_0(t), Pa, from t = 0 s, interpolated linearly. The last slope
         continues.
@@ -211,7 +211,10 @@ class Rupture(Listed):
         return prepare_medium(problem, self.kernel_tolerance, self.courant)
 
     def prepare(self, problem: Problem) -> Callable[[Sample], dict[str, NDArray[Any]]]:
-        """Return a solver for the samples of a problem. The memory kernel is fitted once."""
+        """Return a solver for the samples of a problem.
+
+        The memory kernel is fitted once.
+        """
         if problem.specimen is not None:
             return specimens.RuptureSolver(problem, self.events, self.search(problem))
         medium, loading_rate = self.medium(problem), self.loading_rate
@@ -279,7 +282,7 @@ class Rupture(Listed):
 def make_run(
     method: Rupture, medium: Medium, rows: Sample, row: int, stations: Ints = NO_STATIONS
 ) -> Run:
-    """Return the run for a sample. It records every step at the nodes `stations`."""
+    """Return the run for a sample, which records every step at the nodes `stations`."""
     strength, residual = rows.strength[row], rows.residual_strength[row]
     W, initial = rows.weakening_rate[row], rows.initial_stress[row]
     # Unbreakable nodes have an infinite strength, and an infinite

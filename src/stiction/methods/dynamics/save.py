@@ -59,10 +59,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_FRAME_BYTES = 2**36
-"""Largest file of frames, bytes."""
+"""Largest size of a file of frames, bytes."""
 FRAMES_PER_FILE = 64
 NEARLY_ZERO = 1e-6
-"""Spacings from the first node to a place beyond round-off."""
+"""Distance of a place from the first node, in spacings, that exceeds round-off."""
 _MAX_STEPS_PER_FILE = 50_000  # steps between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 
@@ -281,8 +281,8 @@ class Recorder:
 
         Return whether it holds the same run in its finished state.
 
-        If it holds a part of the same run, the state takes the values
-        that were written last.
+        If the folder holds a part of the same run, the state takes the
+        values that were written last.
         """
         folder = self.save.to
         if folder is None:

@@ -185,7 +185,7 @@ def _record_to_end(
 
 
 def _spectrum(dataset: xr.Dataset, run: Run, state: RuptureState) -> tuple[Any, Any]:
-    """Return the spectrum of the highest instability, up to the next one or the run's end."""
+    """Return the spectrum of the highest instability, up to the next instability or the end."""
     moment_rate = dataset["moment_rate"].values
     time, onset = dataset["step_time"].values, float(state.now["results"]["onset_time"])
     later = [float(event["time"]) for event in run.events if event["time"] > onset]

@@ -62,10 +62,7 @@ def static_search(problem: Problem) -> DenseSearch | None:
 
 
 def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
-    """Return the mean stress of the first instability in equilibrium, Pa.
-
-    NaN without it.
-    """
+    """Return the mean stress of the first instability in equilibrium, Pa, or NaN without it."""
     if np.any(rows.strength[number] <= rows.initial_stress[number]):  # overstressed
         return np.nan
     state = search.next(sample_of(rows, search.pieces, number))
@@ -76,9 +73,9 @@ def first_instability(search: DenseSearch, rows: Sample, number: int) -> float:
 
 
 def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> RuptureState | None:
-    """Return the state closest to the onset with a small error, or `None` without such a state.
+    """Return the state with a small error that is closest to the onset, or `None`.
 
-    `number` is the row of the sample. The load rises at one rate.
+    `number` is the row of the sample. The loading rate is constant.
     """
     nodes, loading_rate = run.setting.nodes, run.slope(0.0)
     if not np.all(np.isfinite(nodes.peak)) or np.any(nodes.peak <= nodes.initial):
@@ -110,11 +107,9 @@ def slow_start(search: DenseSearch, run: Run, rows: Sample, number: int) -> Rupt
 def _state_at(
     search: DenseSearch, run: Run, static: StaticSample, onset: float, distance: float
 ) -> RuptureState | None:
-    """Steps 2 to 5: return the state at a distance (Pa) below the onset.
+    """Steps 2 to 5: return the state at a distance (Pa) below the onset, or `None` if unknown.
 
-    `None` if unknown.
-
-    It is unknown if a node is beyond the first piece of its law, where
+    The state is unknown if a node is beyond the first piece of its law, where
     the linear programme does not hold, or if a front has arrived, since
     the time of arrival is not known.
     """

@@ -54,8 +54,8 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 OPTIONS = ("courant", "arrival", "max_steps", "events")
-"""Options of `Rupture` with an effect on specimens. The others need a
-load that rises in time."""
+"""Options of `Rupture` with an effect on specimens. Other options need a load that rises in
+time."""
 LOAD_RISE = 1e-5
 """Rise of the drive in an event, as a fraction of the mean strength
 drop."""
@@ -226,7 +226,7 @@ class RuptureSearch(DenseSearch):
 
 
 class RuptureSolver(OnsetSolver):
-    """Solver for samples of a specimen with inertia. It is thread-safe."""
+    """Thread-safe solver for samples of a specimen with inertia."""
 
     search: RuptureSearch
     inertia = True
@@ -235,7 +235,10 @@ class RuptureSolver(OnsetSolver):
         super().__init__(problem, Equilibrium(events=events), search)
 
     def __call__(self, rows: Sample) -> dict[str, NDArray[Any]]:
-        """Return the variables of `Rupture`. The first dimension of each is the sample."""
+        """Return the variables of `Rupture`.
+
+        The first dimension of each is the sample.
+        """
         refuse_overstress(rows)
         return super().__call__(rows)
 

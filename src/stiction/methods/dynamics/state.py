@@ -255,7 +255,7 @@ class Thresholds(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """Elastic half-spaces on a grid. They are read-only and shared by threads."""
+    """Read-only elastic half-spaces on a grid, shared by threads."""
 
     transform: Transform
     impedance: float  # Z = G/(2 c_s), Pa s/m
@@ -283,10 +283,7 @@ class Nodes(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """Elasticity, load, friction and stepping for an interface.
-
-    They do not change in a run.
-    """
+    """Elasticity, load, friction and stepping for an interface, which do not change in a run."""
 
     grid: Grid
     law: Any  # ``friction.parameters``

@@ -38,7 +38,7 @@ SPEEDS: dict[str, Variable] = {
 }
 SPECTRUM = Variable("N", "amplitude spectrum of the moment rate per length", ("frequency",))
 NODES_IN_SHORTEST_WAVE = 8.0
-"""Of a spectrum: spacings of nodes in the shortest shear wave."""
+"""Number of node spacings in the shortest shear wave of a spectrum."""
 FREQUENCIES = 100
 SPEED_SPANS = {"rupture_speed": 2.0, "median_rupture_speed": 0.5}
 """Length over which a speed is a mean, in units of h_n."""
@@ -83,9 +83,9 @@ def rate_spectrum(
 ) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
     """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N, or N m on a plane.
 
-    The spectrum is the size of int M'(t) exp(-2 pi i f t) dt, with
-    straight lines between the times (s), from one period in all to the
-    waves that the nodes and times resolve. It is empty with fewer than
+    The spectrum is the absolute value of int M'(t) exp(-2 pi i f t) dt, with
+    straight lines between the times (s), from one period in all to the waves
+    that the nodes and times resolve. The spectrum is empty with fewer than
     three times.
     """
     frequencies = np.empty(0)
@@ -175,10 +175,7 @@ def _speeds(run: Run, state: RuptureState) -> dict[str, list[float]]:
 
 
 def _critical_load(run: Run, now: Any) -> float:
-    """Return the load, Pa, that carries the critical stress.
-
-    NaN if the start was overstressed.
-    """
+    """Return the load, Pa, that carries the critical stress, or NaN after an overstressed start."""
     nodes, margin = run.setting.nodes, 1e-6 * now["run"]["scale"]
     stress = float(now["results"]["onset_stress"])
     # Without slip the mean stress is tau_0 <p> + <tau_i>.

@@ -80,7 +80,7 @@ class Waves(NamedTuple):
 TOTALS = record(
     "time travel speed force friction fast_slip_rate peak_rate fast_since fast_until", "fast"
 )
-"""Numbers of an event so far.
+"""Totals of an event so far.
 
 - `time`, s
 - `travel` of the drive of a block, m
@@ -153,7 +153,10 @@ def _slide(
     keep: float,
     gain: float,
 ) -> int:
-    """Step 3: move the nodes of the interface. Return how many nodes never slipped."""
+    """Step 3: move the nodes of the interface.
+
+    Return the number of nodes that never slipped.
+    """
     dx, step = mesh.spacing, mesh.step
     slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.totals[0]
     never, fast, total = 0, False, 0.0

@@ -84,12 +84,11 @@ CONTACT_PIVOT_RTOL = 1e-9
 CONTACT_OVERSTRESS_RTOL = 1e-12
 """Overstress that is round-off, as a fraction of the largest force."""
 MAX_EVENTS_PER_NODE = 64
-"""Events for each cell and edge, on average, after which a path is
-given up."""
+"""Average number of events per cell and edge after which a path is given up."""
 
 
 class Status(IntEnum):
-    """Why a path stops. Only the first three can go on."""
+    """Reasons why a path stops. After the first three, the path can go on."""
 
     AT_TARGET = 0  # the load is the target
     UNSTABLE = 1  # E was empty, and is not
@@ -99,7 +98,7 @@ class Status(IntEnum):
 
 
 class Motion(IntEnum):
-    """How a cell or an edge moves."""
+    """Motions of a cell or an edge."""
 
     REST = 0  # a cell at rest, or a closed edge
     STABLE = 1  # in S
@@ -107,7 +106,7 @@ class Motion(IntEnum):
 
 
 class Kind(IntEnum):
-    """What happens to a node at a kink."""
+    """Events of a node at a kink."""
 
     TARGET = 0  # nothing, but the load is at its target
     START = 1
@@ -119,7 +118,7 @@ class Kind(IntEnum):
 
 
 class Kink(NamedTuple):
-    """The nearest kink. `step` is the rise of the load or of the slip of e."""
+    """The nearest kink, at a `step` that is the rise of the load or of the slip of e."""
 
     step: float
     node: int
@@ -134,8 +133,8 @@ class Contact(NamedTuple):
     `columns` is M transposed. `difference` is mu_p - mu_r, and
     `weakening` is W. Both are 0 from the corner on. `loads` holds the
     load D, the force F and the largest F so far. `counts` holds the
-    sizes of S and E, and how many events there were and how often S was
-    bordered again.
+    sizes of S and E, the number of events, and how often S was bordered
+    again.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa
@@ -165,14 +164,14 @@ LOAD, FORCE, PEAK = range(3)
 
 @jit_inside
 def normal(edges: Array, n: int, a: int) -> float:
-    """Return (Q P)_a, of values (m,) whose last n + 1 belong to edges."""
+    """Return (Q P)_a from values (m,), of which the last n + 1 belong to edges."""
     first = edges[n + a] * (1.0 if a == 0 else 0.5)
     return first + edges[n + a + 1] * (1.0 if a == n - 1 else 0.5)
 
 
 @jit_inside
 def _largest(values: Array) -> float:
-    """Return the largest size of values."""
+    """Return the largest absolute value."""
     largest = 0.0
     for value in values:
         largest = max(largest, abs(value))
@@ -296,7 +295,7 @@ def _find_rates(state: Contact) -> None:
 
 @jit_inside
 def _nearer(kink: Kink, gap: float, speed: float, least: float, node: int, kind: int) -> Kink:
-    """Return a kink, or another one that comes earlier, where a gap closes at a speed."""
+    """Return the earlier of a kink and the place at which a gap closes at a speed."""
     if speed > least and max(gap, 0.0) < kink.step * speed:
         return Kink(max(gap, 0.0) / speed, node, kind)
     return kink
@@ -335,7 +334,10 @@ def _nearest_kink(state: Contact, target: float) -> Kink:
 
 @jit
 def follow(state: Contact, target: float) -> int:
-    """Follow the path to a load (N/m), an instability or an arrest. Return the `Status`."""
+    """Follow the path to a load (N/m), an instability or an arrest.
+
+    Return the `Status`.
+    """
     counts, loads, overstress, moved = state.counts, state.loads, state.overstress, state.moved
     while counts[N_EVENTS] < MAX_EVENTS_PER_NODE * moved.shape[0]:
         counts[N_EVENTS] += 1

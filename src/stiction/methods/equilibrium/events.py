@@ -172,7 +172,7 @@ def tabulate(
 
 
 def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> dict[str, Any]:
-    """Return what follows from the added slip (*shape), m, and the drop of shear stress, Pa.
+    """Return the measures of the patch, from added slip (*shape), m, and drop of shear stress, Pa.
 
     `before` is the state before the event.
     """
@@ -273,7 +273,7 @@ def travel_of(problem: Problem, load: float, slip: Array) -> float:
 def elongation_of(problem: Problem, stress: float) -> float:
     """Return the elongation of the machine (m) at a mean stress of the whole interface (Pa).
 
-    The elongation is NaN under a dead load, which has no far end.
+    The elongation is NaN under a dead load.
     """
     assert problem.specimen is not None
     machine, depth = problem.specimen.drive.stiffness, problem.specimen.thickness

@@ -48,15 +48,15 @@ ON_NODES = {
 class Equilibrium(Listed):
     """Exact quasi-static onset with all interactions between patches.
 
-    The load rises until there is no equilibrium. While strength
-    falls linearly, this is a linear programme, which is solved
-    to round-off with a certificate. After the first instability,
-    or after the first corner of a `PiecewiseWeakening`, the
-    equilibria are followed event by event. This is also exact.
-    It takes 5 times as long for two pieces and 50 times as long
-    for 32. On planes the path between events is followed in
-    steps of the load. Weakening rate, residual strength, initial
-    stress and load profile may vary along the interface.
+    The load rises until there is no equilibrium. While strength falls
+    linearly, this is a linear programme, which is solved to round-off
+    with a certificate. After the first instability, or after the first
+    corner of a `PiecewiseWeakening`, the equilibria are followed event
+    by event, which is also exact, but takes 5 times as long for two
+    pieces and 50 times as long for 32. On planes the path between
+    events is followed in steps of the load. Weakening rate, residual
+    strength, initial stress and load profile may vary along the
+    interface.
 
     On planes the programme is solved with Fourier transforms. Results contain its
     lower bound, at which there is an equilibrium.
@@ -64,11 +64,11 @@ class Equilibrium(Listed):
     Parameters
     ----------
     sensitivity : bool
-        Also return d first_instability / d tau_p at every node, at
-        fixed weakening rates. Planes have no sensitivity. It is NaN if
-        a law steepens and a node passes a corner before the first
-        instability. If a node of a specimen stops before the first instability, the derivatives are
-        difference quotients, which need a path for every node.
+        Also return d first_instability / d tau_p at every node, at fixed weakening rates.
+        Planes have no sensitivity. The sensitivity is NaN if a law steepens and a node
+        passes a corner before the first instability. If a node of a specimen stops before
+        the first instability, the derivatives are difference quotients, which need a path
+        for every node.
     slip : bool
         Also return the slip at the first instability.
     events : int

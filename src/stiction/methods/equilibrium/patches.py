@@ -107,7 +107,7 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the number of the patch at each node (from 1; 0 at rest), and their count."""
+    """Return the number of the patch at each node (from 1; 0 at rest), and the count of patches."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -178,9 +178,7 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 
 
 def critical_patch(multiplier: Array, interface: Any) -> Patch:
-    """Return the patch that becomes unstable, from the multiplier y >= 0.
-
-    NaN if y is zero.
+    """Return the patch that becomes unstable, from the multiplier y >= 0, or NaN if y is zero.
 
     On a line, the patch is the run with the largest y. On a
     plane, it is the connected area around the largest y in

@@ -65,8 +65,7 @@ change."""
 COEFFICIENT_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
 NODES_AT_ENDS = 16
-"""Nodes in a nucleation length without a warning about the ends of the
-slider."""
+"""Number of nodes in a nucleation length above which no warning about the ends is issued."""
 COARSE_ENDS = (
     "stress is singular at the ends of the slider. If 17 nodes are doubled, static friction changes"
     " by up to 0.04 %, and the first instability by up to 0.5 %"
@@ -180,10 +179,7 @@ def forces_of(state: Contact, friction: Friction) -> Array:
 
 
 def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Contact:
-    """Step 3: return the slider before the push.
-
-    Its slip adds to the slip of the pressing.
-    """
+    """Step 3: return the slider before the push, whose slip adds to the slip of the pressing."""
     peak, residual, weakening = start.friction
     moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
     overstress[:n] -= peak * on_cells(-start.forces[n:])
@@ -221,7 +217,7 @@ class Push(NamedTuple):
 
 
 class SliderPath:
-    """A slider on its path, which only goes on."""
+    """A slider on its path, which never goes back."""
 
     def __init__(self, rig: Rig, relief: float, friction: Friction, force: float) -> None:
         start = press(rig.K, rig.T_p, friction, force)
@@ -266,10 +262,7 @@ def push_variables(interface: Interface) -> dict[str, Variable]:
 
 
 class SliderSolver:
-    """Solver for samples of a slider by `Equilibrium` with given options.
-
-    It is thread-safe.
-    """
+    """Thread-safe solver for samples of a slider by `Equilibrium` with given options."""
 
     def __init__(self, problem: Problem, options: Any = None) -> None:
         if reasons := refused(problem):

@@ -15,7 +15,7 @@ load at which the path of equilibria turns first, and a patch jumps.
 
 Algorithm for a sample
 ----------------------
-The algorithm is our own (`follow_to_sliding`). A `EquilibriumSearch`
+The algorithm is our own (`follow_to_sliding`). An `EquilibriumSearch`
 supplies the two searches:
 
 1. Start from rest and raise the load to the next instability
@@ -107,7 +107,10 @@ class SamplePath(NamedTuple):
 
     @property
     def all_events(self) -> list[ArrestedEvent]:
-        """All arrested events. If the interface ends, also the event in which it slides."""
+        """All arrested events.
+
+        If the interface ends, also the event in which it slides.
+        """
         return self.events + ([] if self.sliding is None else [self.sliding])
 
 
@@ -198,7 +201,7 @@ def warn_of_signs(problem: Problem) -> None:
 
 
 class OnsetSolver:
-    """Solver for samples by `Equilibrium` with given options. It is thread-safe."""
+    """Thread-safe solver for samples by `Equilibrium` with given options."""
 
     inertia = False
 
@@ -239,7 +242,10 @@ class OnsetSolver:
     def _values(
         self, rows: Sample, row: int, sample: StaticSample, path: SamplePath
     ) -> dict[str, Any]:
-        """Return the variables of one sample. Stresses are divided by the load profile."""
+        """Return the variables of one sample.
+
+        Stresses are divided by the load profile.
+        """
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
         sliding_patch = patch = critical_patch(multiplier_of(sample, first), interface)

@@ -14,7 +14,7 @@ from stiction.methods.equilibrium.strength import Pieces, StaticSample
 
 
 class Outcome(IntEnum):
-    """Outcome for an interface that moves at a fixed load."""
+    """Outcomes for an interface that moves at a fixed load."""
 
     SLIDING = 0
     ARRESTED = 1
@@ -23,7 +23,7 @@ class Outcome(IntEnum):
 
 
 class PathStatus(IntEnum):
-    """Why the path of stable equilibria ends at a state."""
+    """Reasons why the path of stable equilibria ends at a state."""
 
     STABLE = 0  # the load is the target, or every node has slipped
     UNSTABLE = 1  # slip jumps along the direction of the state
@@ -31,7 +31,7 @@ class PathStatus(IntEnum):
 
 
 class Route(IntEnum):
-    """How the equilibria after a state of a line or specimen are found."""
+    """Ways to find the equilibria after a state of a line or specimen."""
 
     PROGRAMME_FROM_REST = 0
     PROGRAMME = 1  # from the state, because a patch jumped before

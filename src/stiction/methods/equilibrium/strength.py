@@ -28,9 +28,7 @@ of K d: an instability of such nodes adds no slip and never ends."""
 
 
 class Pieces(NamedTuple):
-    """Falling, piecewise linear function f of u = slip/d_c.
-
-    It is the same at every node.
+    """Falling, piecewise linear function f of u = slip/d_c, the same at every node.
 
     At a node, W is the weakening rate of the first piece that falls.
     The relative slope of this piece is therefore 1.

@@ -30,7 +30,7 @@ from stiction.base.model import (
 from stiction.problem.friction.parameters import Exponential, Linear, Parameters, Polygon
 
 SCALES = ("weakening_rate", "critical_slip", "fracture_energy")
-"""Each of them alone sets how fast a law weakens."""
+"""Names of scales. A single scale sets how fast a law weakens."""
 NEARLY_RESIDUAL = 0.01
 """Remaining fraction of tau_p - tau_r at which a law that never ends
 counts as residual."""
@@ -63,8 +63,8 @@ class FrictionLaw(Listed):
     integral of f.
 
     The weakening rate W of the package is the rate at which the
-    strength first falls, W = `initial_slope` (tau_p - tau_r)/d_c. It is
-    the rate at zero slip, unless the law begins with a plateau.
+    strength first falls, W = `initial_slope` (tau_p - tau_r)/d_c. This
+    is the rate at zero slip, unless the law begins with a plateau.
     """
 
     family: ClassVar[str] = "laws"
@@ -146,10 +146,7 @@ class FrictionLaw(Listed):
 
     @cached_property
     def steepening(self) -> float:
-        """Ratio of the steepest slope to the initial slope, at least 1.
-
-        It governs stability.
-        """
+        """Steepest slope over the initial slope, at least 1. This ratio controls stability."""
         if isinstance(self.parameters, Linear | Exponential):
             return 1.0
         # The examined slopes of a law of the user have some error.
@@ -158,7 +155,7 @@ class FrictionLaw(Listed):
 
     @property
     def plateau(self) -> float:
-        """The u up to which strength does not fall, 0 for most laws."""
+        """Slip u up to which the strength does not fall, 0 for most laws."""
         return 0.0
 
     @property
@@ -173,7 +170,7 @@ class FrictionLaw(Listed):
 
     @property
     def reach(self) -> float:
-        """The u beyond which strength counts as residual: where f reaches 0, or else 1 %."""
+        """Slip u at which f reaches 0, or else 1 %, and the strength counts as residual."""
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
@@ -392,7 +389,7 @@ class PiecewiseWeakening(FrictionLaw):
         return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
 
     def slip_at(self, fraction: float) -> float:
-        """Return the u at which f has the given value."""
+        """Return the slip u at which f has the given value."""
         # `interp` needs rising numbers, and f falls.
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
@@ -469,7 +466,7 @@ def _antiderivative(law: FrictionLaw) -> Any:
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return the mistakes in a user's law. Its f may rise, or contradict its slope."""
+    """Return messages about mistakes in a user's law, such as an f that rises."""
     if type(law).__module__.startswith("stiction."):
         return []
     # Check first what the later checks need: parameters, and f that

@@ -14,14 +14,17 @@ class Parameters(Protocol):
 
     @property
     def initial_slope(self) -> float:
-        """-f'(0), positive. It is a field."""
+        """Slope -f'(0), positive: a field of the NamedTuple."""
 
     def f(self, u: float) -> tuple[float, float]:
-        """Return f(u) and -f'(u) at a slip u >= 0 over d_c. Numba compiles it."""
+        """Return f(u) and -f'(u) at a slip u >= 0 over d_c.
+
+        Numba compiles this method.
+        """
 
 
 class Linear(NamedTuple):
-    """Parameters of the linear law. It needs only the profiles of the sample."""
+    """Parameters of the linear law, which needs only the profiles of a sample."""
 
     initial_slope: float = 1.0
 
@@ -30,7 +33,7 @@ class Linear(NamedTuple):
 
 
 class Exponential(NamedTuple):
-    """Parameters of the exponential law. It needs only the profiles of the sample."""
+    """Parameters of the exponential law, which needs only the profiles of a sample."""
 
     initial_slope: float = 1.0
 

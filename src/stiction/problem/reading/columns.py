@@ -73,7 +73,7 @@ _COEFFICIENT = (
 ASIDE = ("specimen", "time", "travel", "length")
 """Roles of columns that never compete for a force or a stress."""
 MAX_LISTED = 20
-"""Columns in a message."""
+"""Number of columns that a message lists at most."""
 
 Wanted = str | int | None
 
@@ -117,7 +117,7 @@ class Table(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """What was read: file, column, unit, number of values, and what was left out."""
+    """Record of what was read: file, column, unit, number of values, and omissions."""
 
     source: str
     column: str
@@ -134,7 +134,7 @@ class Reading(NamedTuple):
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The same as attributes of an array."""
+        """Return the record as attributes of an array."""
         return {
             "source": self.source, "column": self.column, "unit_in_source": self.unit,
             "values": self.values, "other_columns": ", ".join(self.others),
@@ -237,7 +237,10 @@ def stated_column(columns: Sequence[Column], argument: str, wanted: str | int) -
 
 
 def reading_of(table: Table, column: Column, unit: str, used: dict[str, Column]) -> Reading:
-    """Return what was read from a table. `used` are further columns by what they are."""
+    """Return the record for a table.
+
+    `used` holds further columns that were read, by role.
+    """
     known = {id(other): what for what, other in used.items()}
     others = tuple(
         f"{other.label!r}"

@@ -63,7 +63,7 @@ SAMPLE_NAMES = ("sample", "samples")
 SAID_BY_ROLE = {
     "strength": "friction", "friction_coefficient": "friction", "normal_pressure": "pressing force"
 }  # fmt: skip
-"""Roles of columns that may hold a quantity, whatever they are called."""
+"""Role of the columns that may hold a quantity under any name."""
 Missing = Annotated[
     float | str | tuple[float | str, ...] | list[float | str], "float | str | list"
 ]
@@ -295,10 +295,7 @@ def _chosen(
 
 
 def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
-    """Return the column of a quantity by the rule.
-
-    Other names than its own exclude a column.
-    """
+    """Return the column of a quantity by the rule. The name of another excludes a column."""
     words, si = (quantity, *NAMES.get(quantity, ())), QUANTITIES[quantity].units
     others = {name: key for key in NAMES for name in NAMES[key] if name not in words}
     named = {c: others[name] for c in columns if (name := _plain(c.name)) in others}

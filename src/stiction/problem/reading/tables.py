@@ -39,7 +39,7 @@ _EMPTY = {
     "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
     "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
 }  # fmt: skip
-"""Words for a missing value, in lower case. A row of stars is another."""
+"""Words for a missing value, in lower case. A row of stars also marks a missing value."""
 _STATISTICS = (
     "mean average avg median minimum maximum min max std stdev std.dev sd stddev standard deviation"
     " cv cov c.v variance count sum total range mittelwert mittel standardabweichung streuung"
@@ -69,7 +69,7 @@ _OTHER = {".": ",", ",": "."}
 
 
 class Options(NamedTuple):
-    """What the caller states about a file."""
+    """Options by which the caller describes a file."""
 
     skip: int = 0
     sheet: int | str = 0
@@ -105,7 +105,7 @@ class Row(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The line in a message."""
+        """Text of the line for a message."""
         return f"line {self.number} {', '.join(filter(None, self.cells))[:60]!r}"
 
 

@@ -80,7 +80,7 @@ COST_OF_ROTATING_ROW = 4
 """Time to rotate one entry of a row, in units of the time to append it
 in a group of rows."""
 MAX_SLIPPING = 8192
-"""Slipping nodes for which L has space (268 MB if all of it is used)."""
+"""Number of slipping nodes for which L has space (268 MB if all is used)."""
 
 
 @jit
@@ -197,7 +197,7 @@ def back_substitute(factor: Array, n_rows: int, values: Array) -> None:
 
 
 class Workspace(NamedTuple):
-    """Factor L on the slipping nodes of a sample, and the arrays that belong to L.
+    """Factor L on the slipping nodes of a sample, and arrays that belong to L.
 
     Arrays have an entry for each node (n,), or in S for each row of L.
     """
@@ -237,7 +237,7 @@ def make_workspace(stiffness: Any, n: int, max_slipping: int = MAX_SLIPPING) -> 
 
 
 class SlipState(NamedTuple):
-    """Slip of a sample. It is updated as the load rises or a patch jumps."""
+    """Slip of a sample, updated as the load rises or a patch jumps."""
 
     sample: StaticSample
     slip: Array  # d, m
@@ -294,7 +294,10 @@ def append(workspace: Workspace, n_slipping: int, count: int) -> int:
 
 @jit
 def remove(workspace: Workspace, n_slipping: int, position: int) -> int:
-    """Step 2: remove the node at a position from S, its marks and L. Return how many remain."""
+    """Step 2: remove the node at a position from S, the marks and L.
+
+    Return the number left.
+    """
     factor, slipping = workspace.factor, workspace.slipping
     cosines, sines = workspace.rotations[0], workspace.rotations[1]
     workspace.is_slipping[slipping[position]] = False
@@ -415,7 +418,7 @@ def multiply_outside(workspace: Workspace, n_slipping: int, values: Array, out: 
 def apply_stiffness_to_resting_slip(state: SlipState) -> None:
     """Write K times the slip of nodes that slipped and now rest to `workspace.K_resting`.
 
-    It is zero if no such node exists, as on a line. Overwrites
+    The product is zero if no such node exists, as on a line. The call overwrites
     `workspace.queue` and `workspace.rhs`.
     """
     slip, workspace = state.slip, state.workspace

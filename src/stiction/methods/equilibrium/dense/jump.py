@@ -102,12 +102,11 @@ from stiction.methods.equilibrium.strength import (
 
 MAX_ELASTIC_STEPS_IN_ALL = 4000
 MAX_ELASTIC_STEPS = 16
-"""Elastic steps in a row after which a step 2 follows although nodes
-keep joining."""
+"""Number of elastic steps in a row after which a step 2 follows although nodes keep joining."""
 
 
 class Course(IntEnum):
-    """How a jump continues after a step."""
+    """Continuations of a jump after a step."""
 
     GOES_ON = 0
     SLIDES = 1  # no node is left that can hold the interface
@@ -155,10 +154,7 @@ def _join(state: SlipState, load: float, n_slipping: int, tolerance: float) -> S
 
 @jit_inside
 def _remove_unloaded(state: SlipState, n_slipping: int, tolerance: float) -> int:
-    """Step 1: unmark the nodes that an elastic step would move back.
-
-    Return how many remain.
-    """
+    """Step 1: unmark the nodes that an elastic step would move back. Return the number left."""
     workspace, n_stay = state.workspace, n_slipping
     for t in range(n_slipping):
         i = workspace.slipping[t]
@@ -205,9 +201,7 @@ def _elastic_step(state: SlipState, load: float, n_slipping: int, tolerance: flo
 
 @jit_inside
 def _leave_out_reversed(workspace: Workspace, n_slipping: int, atol: float, rtol: float) -> int:
-    """Step 2: unmark the nodes whose solution is below zero.
-
-    Return how many.
+    """Step 2: unmark the nodes whose solution is below zero. Return their number.
 
     A solution counts as below zero if K_ii times the solution is below
     -`atol` (Pa), and the solution is also below -`rtol` times the

@@ -84,7 +84,7 @@ to the bound itself."""
 SHARE_TOWARDS_BOUND = 0.75
 """Fraction of the way to the bound by which a stable load is raised."""
 MAX_PASSES = 10_000
-"""Passes of a loop in which each pass adds a node or changes the load."""
+"""Largest number of passes, each of which adds a node or changes the load."""
 
 
 @jit_inside
@@ -170,7 +170,7 @@ def _back_off(state: SlipState, load: float, n_slipping: int) -> None:
 
 @jit_inside
 def _remove_reversed(workspace: Workspace, n_slipping: int, load: float) -> int:
-    """Step 3: remove the nodes that would slip backwards from S. Return how many remain.
+    """Step 3: remove the nodes that would slip backwards from S. Return the remaining number.
 
     L remains valid up to the first of these nodes, so all nodes after
     it are also removed. Removed nodes that belong to S are then

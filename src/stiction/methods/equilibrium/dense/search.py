@@ -77,7 +77,7 @@ nodes at rest."""
 
 
 class DenseSearch:
-    """Search for equilibria of a line or a specimen. It is thread-safe."""
+    """Thread-safe search for equilibria of a line or a specimen."""
 
     widest_gap = 1e-9
     """Certificate gap, as a fraction of the load, above which there is
@@ -190,7 +190,7 @@ class DenseSearch:
     ) -> EquilibriumState:
         """Return the next instability from a state or from rest, or the state at a lower load.
 
-        See steps 1 to 3 in the docstring of the module.
+        See steps 1 to 3 at the top of the file.
         """
         state = state or at_rest(sample)
         from_rest = not state.slip.any()

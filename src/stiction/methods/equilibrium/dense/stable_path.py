@@ -99,14 +99,13 @@ from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import piece_at, start_of, strength_at
 
 EVENTS_PER_REFRESH = 16
-"""Slip is computed anew from L after so many events, so that round-off
-does not accumulate."""
+"""Number of events after which slip is computed anew from L, so that round-off does not
+accumulate."""
 MAX_MARGIN_AT_STRENGTH = 1e3
-"""Distance below its strength at which a node counts as at it, in units
-of `stress_tolerance`."""
+"""Largest distance of a node below its strength that counts as zero, in units of
+`stress_tolerance`."""
 MAX_RESTARTS_PER_NODE = 16
-"""How often a node may start again, on average, before the path is
-given up."""
+"""Average number of starts per node after which the path is given up."""
 NEGATIVE_RATE_RTOL = 1e-10
 """A rate below zero by less than this fraction of the largest rate is
 round-off."""
@@ -218,7 +217,7 @@ def _move_v(
 
 @jit_inside
 def _stop(state: SlipState, n_slipping: int, position: int, v_nodes: Array) -> int:
-    """Remove a node from S. Return how many nodes still slip."""
+    """Remove a node from S. Return the number of nodes that still slip."""
     v_nodes[state.workspace.slipping[position]] = 0.0
     n_slipping = cholesky.remove(state.workspace, n_slipping, position)
     cholesky.apply_stiffness_to_resting_slip(state)
@@ -343,8 +342,7 @@ def _pass_corner(
 ) -> int:
     """Step 4 at a corner: move the node to its next piece, and update L.
 
-    Returns how many nodes are factored: fewer than before if a pivot
-    failed.
+    Return the number of factored nodes, which falls if a pivot failed.
     """
     sample, slip, _, workspace, _, _ = state
     pieces, i = sample.pieces, workspace.slipping[corner]

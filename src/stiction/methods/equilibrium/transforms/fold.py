@@ -63,7 +63,10 @@ class Turn(NamedTuple):
 
 
 def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
-    """Solve A x = right on the nodes inside. `None` if A is not positive definite there."""
+    """Solve A x = right on the nodes inside.
+
+    Return `None` if A is not positive definite there.
+    """
     x, residual = np.zeros(right.size), np.where(inside, right, 0.0)
     tolerance = SOLUTION_RTOL * float(np.abs(residual).max())
     status, _ = solve_inside(operator, inside, x, residual, tolerance)
@@ -73,7 +76,10 @@ def _solution(operator: Operator, inside: Mask, right: Array) -> Array | None:
 def _equilibrium_near(
     operator: Operator, sample: StaticSample, load: float, slip: Array
 ) -> Array | None:
-    """Step 1: improve a rough slip at a load. `None` if there is no equilibrium nearby."""
+    """Step 1: improve a rough slip at a load.
+
+    Return `None` without an equilibrium nearby.
+    """
     tolerance = residual_tolerance(sample, load, TURN_SLIP_RTOL)
     for _ in range(MAX_PIECE_REVISIONS):
         present = present_pieces(sample, slip)

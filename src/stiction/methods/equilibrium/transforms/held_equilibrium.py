@@ -59,7 +59,7 @@ nodes is revised."""
 
 @jit_inside
 def _revise(inside: Mask, slip: Array, residual: Array, tolerance: float) -> tuple[int, int]:
-    """Step 1: return how many nodes joined and how many left."""
+    """Step 1: return the numbers of nodes that joined and left."""
     joined, left = 0, 0
     for i in range(slip.size):
         if inside[i]:

@@ -68,8 +68,7 @@ MIN_STIFFNESS_RATIO = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six
 nodes in h_n."""
 MIN_COARSE_NODES = 8
-"""Least nodes along x and y on a coarse grid. A smaller grid is not
-faster than the next."""
+"""Least number of nodes along x and y on a coarse grid. A smaller grid saves no time."""
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
 FIRST_LOAD_STEP = 1e-4
@@ -82,7 +81,7 @@ STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
 """Factors of the next step, after a step that failed and after a step
 that succeeded."""
 MAX_EXTRAPOLATION = 3.0
-"""Steps ahead to which slip is extrapolated as a guess."""
+"""Largest number of steps by which slip is extrapolated as a guess."""
 STEP_RESIDUAL = 0.1
 """Largest residual stress after a step, as a fraction of the step."""
 MAX_STEP_RESIDUAL = 1e-5
@@ -225,10 +224,7 @@ def plane_onset(
 
 
 class PlaneSearch:
-    """Search for equilibria of a plane, to a relative gap between bounds.
-
-    It is thread-safe.
-    """
+    """Thread-safe search for equilibria of a plane, to a relative gap between bounds."""
 
     def __init__(self, problem: Problem, gap: float = 1e-6) -> None:
         self.elastic = problem.half_spaces

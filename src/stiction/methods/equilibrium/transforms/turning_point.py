@@ -62,7 +62,7 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 MAX_STATES = 40
 MAX_PATCH_CHANGES = 4
-"""How often another patch may be held instead."""
+"""Largest number of changes to another patch."""
 MAX_IDLE_STATES = 8
 """States in a row that hardly narrow the gap, after which the search
 ends."""
@@ -81,11 +81,11 @@ STALLED_SHARE = 0.7
 """Fraction of mu' that must remain after a step for the next step to be
 twice as long instead."""
 RESIDUAL_SHARE_OF_GAP = 0.05
-"""Residual stress, relative to the gap that is asked for, so that it
-does not open the bounds."""
+"""Residual stress, relative to the requested gap, at which the residual does not open the
+bounds."""
 LOAD_BELOW_BOUND = 0.3
-"""Distance of the load below the upper bound, as a fraction of that
-gap: such a state closes it."""
+"""Distance of the load below the upper bound, as a fraction of the gap, at which a state closes
+the gap."""
 PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
 """Residual of the eigenvector of another patch, as a fraction of the
 largest W, and iterations."""
@@ -104,9 +104,7 @@ class Held(NamedTuple):
 
 
 def _hold(bracket: Bracket, phi: Array, guess: Held, accuracy: float) -> Held | None:
-    """Step 1: return the equilibrium with a held patch phi.
-
-    `None` if another patch is unstable.
+    """Step 1: return the equilibrium with a held patch, or `None` if another patch is unstable.
 
     The guess gives the amplitude at which the
     spring has no force. The accuracy is the largest
