@@ -117,9 +117,8 @@ def _peaks_at(
             f"theta: must be {len(parameters)} finite numbers, {', '.join(parameters)}, got"
             f" {describe(theta)}"
         )
-    experiment = Experiment(
-        *with_parameters(problem, random, parameters, values), simulation.method
-    )
+    case = with_parameters(problem, random, parameters, values)
+    experiment = Experiment(*case, simulation.method)
     (peaks,) = simulate([experiment], simulation, first, "critical_stress")
     rng = np.random.default_rng([simulation.seed, first, 1])
     return peaks + error * rng.standard_normal(peaks.size)

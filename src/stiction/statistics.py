@@ -155,10 +155,8 @@ def density(values: Any, *, bounds: tuple[Real | None, Real | None] = (None, Non
     low, high = max(low, smallest - 0.5 * spread), min(high, largest + 0.5 * spread)
     width = high - low
     # 2.
-    counts = np.bincount(
-        np.minimum(((sample - low) / width * GRID_CELLS).astype(int), GRID_CELLS - 1),
-        minlength=GRID_CELLS,
-    )
+    cells = ((sample - low) / width * GRID_CELLS).astype(int)
+    counts = np.bincount(np.minimum(cells, GRID_CELLS - 1), minlength=GRID_CELLS)
     # 3. A narrower kernel would resolve the cells of the grid instead
     # of the sample.
     deviation, middle = float(sample.std()), np.quantile(sample, [0.25, 0.75])

@@ -231,9 +231,7 @@ def warn_of_samples(text: str, which: Any, sizes: Any = ()) -> None:
     """
     affected = [bool(flag) for flag in which]
     numbers = [number for number, flag in enumerate(affected) if flag]
-    worst = (
-        max((float(sizes[number]) for number in numbers), default=0.0) if len(sizes) else 0.0
-    )
+    worst = max((float(sizes[number]) for number in numbers if len(sizes)), default=0.0)
     first = tuple(numbers[:LISTED])
     issue(Warned(text, AccuracyWarning, len(affected), len(numbers), first, worst))
 

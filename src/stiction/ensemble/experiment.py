@@ -272,4 +272,12 @@ class Measured(Experiment):
         return self._sample
 
 
+def method_of(random: Any, method: Any) -> Any:
+    """Return the method, by default the method of a posterior."""
+    known = method or getattr(getattr(random, "likelihood", None), "method", None)
+    if known is None:
+        raise InputError("method: is needed without a posterior. Give st.Equilibrium()")
+    return known
+
+
 _solver = lru_cache(maxsize=8)(prepared)

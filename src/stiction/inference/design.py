@@ -63,7 +63,7 @@ from stiction.base.model import (
     is_whole,
 )
 from stiction.base.progress import Meter
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Experiment, method_of
 from stiction.inference.infer import profiles_of
 from stiction.inference.likelihood import Likelihood, Simulation, make_likelihood, variable_of
 from stiction.inference.peaks import Peaks, factor_of, si_of
@@ -183,9 +183,7 @@ def design_of_tests(
     True
     """
     error = load_cell_error * factor_of(unit)
-    method = method or getattr(getattr(random, "likelihood", None), "method", None)
-    if method is None:
-        raise InputError("method: is required without a posterior. Pass st.Equilibrium()")
+    method = method_of(random, method)
     with Meter("design of tests", show=progress) as meter:
         simulation = Simulation(method, samples, seed, None, meter)
         if prior is None:

@@ -377,12 +377,10 @@ class SpecimenPosterior(Posterior):
         profiles = self.grid.profiles
         fields = tuple(with_values(one, of_field) for one in profiles.fields[:FEW_FIELDS])
         profiles = profiles._replace(fields=fields, within=profiles.within[:FEW_FIELDS])
-        in_tests = {
-            key: value
-            for key, value in of_problem.items()
-            if value_at(self.problem, key) == value_at(problem, key)
-        }
-        tested = with_values(self.problem, in_tests, "problem")
+        alike = [
+            key for key in of_problem if value_at(self.problem, key) == value_at(problem, key)
+        ]
+        tested = with_values(self.problem, {key: of_problem[key] for key in alike}, "problem")
         joint = with_values(problem, of_problem, "problem")
         tests = self._again(tested, profiles, workers)
         same = joint == tested and method == self.likelihood.method

@@ -322,7 +322,7 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     """
     table = design.sensitivities
     if not table.sizes.get("source"):
-        raise InputError("design: has none. Pass sensitivities=True to st.design_stress")
+        raise InputError("design: has no sensitivities. Design with sensitivities=True")
     quantity = "force" if np.isfinite(design.area) else "stress"
     ends = np.stack([table[f"{quantity}_at_low"].values, table[f"{quantity}_at_high"].values])
     factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())

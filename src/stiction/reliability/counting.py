@@ -267,9 +267,8 @@ def _expands(state: LimitState) -> bool:
     """Return whether each solved sample represents many specimens."""
     experiment = state.experiment
     problem, random = experiment.problem, experiment.random
-    return random.factor_column(problem.interface) is not None and scales_with_strength(
-        problem, random, experiment.method
-    )
+    has_factor = random.factor_column(problem.interface) is not None
+    return has_factor and scales_with_strength(problem, random, experiment.method)
 
 
 def solve_specimens(state: LimitState, first: int, samples: int) -> Counts:

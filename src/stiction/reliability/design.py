@@ -43,7 +43,7 @@ from stiction.base.arrays import Array
 from stiction.base.errors import InputError, collect_warnings
 from stiction.base.model import Count, Flag, Number, Progress, Real, checked, is_finite
 from stiction.base.progress import Meter
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Experiment, method_of
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject
 from stiction.problem.problem import Problem
@@ -62,7 +62,6 @@ from stiction.reliability.solving import (
     exact_law,
     exact_tail,
     imprecise,
-    method_of,
     prepare,
     sampling_target,
     undetermined,

@@ -34,7 +34,7 @@ from stiction.base.model import Count, Number, Positive, Progress, checked
 from stiction.base.progress import Meter
 from stiction.base.units import Doubt, doubt_units, in_words
 from stiction.base.variables import ONSET_VARIABLES, PROFILES
-from stiction.ensemble.experiment import Experiment
+from stiction.ensemble.experiment import Experiment, method_of
 from stiction.ensemble.limit_state import LimitState, weakest_first
 from stiction.methods.protocol import MethodObject, label
 from stiction.problem.problem import Problem, stress_of
@@ -52,7 +52,6 @@ from stiction.reliability.solving import (
     exact_law,
     exact_tail,
     imprecise,
-    method_of,
     prepare,
     sampling_target,
     too_slow,

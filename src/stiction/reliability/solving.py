@@ -95,14 +95,6 @@ def prepare(
     return state, allowed(experiment, max_evaluations) - spent
 
 
-def method_of(random: Any, method: Any) -> Any:
-    """Return the method, by default the method of a posterior."""
-    known = method or getattr(getattr(random, "likelihood", None), "method", None)
-    if known is None:
-        raise InputError("method: is needed without a posterior. Give st.Equilibrium()")
-    return known
-
-
 def exact_law(state: LimitState) -> Any:
     """Return the distribution of the onset if no samples are needed, else None."""
     experiment, law = state.experiment, getattr(state.experiment.random.source, "law", None)
