@@ -66,6 +66,23 @@ def test_a_figure_at_the_first_instability(side):
     assert moved[0 if side == "left" else -1] == moved.max() > 0.0
 
 
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("stiffness", [0.0, 6e7])
+def test_a_slider_that_hardly_weakens_is_a_slider_that_never_weakens(stiffness):
+    """However close its residual strength is: its load was 1e15 Pa at the edge of round-off."""
+    drive = dataclasses.replace(PROBLEM.specimen.drive, stiffness=stiffness)
+    onsets = []
+    for drop in (0.0, *10.0 ** np.arange(-13.0, -8.5, 0.5)):
+        law = st.LinearWeakening(critical_slip=9e-6, residual_ratio=1.0 - max(drop, 1e-15))
+        problem = rig_problem(problem={"friction": law}, drive=drive)
+        onsets.append(st.onset(problem, MU, method=EXACT))
+    never = onsets[0]
+    for onset in onsets:
+        for name in ("critical_stress", "first_instability"):
+            np.testing.assert_allclose(onset[name], never[name], rtol=1e-8)
+        assert onset.critical_load < 1.5 * never.critical_load
+
+
 def test_a_coarse_grid_is_warned_of_without_free_ends():
     """The end of a slider is a corner, for which the critical length of free ends does not hold."""
     (text,) = warning_texts(lambda: st.onset(PROBLEM, MU, method=EXACT))

@@ -290,7 +290,10 @@ class SliderSolver:
         pressure, spacing = rows.normal_pressure[row], self.problem.interface.spacing
         peak, residual = rows.strength[row] / pressure, rows.residual_strength[row] / pressure
         peak[node] += step
-        friction = Friction(peak, residual, rows.weakening_rate[row] * spacing)
+        # Round-off hides a weakening that does not change the pivot of a cell. It never weakens.
+        weakening = rows.weakening_rate[row] * spacing
+        hidden = weakening <= contact_path.CONTACT_PIVOT_RTOL * np.diag(self.rig.K)[: peak.size]
+        friction = Friction(peak, np.where(hidden, peak, residual), weakening)
         force = float(pressure.mean()) * self.length
         return SliderPath(self.rig, self.relief, friction, force)
 
