@@ -321,7 +321,7 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     assert given.members_cv == pytest.approx(math.sqrt(np.sum(shares**2) - 1 / 12), rel=0.3)
     assert given.cv == pytest.approx(given.members_cv, rel=0.2)
     carriers = 1 + np.searchsorted(np.cumsum(np.sort(shares)[::-1]), 0.9)
-    told = int(re.search(r"(\d+) of its 12.*90% of the mean", given.warnings[-1])[1])
+    told = int(re.search(r"(\d+) of 12.*90% of the mean", given.warnings[-1])[1])
     assert told == pytest.approx(carriers, abs=1)
     shown = re.search(r"of which by choice of the interfaces +([\d.]+)", str(given))
     assert float(shown[1]) == pytest.approx(given.members_cv, rel=1e-5)  # six digits are shown
