@@ -66,7 +66,7 @@ NEGATIVE_CURVATURE = 1
 EXHAUSTED = 2
 
 MAX_ITERATIONS = 3000
-"""Largest number of iterations of conjugate gradients for a solution or an equilibrium."""
+"""Most iterations of conjugate gradients for a solution or an equilibrium."""
 MIN_NORM = 1e-14
 """Smallest norm of a unit vector, less its parts along others, that is
 not round-off."""

@@ -44,7 +44,7 @@ from stiction.base.arrays import Array
 from stiction.base.jit import jit
 
 GROUPS = 256
-"""Largest number of groups of neighbouring sorted samples."""
+"""Most groups of neighbouring sorted samples."""
 TABLE_REACH = 10.0
 STEP = 0.05
 BOUND_DEVIATIONS = 1e5

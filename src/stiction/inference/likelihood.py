@@ -433,7 +433,7 @@ def moved(
 
 
 def effective_samples(alike: float, many: int, few: int) -> float:
-    """Return the number of independent samples with as much information as the moved onsets."""
+    """Count independent samples with as much information as the moved onsets."""
     return 1.0 / (alike**2 / many + (1.0 - alike**2) / few)
 
 

@@ -59,7 +59,7 @@ from stiction.problem.reading.labels import (
 from stiction.problem.reading.tables import Options, table_of_frame
 
 MIN_PEAKS = 3
-"""Least number of different peaks, because one of two numbers may be a mistake."""
+"""Fewest different peaks, because one of two numbers may be a mistake."""
 MAX_PEAK_RATIO = 50.0
 """Ratio of measured and predicted peaks above which their unit must be
 wrong."""

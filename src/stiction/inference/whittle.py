@@ -167,7 +167,7 @@ def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
     """Return the name and the fixed parameters of a spectrum family, after checks."""
     table = family_table(given)
     if "power_kept" in table:
-        raise InputError("power_kept: a fit is of the whole spectrum. Leave it out")
+        raise InputError("power_kept: a fit covers the whole spectrum. Leave it out")
     name = from_table(SPECTRA, {"correlation_length": 1.0} | table).type
     return name, {key: float(value) for key, value in table.items() if key != "type"}
 

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
-"""Largest number of samples that `onset` also solves by the exact method, and the seconds for
+"""Most samples that `onset` also solves by the exact method, and the seconds for
 these samples."""
 MAX_DIFFERENCE = 0.01
 """Mean or scatter of the difference, over the exact onset, above which

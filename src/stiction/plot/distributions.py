@@ -32,7 +32,7 @@ from stiction.statistics import quantiles as estimate_quantiles
 
 MAX_CURVES = 6
 FEWEST = 20
-"""Least number of values for a density. Fewer values are marked separately."""
+"""Fewest values for a density. Fewer values are marked separately."""
 DRAWN_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 TINY = 1e-300
 """Probability in place of zero on a logarithmic scale."""

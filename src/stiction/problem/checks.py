@@ -29,7 +29,7 @@ BARRIER = 10.0
 """Factor by which tau_p - tau_r of a barrier exceeds the lower quartile, by rank, of nodes that
 weaken."""
 MIN_NODES_IN_NUCLEATION = 4
-"""Least number of nodes in a nucleation length."""
+"""Fewest nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
 """Nodes in a nucleation length below which a unit is doubted. At least 4 are needed."""
 MIN_LENGTHS_IN_LINE = 4.0
@@ -118,7 +118,7 @@ def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Ar
 
 
 def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[float, ...]:
-    """Return the number of nodes of a `Problem` that span h_n, in each direction.
+    """Count the nodes of a `Problem` that span h_n, in each direction.
 
     The weakening rate (Pa/m) is the steepest at any slip, as everywhere
     in this file.

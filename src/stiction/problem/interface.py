@@ -27,7 +27,7 @@ from stiction.base.model import (
 Mask = NDArray[np.bool_]
 
 FEWEST_NODES, MOST_NODES = 8, 2**24
-"""Least number of nodes in each direction, and largest number in all."""
+"""Fewest nodes in each direction, and largest number in all."""
 SHORTEST = 1e-30
 """Spacing of nodes, m, below which squares and ratios leave the range
 of numbers."""

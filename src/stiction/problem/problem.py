@@ -192,7 +192,7 @@ class Problem(Listed):
             problems.append("load.normal_pressure: must be a mean, because blocks are glued")
         if specimen.height < 2.0 * interface.spacing:
             problems.append(
-                f"specimen.height: below two spacings of {interface.spacing:.3g} m. Take more nodes"
+                f"specimen.height: must be at least two spacings of {interface.spacing:.3g} m"
             )
         high = specimen.height / interface.measure
         if self.mode == "II" and not MIN_HEIGHT_RATIO <= high <= MAX_HEIGHT_RATIO:

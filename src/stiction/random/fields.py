@@ -413,7 +413,7 @@ class RandomInterface(Listed):
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
-        """Return the number of standard normal draws in a sample."""
+        """Count the standard normal draws in a sample."""
         return int(layout(self, interface)[-1].columns.stop)
 
     @checked

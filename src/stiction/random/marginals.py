@@ -200,7 +200,7 @@ class Weibull(_ByMoments):
 
     def _shape(self, ratio: float) -> tuple[float, float]:
         if not 1e-3 < ratio < 10.0:
-            raise InputError(f"cv: over mean - low must be 0.001 to 10, got {ratio:g}")
+            raise InputError(f"cv: must be 0.001 to 10 times mean - low, got {ratio:g}")
 
         def excess(log_shape: float) -> float:
             inverse = math.exp(-log_shape)

@@ -233,7 +233,7 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
 
 
 def block_of(dimensions: int) -> int:
-    """Return the number of samples per generator, on a line (1 dimension) or a plane (2)."""
+    """Return the samples per generator, on a line (1 dimension) or a plane (2)."""
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 

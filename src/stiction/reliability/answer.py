@@ -357,7 +357,7 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
 
 
 def unseen_batch(specimens: int) -> list[str]:
-    """Return a sentence on the weak batch that a number of specimens cannot exclude (95 %)."""
+    """Return a sentence on the weak batch that some specimens cannot exclude (95 %)."""
     if not specimens:
         return []
     unseen = 1.0 - (1.0 - UNSEEN_CONFIDENCE) ** (1.0 / specimens)

@@ -137,7 +137,7 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
 
 
 def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
-    """Return the largest number of evaluations in all rounds of a call."""
+    """Return the most evaluations in all rounds of a call."""
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return max_evaluations or int(
         min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))

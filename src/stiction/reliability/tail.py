@@ -63,7 +63,7 @@ GUIDE_PILOT_SAMPLES = 500
 LEAST_SHARE_PICKED = 0.9
 """Fraction of the weakest plain samples that a guide must pick."""
 RESOLVED = 3
-"""Least number of samples that determine the probability of an interface of a list."""
+"""Fewest samples that determine the probability of an interface of a list."""
 POOR = 0.02
 """Least fraction of failures among the samples of a guide."""
 
@@ -356,7 +356,7 @@ def repeat_until_precise(
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return the fraction of the weakest fiftieth of samples in the weakest tenth by the guide."""
+    """Return the fraction of the weakest fiftieth in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 OVERHEAD = 2**16
 """Bytes of a NetCDF file apart from its arrays."""
 FEWEST_BLOCKS = 8
-"""Least number of blocks in a part, if there are enough, so that parts take similar times."""
+"""Fewest blocks in a part, if there are enough, so that parts take similar times."""
 
 
 def _part(value: Any) -> tuple[int, int]:

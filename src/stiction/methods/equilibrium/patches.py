@@ -107,7 +107,7 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return the number of the patch at each node (from 1; 0 at rest), and the count of patches."""
+    """Return each node's patch number (from 1; 0 at rest), and the patch count."""
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0

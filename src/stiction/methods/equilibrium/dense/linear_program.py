@@ -84,7 +84,7 @@ to the bound itself."""
 SHARE_TOWARDS_BOUND = 0.75
 """Fraction of the way to the bound by which a stable load is raised."""
 MAX_PASSES = 10_000
-"""Largest number of passes, each of which adds a node or changes the load."""
+"""Most passes, each of which adds a node or changes the load."""
 
 
 @jit_inside

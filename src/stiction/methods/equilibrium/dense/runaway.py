@@ -61,12 +61,12 @@ from stiction.methods.equilibrium.strength import (
 )
 
 MAX_RUN_STEPS = 30
-"""Largest number of elastic steps. Most samples need five to eight."""
+"""Most elastic steps. Samples usually need five to eight."""
 MIN_GROWTH = 1e-3
 """Growth in a step, as a fraction of the largest slip, below which the
 test gives up."""
 MAX_RUN = 2048
-"""Largest number of nodes in a run that the test follows."""
+"""Most nodes in a run that the test follows."""
 UNSTOPPABLE_MARGIN = 1.5
 """Safety factor on the length from which `jump` counts a rupture as
 unstoppable."""

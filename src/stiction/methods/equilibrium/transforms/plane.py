@@ -68,7 +68,7 @@ MIN_STIFFNESS_RATIO = 8.0
 """Least ratio of the largest K(k) to W on a coarse grid: about six
 nodes in h_n."""
 MIN_COARSE_NODES = 8
-"""Least number of nodes along x and y on a coarse grid. A smaller grid saves no time."""
+"""Fewest nodes along x and y on a coarse grid. A smaller grid saves no time."""
 COARSE_GAP = 1e-4
 """Relative gap on coarse grids, whose own error is larger."""
 FIRST_LOAD_STEP = 1e-4
@@ -81,7 +81,7 @@ STEP_FACTOR_IF_FAILED, STEP_FACTOR = 0.3, 1.5
 """Factors of the next step, after a step that failed and after a step
 that succeeded."""
 MAX_EXTRAPOLATION = 3.0
-"""Largest number of steps by which slip is extrapolated as a guess."""
+"""Most steps by which slip is extrapolated as a guess."""
 STEP_RESIDUAL = 0.1
 """Largest residual stress after a step, as a fraction of the step."""
 MAX_STEP_RESIDUAL = 1e-5

@@ -62,7 +62,7 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 
 MAX_STATES = 40
 MAX_PATCH_CHANGES = 4
-"""Largest number of changes to another patch."""
+"""Most changes to another patch."""
 MAX_IDLE_STATES = 8
 """States in a row that hardly narrow the gap, after which the search
 ends."""
