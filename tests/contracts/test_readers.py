@@ -10,7 +10,8 @@ from typing import Any
 import openpyxl
 import pandas as pd
 import pytest
-from contracts.bodies import attempt
+from contracts.bodies import BODIES, FIELD, attempt
+from refusals import warning_texts
 
 import stiction as st
 
@@ -174,6 +175,35 @@ def test_specimens_have_whole_numbers_or_names(name, form, tmp_path):
         gap[3][0] = ""
         _, refusal = read("read_peaks", form, gap, tmp_path)
         assert name in ("test", "No.") or "has no specimen in line 4" in refusal
+
+
+LINE = BODIES["line"]
+STRENGTH = [["x (m)", "strength (Pa)"]]
+STRENGTH += [*zip(LINE.interface.x, FIELD.sample(LINE.interface, seed=2)[0], strict=True)]
+FIT = {"noise": 0.0, "bootstrap": 20, "marginal": "normal", "progress": False}
+READ: dict[str, Any] = {  # every call that reads a table, by a file of it, and a table
+    "read_profile": (st.read_profile, STRENGTH),
+    "read_curve": (st.read_curve, [row[1:3] for row in CURVE]),
+    "read_peaks": (st.read_peaks, [row[1::-1] for row in PEAKS]),
+    "fit_field": (lambda path: st.fit_field(pd.read_csv(path, sep=";"), **FIT), STRENGTH),
+    "sample": (lambda path: LINE.sample({"strength": pd.read_csv(path, sep=";")}), STRENGTH),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("column", [0, 1])
+@pytest.mark.parametrize("call", READ)
+def test_no_number_whose_unit_is_not_stated_is_read_silently(call, column, tmp_path):
+    """It is refused, or a warning says which unit is assumed. Stated units leave nothing to say."""
+    (read, table), told = READ[call], []
+    name, _, unit = table[0][column].partition(" (")
+    plain = [text if n != column else name for n, text in enumerate(table[0])]
+    for heading in (table[0], plain):
+        path, refusals = as_text([heading, *table[1:]], tmp_path), []
+        ask = lambda path=path, texts=refusals: texts.append(attempt(lambda: read(path))[1])  # noqa: E731
+        doubts = [text for text in warning_texts(ask) if "no unit is stated" in text]
+        told.append(" ".join(refusals + doubts))
+    assert not told[0]
+    assert (name in told[1] and "stated" in told[1]) == bool(unit)
 
 
 BARE = [row[:1] + row[2:] for row in PROFILE[1:]]

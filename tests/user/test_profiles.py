@@ -1,6 +1,7 @@
 """Profiles and maps of one's own: units, coordinates and gaps decide, wherever one enters."""
 
 import dataclasses
+import warnings
 from pathlib import Path
 
 import astropy.units as u
@@ -107,7 +108,6 @@ HEADINGS = Path(__file__).parents[1] / "records" / "headings.json"
 
 
 @pytest.mark.parametrize("comma", [False, True])
-@pytest.mark.filterwarnings("error")
 def test_headings_of_laboratories(tmp_path, comma):
     path = tmp_path / "p.csv"
     for head, (x_scale, scale) in read(HEADINGS).items():
@@ -119,7 +119,8 @@ def test_headings_of_laboratories(tmp_path, comma):
             text = text.replace(".", ",")
         text = f"{head}\n{text}\n"
         path.write_text(text, encoding="utf-8" if "\ufeff" in text else "cp1252")
-        profile = st.read_profile(path, interface=LINE)
+        with warnings.catch_warnings(action="error" if head else "ignore"):
+            profile = st.read_profile(path, interface=LINE)
         np.testing.assert_allclose(profile, STRENGTH, rtol=1e-9, err_msg=head)
         assert (profile.attrs["units"], profile.x.attrs["units"]) == ("Pa", "m"), head
 

@@ -367,14 +367,23 @@ def profile_in_si(
         return as_numbers(magnitude_in_one_of(value, units[:1])[0])
     parts = {quantity: (value, units, unit)}
     parts |= {dim: (value[dim], ("m",), x_unit) for dim in ("x", "y") if dim in value.coords}
-    converted, lines = {}, value.attrs.get("lines", ())
+    converted, lines, assumed = {}, value.attrs.get("lines", ()), []
     for name, (array, valid, given) in parts.items():
         with prefixed(name, " "):
             converted[name] = in_si(array, valid, given)
+        known = given or stated_unit(array) or converted[name][1] == "1"
+        if value.attrs.get("read") and not known:  # a table, whose headings state units
+            assumed.append(f"{name} is read in {converted[name][1]}")
     values, si = converted.pop(quantity)
     shown = value.values if isinstance(value.data, np.ndarray) else values
     check_measured(values, quantity, lines, shown, doubted)
-    if quantity == "height" and not (unit or stated_unit(value)):
+    if assumed:
+        warn_user(
+            f"{' and '.join(assumed)}, because no unit is stated. Write units into the headings,"
+            " such as 'x (mm)', or pass unit= and x_unit= to st.read_profile",
+            UnitWarning,
+        )
+    elif quantity == "height" and not (unit or stated_unit(value)):
         known = np.isfinite(values)
         span = values.max(where=known, initial=-np.inf) - values.min(
             where=known, initial=np.inf

@@ -415,8 +415,8 @@ def fit_field(
         For outliers, dropouts and repeated profiles, families that are left out, and each of
         the `doubts`.
     UnitWarning
-        If the mean strength is below 10 kPa, or a record is shorter than 0.01 mm or longer
-        than 1 km.
+        If a table states no unit, the mean strength is below 10 kPa, or a record is shorter
+        than 0.01 mm or longer than 1 km.
 
     Notes
     -----

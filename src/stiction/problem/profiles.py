@@ -238,7 +238,8 @@ def read_profile(
     AccuracyWarning
         If x lies between the nodes.
     UnitWarning
-        If heights without a unit range over more than 1 mm.
+        If a table states no unit, so that SI is assumed, or heights without a unit range
+        over more than 1 mm.
 
     Examples
     --------
