@@ -65,34 +65,15 @@ def largest_load(
     return by_linear_programme(dense(symbol, strength.shape), *flat)
 
 
-def by_relaxation(
-    symbol: Any, load: Any, strength: Callable[[Any], Any], end: Any, slip: Any = None,
-    rest: float = 5e-7,
-) -> Any:  # fmt: skip
-    """Slip of the least equilibrium under stresses `load`, or None where all slides beyond `end`.
+def relaxed(
+    problem: st.Problem, strength: Any, load: float, slip: Any = None, rest: float = 5e-7
+) -> Any:
+    """Slip of the least equilibrium at a load, or None where all nodes slide.
 
     Strictly local and monotone: each node slips a little until no stress is `rest` Pa above the
     strength, a function of slip.
     """
-    slip = np.zeros(np.shape(load)) if slip is None else slip
-    step = 1.0 / np.fft.irfftn(symbol, slip.shape, range(slip.ndim)).flat[0]
-    stiffness = dense(symbol, slip.shape) if slip.ndim == 1 else None  # faster than transforms
-    for _ in range(200_000):
-        pull = times(symbol, slip) if stiffness is None else stiffness @ slip
-        drive = load - pull - strength(slip)
-        if drive.max() < rest:
-            return slip
-        if (slip > end).all():
-            return None
-        slip = slip + step * np.maximum(drive, 0.0)
-    raise AssertionError("relaxation did not come to rest")
-
-
-def relaxed(
-    problem: st.Problem, strength: Any, load: float, slip: Any = None, rest: float = 5e-7
-) -> Any:
-    """Slip at a load with the friction of a problem, or None where all of it slides."""
-    law: Any = problem.friction
+    law, symbol = problem.friction, symbol_of(problem)
     u, f = (np.r_[each] for each in (getattr(law, "slip", 1.0), getattr(law, "strength", 0.0)))
     residual = np.minimum(law.residual_strength, strength)
     drop = strength - residual
@@ -100,12 +81,20 @@ def relaxed(
     first = slopes[slopes > 0.0][0]  # of the first fall
     end = law.critical_slip or first * drop / law.weakening_rate
 
-    def present(slip: Any) -> Any:
+    slip = np.zeros(strength.shape) if slip is None else slip
+    step = 1.0 / np.fft.irfftn(symbol, slip.shape, range(slip.ndim)).flat[0]
+    stiffness = dense(symbol, slip.shape) if slip.ndim == 1 else None  # faster than transforms
+    for _ in range(200_000):
         share = slip / np.maximum(end, 1e-30)  # some nodes do not weaken
-        return residual + drop * np.interp(share, np.r_[0.0, u], np.r_[1.0, f])
-
-    given = np.full(strength.shape, load), present, end
-    return by_relaxation(symbol_of(problem), *given, slip, rest)
+        present = residual + drop * np.interp(share, np.r_[0.0, u], np.r_[1.0, f])
+        pull = times(symbol, slip) if stiffness is None else stiffness @ slip
+        drive = load - pull - present
+        if drive.max() < rest:
+            return slip
+        if (slip > end).all():
+            return None
+        slip = slip + step * np.maximum(drive, 0.0)
+    raise AssertionError("relaxation did not come to rest")
 
 
 def angle_rule(count: int) -> tuple[Any, Any]:

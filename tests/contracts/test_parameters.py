@@ -21,7 +21,8 @@ LINE, OTHER = BODIES["line"], BODIES["line with ends"]
 LOCAL, EXACT = st.LocalCriterion(), st.Equilibrium()
 WEAKER = st.RandomField(st.Lognormal(mean=0.9e6, cv=0.2), st.PowerLawSpectrum(4e-3))
 ROWS = FIELD.sample(LINE.interface, samples=2, seed=2)
-RECORDS = FIELD.sample(st.Interface(0.06, 256), samples=2, seed=3)
+SHORT = st.Interface(0.03, 128)
+RECORDS = FIELD.sample(SHORT, samples=2, seed=3)
 NOISY = RECORDS + 1e4 * np.random.default_rng(1).standard_normal(RECORDS.shape)
 PEAKS = [5.9e5, 6.2e5, 6.6e5, 7.1e5]
 PRIOR, SECOND = {"marginal.low": (5.6e5, 7.2e5)}, {"marginal.low": (5e5, 7.2e5)}
@@ -38,7 +39,7 @@ BASE: dict[str, dict[str, Any]] = {  # public call: arguments of a cheap example
     "design_stress": DRAWN | {"probability": 0.1, "target_cv": 0.4},
     "failure_curve": DRAWN | {"smallest": 0.1, "target_cv": 0.4},
     "fit_field": {
-        "profiles": NOISY, "interface": st.Interface(0.06, 256), "marginal": "lognormal",
+        "profiles": NOISY, "interface": SHORT, "marginal": "lognormal",
         "spectrum": "exponential", "noise": False, "bootstrap": 20,
     },
     "infer": DRAWN | {"peaks": PEAKS, "prior": PRIOR, "samples": 200},
@@ -53,7 +54,7 @@ OTHERS: dict[str, Any] = {  # parameter: another value, for all calls or by call
     "stress": 6.4e5, "friction_coefficient": 0.31, "force": 270.0, "target_cv": 0.05,
     "probability": 0.2, "max_evaluations": 100, "algorithm": "subset", "smallest": 0.02,
     "sensitivities": True, "save": st.Save(["slip"], every=2), "event": 0,
-    "interface": st.Interface(0.05, 256), "marginal": "gamma", "spectrum": "power_law",
+    "interface": st.Interface(0.025, 128), "marginal": "gamma", "spectrum": "power_law",
     "detrend": 1, "noise": 2e4, "anisotropy": 2.0, "between": True, "bootstrap": 30,
     "quantity": "residual_strength", "peaks": [6e5, 6.3e5, 6.6e5, 7.1e5], "prior": SECOND,
     "load_cell_error": 3e4, "unit": "kPa", "designs": {"more": 6}, "repetitions": 12,

@@ -9,6 +9,7 @@ import pytest
 from refusals import refuses
 from scipy.stats import binomtest, nbinom
 from setups import EXACT, LOCAL, ensemble, local_onset, make_problem, turns
+from stand_ins import StandIn
 
 import stiction as st
 from stiction.base.progress import SILENT
@@ -129,23 +130,10 @@ def test_where_most_survive_a_curve_begins_later():
     st.plot.failure_curve(curve)
 
 
-class Never:
-    """A method whose interfaces carry any load."""
-
-    type = label = "never"
-    variables = staticmethod(LOCAL.variables)
-    supports = staticmethod(lambda problem: [])
-    seconds_per_sample = staticmethod(lambda problem: 1e-6)
-
-    def prepare(self, problem):
-        return lambda sample: {
-            name: np.full(sample.samples, math.nan) for name in self.variables(problem)
-        }
-
-
 def test_a_curve_of_an_event_that_never_happens_is_unknown():
+    never = StandIn(lambda rows, stress: np.nan * stress)
     with pytest.warns(st.AccuracyWarning, match="the event happens in none of 2000 samples"):
-        curve = st.failure_curve(PROBLEM, STRENGTH, method=Never(), progress=False)
+        curve = st.failure_curve(PROBLEM, STRENGTH, method=never, progress=False)
     assert curve.sizes["point"] == 1
     assert curve.survived == 1.0
     assert np.isnan(curve.probability.values).all()
