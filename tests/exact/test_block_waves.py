@@ -55,17 +55,6 @@ def whole_matrix(mesh, nodes):
     return total.tocsr()
 
 
-@pytest.mark.parametrize("drive", [drive for drive in DRIVES if drive.mass > 0.0])
-def test_blocks_of_twice_the_thickness_move_alike_if_their_drive_is_doubled(drive):
-    single = crooked(drive=drive)
-    doubled = dataclasses.replace(drive, stiffness=2.0 * drive.stiffness, mass=2.0 * drive.mass)
-    thickness = 2.0 * single.specimen.thickness
-    specimen = dataclasses.replace(single.specimen, thickness=thickness, drive=doubled)
-    mesh, expected = map(make_mesh, (dataclasses.replace(single, specimen=specimen), single))
-    for name in ("mass", "stiffness", "drive_mass", "step", "correction"):
-        np.testing.assert_allclose(getattr(mesh, name), getattr(expected, name), rtol=1e-9)
-
-
 @pytest.mark.parametrize("mode", ["II", "III"])
 @pytest.mark.parametrize("drive", [st.Platen(), st.Pusher(height=0.016, width=0.01)])
 def test_the_statics_of_the_mesh_are_those_of_the_block(mode, drive):

@@ -68,12 +68,8 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     # Of a normal marginal z and its error are the values and the noise, scaled.
     field = st.RandomField(scipy.stats.norm(1e6, 0.2e6), FIELD.spectrum, mean_mode=mean_mode)
     numbers = np.arange(5.0, 12.0), np.arange(2.0, 5.0)
-    at = {
-        dim: (number + shift) * spacing
-        for dim, number, spacing in zip(
-            interface.dims, numbers, interface.spacings, strict=False
-        )
-    }
+    sides = zip(interface.dims, numbers, interface.spacings, strict=False)
+    at = {dim: (number + shift) * spacing for dim, number, spacing in sides}
     places, grid = all_of(at), all_of(interface.coordinates)
     values = scan(interface, places, field)
     known = xr.DataArray(values.reshape([one.size for one in at.values()]), at, tuple(at))
@@ -194,11 +190,9 @@ def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
     marginal = st.Beta(alpha=2.0, beta=2.0, low=0.1e6, high=0.3e6)
     residual = st.RandomField(marginal, FIELD.spectrum)
     places = LINE.x[10:30]
-    random = st.RandomInterface(
-        strength=given_on(places, scan(LINE, places[None]), 2e3),
-        residual_strength=residual,
-        correlation={("strength", "residual_strength"): 1.0},
-    )
+    strength = given_on(places, scan(LINE, places[None]), 2e3)
+    alike = {("strength", "residual_strength"): 1.0}
+    random = st.RandomInterface(strength, residual_strength=residual, correlation=alike)
     profiles = random.profiles(LINE, samples=20, seed=0)
     # With a correlation of 1 and one spectrum both are functions of one field.
     rank = FIELD.marginal.distribution.cdf(profiles["strength"])

@@ -56,15 +56,10 @@ def test_multiplier_is_the_fourier_transform_of_the_weight():
 # Largest error for waves of |k| h_n/2 up to 1, 3, 6 and 12, rounded up from what was measured.
 @pytest.mark.parametrize(
     ("half_width", "errors"),
-    [
-        (2.0, (1.0, 1.0, 1.0, 1.0)),
-        (4.4, (2e-5, 2e-4, 2e-3, 2e-2)),
-        (8.0, (2e-6, 1e-5, 1e-4, 2e-3)),
-        (17.5, (1e-9, 5e-9, 2e-8, 1e-6)),
-        (70.0, (2e-11, 1e-10, 1e-9, 1e-8)),
-        (1000.0, (1e-13, 1e-13, 1e-13, 1e-13)),
-    ],
-)
+    [(2.0, (1.0, 1.0, 1.0, 1.0)), (4.4, (2e-5, 2e-4, 2e-3, 2e-2)),
+     (8.0, (2e-6, 1e-5, 1e-4, 2e-3)), (17.5, (1e-9, 5e-9, 2e-8, 1e-6)),
+     (70.0, (2e-11, 1e-10, 1e-9, 1e-8)), (1000.0, (1e-13, 1e-13, 1e-13, 1e-13))],
+)  # fmt: skip
 def test_weights_on_a_grid_do_to_smooth_waves_what_the_eigenfunction_does(half_width, errors):
     nodes = 16 * int(np.ceil(half_width))
     w = grid_weights(half_width)
@@ -178,14 +173,12 @@ def test_periodic_variance_is_that_of_the_grid(problem, make_strength):
 def test_friction_coefficients_are_taken_times_the_pressure(problem):
     """0.22 was taken for 0.22 Pa."""
     pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
-    in_pascals, coefficient = (
-        st.RandomField(
-            st.Beta(alpha=2.0, beta=3.0, low=low, high=3.0 * low),
-            st.PowerLawSpectrum(correlation_length=5e-3),
-            quantity=of,
-        )
-        for low, of in ((0.4e6, None), (0.2, "friction_coefficient"))
+    in_pascals, of_one = (
+        st.Beta(alpha=2.0, beta=3.0, low=b, high=3.0 * b) for b in (0.4e6, 0.2)
     )
+    spectrum = st.PowerLawSpectrum(correlation_length=5e-3)
+    in_pascals = st.RandomField(in_pascals, spectrum)
+    coefficient = st.RandomField(of_one, spectrum, quantity="friction_coefficient")
     found, expected = (nucleation_statistics(pressed, f) for f in (coefficient, in_pascals))
     assert found.mean == pytest.approx(expected.mean, rel=1e-12)
     assert found.variance == pytest.approx(expected.variance, rel=1e-12)
@@ -239,12 +232,9 @@ def test_cracks_shorter_than_any_that_is_looked_at():
 
 def test_a_release_rate_that_peaks_within_a_few_nodes_is_seen():
     """A strong, narrow load: the peak lies below a 2,000th of the length, and was missed."""
-    problem = st.Problem(
-        st.Solid(3e9, 0.21, 2000.0),
-        st.Interface(1.0, 2048),
-        st.LinearWeakening(weakening_rate=2e12, residual_strength=4e5),
-        edge_load(st.Interface(1.0, 2048), 60.0, 4e-4),
-    )
+    line, law = st.Interface(1.0, 2048), {"weakening_rate": 2e12, "residual_strength": 4e5}
+    solid, load = st.Solid(3e9, 0.21, 2000.0), edge_load(line, 60.0, 4e-4)
+    problem = st.Problem(solid, line, st.LinearWeakening(**law), load)
     lengths = np.geomspace(1e-5, 0.1, 1000)
     above = release_rates(problem, 1.5e5, lengths, 0.0).min(axis=1) > 1.5
     first = int(above.argmax())

@@ -143,12 +143,11 @@ def test_a_uniform_specimen_slides_at_its_strength_by_any_law(law):
             256, 0.173, width=0.023, load=st.Load(pressing_force=117e3), **weakening
         )
         source = st.infer(problem, None, peaks, unit="N", between="normal", **options)
-        answers.append(
-            [
-                st.failure_probability(problem, source, force=force, progress=False).probability
-                for force in (1e3, 1e4, 19e3, 28e3, 60e3)
-            ]
-        )
+        forces = (1e3, 1e4, 19e3, 28e3, 60e3)
+        demands = [
+            st.failure_probability(problem, source, force=f, progress=False) for f in forces
+        ]
+        answers.append([demand.probability for demand in demands])
     assert (np.diff(answers) > 0.0).all()
     # Onsets in the middle of the range are interpolated between means, to 1e-9.
     assert answers[1] == pytest.approx(answers[0], rel=1e-6)

@@ -114,15 +114,10 @@ def closed_form(t, mode, eta):
     t, e = mpmath.mpf(t), mpmath.mpf(float(eta))
     if mode == "III":
         return bessel_tail(t)
-    w, w_fast = bessel_tail(t), bessel_tail(e * t)
-    return (
-        2 * w
-        - mpmath.besselj(1, t)
-        - 2 / e**2 * (w_fast - mpmath.besselj(1, e * t))
-        - 2 * t**2 * (w_fast - w)
-        + 2 * t / e * mpmath.besselj(0, e * t)
-        - 2 * t * mpmath.besselj(0, t)
-    )
+    w, w_fast, J = bessel_tail(t), bessel_tail(e * t), mpmath.besselj
+    slow = 2 * w - J(1, t) - 2 * t * J(0, t)
+    fast = 2 * t / e * J(0, e * t) - 2 / e**2 * (w_fast - J(1, e * t))
+    return slow + fast - 2 * t**2 * (w_fast - w)
 
 
 @pytest.mark.parametrize(

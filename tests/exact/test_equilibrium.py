@@ -126,17 +126,12 @@ def test_a_length_that_nothing_stops_has_the_least_drop_and_the_largest_energy()
     assert unstoppable_length(sample, 3e6, runs) == pytest.approx(half / 1e-3, rel=1e-12)
 
 
-@pytest.fixture
-def humped():
-    """A line whose law falls more steeply beyond half of its slip, and smooth strengths."""
+def test_no_sensitivity_beyond_a_corner_where_a_law_steepens():
+    """A law that falls more steeply beyond half of its slip, and smooth strengths."""
     law = {"slip": [0.5, 1.0], "strength": [0.7, 0.0], "weakening_rate": 8.6e10}
     problem = make_problem(96, friction=st.PiecewiseWeakening(**law))
     field = st.RandomField(st.Lognormal(mean=1e6, cv=0.25), st.PowerLawSpectrum(0.015))
-    return problem, field.sample(problem.interface, samples=8, seed=0)
-
-
-def test_no_sensitivity_beyond_a_corner_where_a_law_steepens(humped):
-    problem, tau_p = humped
+    tau_p = field.sample(problem.interface, samples=8, seed=0)
     with pytest.warns(st.AccuracyWarning, match="sensitivity is NaN in . of 8 samples"):
         found = exact_onset(problem, tau_p, sensitivity=True)
     proved = np.isfinite(found.certificate_gap.values)

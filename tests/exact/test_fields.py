@@ -359,21 +359,19 @@ def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
     plane = isinstance(nodes, tuple)
     interface = st.Interface((1.0, 0.7) if plane else 1.0, nodes)
     options = {"anisotropy": 1.3} if plane else {}
-    fields = {
-        name: st.RandomField(scipy.stats.norm(), spectrum, mean_mode=mean, **options)
-        for name, spectrum, mean in (
-            ("strength", st.PowerLawSpectrum(0.5), False),
-            ("residual_strength", st.SquaredExponentialSpectrum(0.3), True),
-            ("initial_stress", st.ExponentialSpectrum(0.4, power_kept=0.9), True),
-        )
+    spectra = {
+        "strength": st.PowerLawSpectrum(0.5),
+        "residual_strength": st.SquaredExponentialSpectrum(0.3),
+        "initial_stress": st.ExponentialSpectrum(0.4, power_kept=0.9),
     }
-    random = st.RandomInterface(
-        **fields,
-        correlation={
-            ("strength", "residual_strength"): 0.7,
-            ("residual_strength", "initial_stress"): -0.6,
-        },
-    )
+    fields = {
+        name: st.RandomField(scipy.stats.norm(), spectra[name], name != "strength", **options)
+        for name in spectra
+    }
+    chain = {
+        ("strength", "residual_strength"): 0.7, ("residual_strength", "initial_stress"): -0.6,
+    }  # fmt: skip
+    random = st.RandomInterface(**fields, correlation=chain)
     response = random.from_draws(interface, np.eye(random.dimension(interface)))
     modes = [fields[name].modes(interface) for name in random.names]
     places = np.meshgrid(*interface.coordinates.values(), indexing="ij")

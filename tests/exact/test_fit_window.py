@@ -122,14 +122,12 @@ def test_score_and_information_are_derivatives_of_the_likelihood(windows, noise)
     model = family.model(at, SHARES)
     expected = [model.expectation(window) for window in windows]
     for as_expected in (False, True):
-        observed = [
-            Observed(
-                window, 2 + 3 * i, e if as_expected else e * rng.exponential(size=e.shape), f
-            )
-            for i, (window, e, f) in enumerate(
-                zip(windows, expected, (0.02, 0.05), strict=False)
-            )
-        ]
+        observed = []
+        for window, e, count, floor in zip(
+            windows, expected, (2, 5), (0.02, 0.05), strict=False
+        ):
+            powers = e if as_expected else e * rng.exponential(size=e.shape)
+            observed.append(Observed(window, count, powers, floor))
         whole = Whittle(family, SHARES, observed)
         score, information = whole.score(at, whole.value(at)[1])
         moved = at + step * np.stack([np.eye(at.size), -np.eye(at.size)])

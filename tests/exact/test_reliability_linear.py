@@ -408,8 +408,6 @@ def test_small_repetitions_over_members_are_unbiased():
     # Nor that many runs hold none of a member of a long list.
     many = EquallyLikely(random.members[:1] * 300)
     options |= {"label": many.member}
-    long = [
-        descend(lambda draws: draws[:, 1], 26, rng=generator(seed, 8), **options)
-        for seed in range(60)
-    ]
+    generators = (generator(seed, 8) for seed in range(60))
+    long = [descend(lambda draws: draws[:, 1], 26, rng=rng, **options) for rng in generators]
     assert Tail(long).of_members(99.0, 300) == pytest.approx(np.ones(300), rel=1e-12)

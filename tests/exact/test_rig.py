@@ -86,9 +86,8 @@ def test_a_stop_takes_the_push_of_a_base_on_rollers():
         "soft base on rollers",
         8.0 * 0.3e9 / 2.7,
     )  # E = 8 G/(kappa + 1), plane stress
-    compliances = [
-        1.0 / rig_of(name, behind=a, ahead=b).C for a, b in ((0, 0.2), (0, 0.4), (0.2, 0.2))
-    ]
+    ends = (0, 0.2), (0, 0.4), (0.2, 0.2)
+    compliances = [1.0 / rig_of(name, behind=a, ahead=b).C for a, b in ends]
     assert compliances[1] - compliances[0] == pytest.approx(0.2 / (E_plane * 0.05), rel=0.01)
     assert compliances[2] == pytest.approx(compliances[0], rel=0.02)
 

@@ -308,13 +308,11 @@ def test_pressure():
     p, spectrum = pressed.normal_pressure, st.PowerLawSpectrum(correlation_length=4e-3)
     assert p.mean() == pytest.approx(2e6)
     assert p[0] < 0.95 * p[48]
+    marginal, of_what = st.Lognormal(mean=0.5, cv=0.1), {"quantity": "friction_coefficient"}
+    pressures = st.Beta(alpha=1.3, beta=1.95, low=1.5e6, high=2.4e6)
     drawn = st.RandomInterface(
-        strength=st.RandomField(
-            st.Lognormal(mean=0.5, cv=0.1), spectrum, quantity="friction_coefficient"
-        ),
-        normal_pressure=st.RandomField(
-            st.Beta(alpha=1.3, beta=1.95, low=1.5e6, high=2.4e6), spectrum
-        ),
+        strength=st.RandomField(marginal, spectrum, **of_what),
+        normal_pressure=st.RandomField(pressures, spectrum),
     )
     bare = without(pressed, "load.normal_pressure")
     found = st.monte_carlo(

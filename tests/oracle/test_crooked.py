@@ -144,13 +144,12 @@ def tips(load, whole, centre):
     def sine(x):
         return np.sin(np.pi * x / line.length)
 
-    factors = [
-        np.sqrt(2.0 / (line.length * sine(whole)))
-        * half
-        * np.sum(drop * measure * np.sqrt(sine(half + x) / sine(half - x)))
-        for x in (-half * s, half * s)
-    ]
-    return np.array([k * abs(k) for k in factors]) / (2.0 * LINE.effective_modulus)
+    scale, x = (
+        np.sqrt(2.0 / (line.length * sine(whole))) * half,
+        np.array([-half * s, half * s]),
+    )
+    k = scale * np.sqrt(sine(half + x) / sine(half - x)) @ (drop * measure)
+    return k * abs(k) / (2.0 * LINE.effective_modulus)
 
 
 def test_cracks_across_the_seam_under_an_uneven_load():

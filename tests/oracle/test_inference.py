@@ -77,16 +77,11 @@ def by_counting(base, field, method, values, peaks, samples):
     return mean, float(np.sqrt(density @ (fine - mean) ** 2))
 
 
+QUICK = "coefficients", "gradient load", "residual strength"
+
+
 @pytest.mark.parametrize(
-    "name",
-    [
-        "coefficients",
-        "gradient load",
-        "residual strength",
-        pytest.param("lap joint in which nodes stop", marks=SLOW),
-        pytest.param("coefficients under a pressure that varies", marks=SLOW),
-        pytest.param("beyond what the local criterion finds", marks=SLOW),
-    ],
+    "name", [*QUICK, *(pytest.param(name, marks=SLOW) for name in CASES if name not in QUICK)]
 )
 def test_posterior_of_one_parameter(name):
     base, field, method, key, prior, truth, count = CASES[name]

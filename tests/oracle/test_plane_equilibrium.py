@@ -143,9 +143,8 @@ def first_loss_of_stability(problem, strength, load, slip):
     critical = (strength - residual) / weakening_rate
     fallen, inside = slip >= critical * (1.0 - 1e-9), slip > 0.0
     while True:
-        matrix = (stiff - np.diag(np.where(fallen, 0.0, weakening_rate)))[
-            np.ix_(inside, inside)
-        ]
+        whole = stiff - np.diag(np.where(fallen, 0.0, weakening_rate))
+        matrix = whole[np.ix_(inside, inside)]
         if np.linalg.eigvalsh(matrix)[0] < 0.0:
             return load
         carried = np.where(fallen, residual, strength)
@@ -231,9 +230,8 @@ def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable(
     def least(weakening_rate):
         """The lowest eigenvalue of A on the nodes that slip, over K of one node."""
         at = np.flatnonzero(slip > 0.0)
-        matrix = stiffness[np.ix_(at, at)] - np.diag(
-            (weakening_rate * sample.weakening_rate)[at]
-        )
+        rates = (weakening_rate * sample.weakening_rate)[at]
+        matrix = stiffness[np.ix_(at, at)] - np.diag(rates)
         return eigh(matrix, eigvals_only=True, subset_by_index=[0, 0])[0] / stiffness[0, 0]
 
     slip, taken, refused, spared = np.zeros(480), 0, 0, 0
@@ -258,10 +256,8 @@ def test_a_coarse_grid_only_says_where_the_path_is_begun(monkeypatch):
     load = st.Load(
         profile=1.0 + 0.3 * noise(4.0, 6, shape), initial_stress=1e5 * noise(4.0, 7, shape)
     )
-    law = {
-        "weakening_rate": RATE * (0.9 + 0.1 * noise(4.0, 5, shape)),
-        "residual_strength": 6.2e5,
-    }
+    rate = RATE * (0.9 + 0.1 * noise(4.0, 5, shape))
+    law = {"weakening_rate": rate, "residual_strength": 6.2e5}
     problem = make_problem(shape, lengths, load=load, **law)
     strength = 0.66e6 + 1e6 * noise(4.0, 3, shape)
     quick = exact_onset(problem, strength)

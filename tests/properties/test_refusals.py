@@ -80,11 +80,8 @@ def right_values(name, valid):
 
 
 def named(problems, name):
-    return [
-        text
-        for text in problems
-        if re.match(rf"(\w+\.)*{name}\b|(\w+Weakening|Load): {name} must", text)
-    ]
+    pattern = re.compile(rf"(\w+\.)*{name}\b|(\w+Weakening|Load): {name} must")
+    return [text for text in problems if pattern.match(text)]
 
 
 @pytest.mark.parametrize(("one", "name", "valid"), ROWS)
