@@ -273,7 +273,7 @@ def point_load(steps, end, plane, load):
 
 def test_a_point_load_spreads_as_the_exact_waves_with_second_order():
     """Like Lamb's problem, with slip across the load held: mode by mode by Laplace inversion."""
-    plane = st.Interface(length=(0.1, 0.08), nodes=(16, 12))
+    plane = st.Interface(length=(0.1, 0.08), nodes=(12, 10))
     x, y = np.meshgrid(*plane.coordinates.values(), indexing="ij")
     load = 1e5 * np.exp(-(((x - 0.05) / 0.012) ** 2) - ((y - 0.04) / 0.012) ** 2)
     k, share = plane.wavenumbers, plane.in_plane_share
@@ -291,4 +291,4 @@ def test_a_point_load_spreads_as_the_exact_waves_with_second_order():
     assert_second_order(errors, 0.5)
     assert errors[2] < 3e-5
     # Along the load waves run ahead at c_d, across it at c_s: the response is no circle.
-    assert abs(exact[8 + 4, 6]) != pytest.approx(abs(exact[8, 6 + 4]), rel=0.05)
+    assert abs(exact[6 + 3, 5]) != pytest.approx(abs(exact[6, 5 + 3]), rel=0.05)
