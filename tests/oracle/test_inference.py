@@ -42,9 +42,7 @@ CASES = {
     "coefficients under a pressure that varies": (
         problem(normal_pressure=3e6 * WAVE), coefficient, LOCAL, *SMALL, 30,
     ),
-    "gradient load": (
-        problem(profile=GRADIENT), beta, LOCAL, *LARGE, 30,
-    ),
+    "gradient load": (problem(profile=GRADIENT), beta, LOCAL, *LARGE, 30),
     "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
     "lap joint in which nodes stop": (
         crooked(
