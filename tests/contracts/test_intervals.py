@@ -124,9 +124,8 @@ def test_intervals_of_a_posterior_hold_its_mean(more):
         assert low <= posterior.mean[name] <= high, name
 
 
-@pytest.mark.parametrize("share", [0.05, 0.5])
+@pytest.mark.parametrize(("share", "most"), [(0.05, 300), (0.5, 1000)])
 @pytest.mark.parametrize("algorithm", ["auto", "plain", "subset", "two_level"])
-@pytest.mark.parametrize("most", [300, 1000])
 def test_no_answer_takes_more_evaluations_than_allowed(algorithm, most, share):
     """With rough fields, which the guide ranks poorly, and with smooth ones."""
     problem = make_problem(96, 0.0144)
