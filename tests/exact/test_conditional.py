@@ -192,7 +192,9 @@ def test_a_scan_of_one_property_tells_of_one_that_is_correlated_with_it():
     places = LINE.x[10:30]
     strength = given_on(places, scan(LINE, places[None]), 2e3)
     alike = {("strength", "residual_strength"): 1.0}
-    random = st.RandomInterface(strength, residual_strength=residual, correlation=alike)
+    random = st.RandomInterface(
+        strength=strength, residual_strength=residual, correlation=alike
+    )
     profiles = random.profiles(LINE, samples=20, seed=0)
     # With a correlation of 1 and one spectrum both are functions of one field.
     rank = FIELD.marginal.distribution.cdf(profiles["strength"])
