@@ -227,7 +227,8 @@ Flag: TypeAlias = Annotated[bool, BeforeValidator(_flag)]
 Progress: TypeAlias = Annotated[Show, BeforeValidator(_show), "bool | Callable"]
 """True, False, or a function of (done, total)."""
 Text: TypeAlias = Annotated[str, Field(strict=True, min_length=0)]
-"""Text in valid UTF-8. Pydantic checks the encoding only if the length is limited."""
+"""Text in valid UTF-8. Pydantic checks the encoding only if the length
+is limited."""
 Mode: TypeAlias = Literal["II", "III"]
 
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 MAX_OBJECTS = 1_000
 MAX_VALUES = 2**23
-"""Number of values that a file of fewer bytes may hold. A larger file may hold a value per
-byte."""
+"""Number of values that a file of fewer bytes may hold. A larger file
+may hold a value per byte."""
 SHUFFLE, DEFLATE, CHECKSUM, VIRTUAL = 2, 1, 3, 3
 """HDF5's numbers of the accepted filters, and of the layout of virtual
 datasets."""

@@ -37,8 +37,8 @@ PROFILES: dict[str, Variable] = {
     "fracture_energy": Variable("J m-2", "fracture energy"),
     "normal_pressure": Variable("Pa", "normal pressure"),
 }
-"""Profiles that may be given or sampled, in an order that numbers the streams of random draws and
-never changes."""
+"""Profiles that may be given or sampled, in an order that numbers the
+streams of random draws and never changes."""
 FRICTION_COEFFICIENT = Variable("1", "static friction coefficient")
 QUANTITIES = PROFILES | {
     "residual_ratio": Variable("1", "residual ratio"),

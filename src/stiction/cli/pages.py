@@ -39,7 +39,8 @@ LIGHT = "positive entries"
 CONTROLS = {
     code: "\N{REPLACEMENT CHARACTER}" for code in (*range(9), *range(11, 32), *range(127, 160))
 }
-"""Replacements for characters that control terminals, because a terminal may print a page."""
+"""Replacements for characters that control terminals, because a
+terminal may print a page."""
 
 
 @dataclass

@@ -55,8 +55,8 @@ MAX_WIDTH = 4096
 """Nodes of the widest window. The eigenvector of a wider window takes
 longer than it saves."""
 MAX_INVERSE_ITERATIONS = 60
-"""Number of iterations, each of which more than halves the error, until a double gains no
-digit."""
+"""Number of iterations, each of which more than halves the error, until
+a double gains no digit."""
 MODE_RTOL = 1e-14
 """Change of an eigenvector in an iteration, relative to its largest
 entry, that is round-off."""

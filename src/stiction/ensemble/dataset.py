@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 Coordinates: TypeAlias = dict[str, tuple[NDArray[Any], Variable]]
 """Values and variables of coordinates by name."""
 GridAxes: TypeAlias = Mapping[str, Coordinates]
-"""Coordinates of each dimension of a sweep. The first has the name of the dimension."""
+"""Coordinates of each dimension of a sweep. The first has the name of
+the dimension."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:

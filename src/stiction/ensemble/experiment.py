@@ -45,9 +45,11 @@ from stiction.random.stresses import (
 )
 
 CHECKED_NODES = 1 << 14
-"""Approximate number of sampled nodes whose strength is compared with the residual strength."""
+"""Approximate number of sampled nodes whose strength is compared with
+the residual strength."""
 MOST_NUMBERS = 1 << 20
-"""Most nodes or draws of samples of a plane that are solved at once: 8 MiB per profile."""
+"""Most nodes or draws of samples of a plane that are solved at once: 8
+MiB per profile."""
 
 
 @dataclass(frozen=True)

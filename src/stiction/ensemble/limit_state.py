@@ -260,8 +260,8 @@ def solve_part(state: LimitState, draws: Array) -> Table:
 def limit_state(problem: Problem, random: AnyRandom, method: MethodObject) -> LimitState:
     """Make a function that maps standard normal draws to the stress at onset.
 
-    External reliability codes can call this function. Failure below a stress s is
-    ``limit_state(draws) < s``.
+    External reliability codes can call this function. Failure below a
+    stress s is ``limit_state(draws) < s``.
 
     Parameters
     ----------

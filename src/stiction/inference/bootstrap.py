@@ -71,7 +71,8 @@ The whole range replaces a narrower interval.
 """
 
 HELD_RTOL = 1e-6
-"""Relative distance of a shape from its limit below which the limit counts as reached."""
+"""Relative distance of a shape from its limit below which the limit
+counts as reached."""
 
 
 class Refits(NamedTuple):

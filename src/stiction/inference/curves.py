@@ -92,16 +92,19 @@ round-off."""
 MIN_DROP_SHARE = 1e-6
 """Fraction of the peak below which a fall is round-off if there is no noise."""
 MAX_SPIKES_SHARE = 0.01
-"""Fraction of readings above which spikes do not count as errors of single readings."""
+"""Fraction of readings above which spikes do not count as errors of
+single readings."""
 MIN_FITTED = 12
 """Fewest readings at the peak to which a parabola is fitted."""
 TARE = 0.05
-"""Largest ratio of the first readings to the peak without a doubt about the tare."""
+"""Largest ratio of the first readings to the peak without a doubt about
+the tare."""
 HIGH, LOW, MAX_RETURNS = 0.8, 0.7, 3
 """A test falls below LOW of its peak and returns above HIGH of it fewer
 times than this. A record of stick-slip does so in each cycle."""
 BOTH_SIGNS = 0.2
-"""Least size of forces of the other sign in a reciprocating test, over the largest force."""
+"""Least size of forces of the other sign in a reciprocating test, over
+the largest force."""
 Split = Literal["cycles", "strokes", "tables"]
 
 
@@ -397,7 +400,10 @@ def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
 
 
 def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
-    """Yield the label of each test in a table, and a mask of its rows. A lone test has no label."""
+    """Yield the label of each test in a table, and a mask of its rows.
+
+    A lone test has no label.
+    """
     numbers = [c for c in named(table.columns, TESTS) if role_of(c) == "specimen"]
     if len(numbers) == 1 and np.isfinite(numbers[0].values).all():
         for label in dict.fromkeys(numbers[0].values.tolist()):

@@ -81,7 +81,8 @@ from stiction.random.fields import RandomField, RandomInterface
 
 USUAL_FAMILIES = ("lognormal", "weibull", "gamma", "beta")
 ENOUGH_LENGTHS = 10.0
-"""Number of correlation lengths that a record needs to constrain parameters well."""
+"""Number of correlation lengths that a record needs to constrain
+parameters well."""
 MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {

@@ -146,7 +146,9 @@ def experiments_at(
 
 
 def of_length(problem: Problem, length: float | None) -> Problem:
-    """Return the problem for specimens with a length, m. None means the length of the problem.
+    """Return the problem for specimens with a length, m.
+
+    None means the length of the problem.
 
     The node spacing is the spacing of the problem.
     """

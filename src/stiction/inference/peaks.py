@@ -75,7 +75,8 @@ SPECIMEN_NAMES = "specimen|sample|probe|éprouvette|muestra|probeta"
 """Beginnings of the heading of a column that says which specimen was
 tested."""
 SLIP_FACTORS = (0.05, 1.0)
-"""Range of slip factors. Swapped columns or units lead far beyond this range."""
+"""Range of slip factors. Swapped columns or units lead far beyond this
+range."""
 VARIABLES = {"Pa": "critical_stress", "N": "critical_force", "1": "friction_coefficient"}
 """Variable of a method that each unit measures."""
 

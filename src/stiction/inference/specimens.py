@@ -80,10 +80,11 @@ PRIOR_SCALE = 0.1
 LEAST_CV, MOST_CV = 2e-3, 0.9
 """Smallest and largest s."""
 SCATTER_CELLS, MEAN_CELLS, ONSET_MEANS = 40, 48, 5
-"""Number of values of s and of log m on the grid, and of means at which onsets are simulated if
-T(c)/c depends on c."""
+"""Number of values of s and of log m on the grid, and of means at which
+onsets are simulated if T(c)/c depends on c."""
 ONSETS, FEW_ONSETS = {"local_criterion": 200}, 100
-"""Number of simulated onsets of each field, by the local criterion and by other methods."""
+"""Number of simulated onsets of each field, by the local criterion and
+by other methods."""
 LOG_STRENGTH_MARGIN = 0.3
 """Distance in the logarithm of the strength by which simulated means
 exceed the range of peaks."""
@@ -105,7 +106,8 @@ table of its distribution."""
 TABULATED_DEVIATIONS = 6.0
 """Standard deviations up to which the likelihood of a number is tabulated."""
 FEW_FIELDS = 10
-"""Number of fields within a specimen for the sensitivities of a design, which are only ratios."""
+"""Number of fields within a specimen for the sensitivities of a design,
+which are only ratios."""
 UNIFORM = 1e-8
 """Coefficient of variation of a field that counts as uniform."""
 LEAST_DEVIATION = 1e-3
@@ -131,7 +133,10 @@ def families_of(given: Any) -> tuple[str, ...]:
 
 
 class FactorPrior(NamedTuple):
-    """Priors for the scatter s and the mean. By default the mean is flat in its logarithm."""
+    """Priors for the scatter s and the mean.
+
+    By default the mean is flat in its logarithm.
+    """
 
     scatter: Any = scipy.stats.halfcauchy(scale=PRIOR_SCALE)
     mean: Any = None

@@ -81,10 +81,12 @@ them to 1e-4."""
 OF_SPECTRUM = ("correlation_length", "exponent", "anisotropy")
 """Parameters of a spectrum, by their keys."""
 AT_END = 1e-3
-"""Distance from an end of a range, over the range, below which an estimate is at the end."""
+"""Distance from an end of a range, over the range, below which an
+estimate is at the end."""
 LOG_STEP = 1e-4
 SETTLED = 1e-3
-"""Gain of log likelihood below which scoring ends. A standard error costs one half."""
+"""Gain of log likelihood below which scoring ends. A standard error
+costs one half."""
 LONGEST = 1.5
 """Longest step of scoring, on the scale of the search."""
 

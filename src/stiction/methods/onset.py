@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MAX_COMPARED, COMPARISON_SECONDS = 32, 2.0
-"""Most samples that `onset` also solves by the exact method, and the seconds for
-these samples."""
+"""Most samples that `onset` also solves by the exact method, and the
+seconds for these samples."""
 MAX_DIFFERENCE = 0.01
 """Mean or scatter of the difference, over the exact onset, above which
 there is a warning."""

@@ -18,7 +18,8 @@ from stiction.plot.axes import FigureAxes, new_figure, on_axes, with_unit
 from stiction.plot.style import ACCENT, INK, PAGE, PALE, QUIET, color, paper_style
 
 SHOWN = 100
-"""Number of repetitions, or simulated records, from which a 90 % band is drawn."""
+"""Number of repetitions, or simulated records, from which a 90 % band
+is drawn."""
 LAGS = 2.5
 """Number of correlation lengths in the panel of the correlation."""
 PER_OCTAVE = 4

@@ -35,7 +35,8 @@ DECADES = 7.0
 BEFORE = 0.11
 """Time before the onset that is drawn, in units of L/c_s."""
 FILMED_RATE = 1e-3
-"""Slip rate above which a frame is in a film, over the largest slip rate of the run."""
+"""Slip rate above which a frame is in a film, over the largest slip
+rate of the run."""
 FRONT_SHARE = 0.9
 """Fraction of the nodes that the front has reached at the last of its
 contours."""

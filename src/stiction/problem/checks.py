@@ -24,16 +24,19 @@ from stiction.problem.interface import Interface
 from stiction.problem.specimen import Blocks
 
 MAX_STRENGTH_RATIO = 1e8
-"""Strength of a node over the median above which other strengths are lost in round-off."""
+"""Strength of a node over the median above which other strengths are
+lost in round-off."""
 BARRIER = 10.0
-"""Factor by which tau_p - tau_r of a barrier exceeds the lower quartile, by rank, of nodes that
-weaken."""
+"""Factor by which tau_p - tau_r of a barrier exceeds the lower
+quartile, by rank, of nodes that weaken."""
 MIN_NODES_IN_NUCLEATION = 4
 """Fewest nodes in a nucleation length."""
 HARDLY_RESOLVED = 0.04
-"""Nodes in a nucleation length below which a unit is doubted. At least 4 are needed."""
+"""Nodes in a nucleation length below which a unit is doubted. At least
+4 are needed."""
 MIN_LENGTHS_IN_LINE = 4.0
-"""Nucleation lengths in a line below which free ends change the mean onset by over 1 %."""
+"""Nucleation lengths in a line below which free ends change the mean
+onset by over 1 %."""
 AT_END = {"II": 0.445 / 1.158, "III": 0.5}
 """Nucleation length at a free end of two equal blocks over the length
 in the middle."""

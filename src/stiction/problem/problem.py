@@ -38,9 +38,11 @@ if TYPE_CHECKING:
     from stiction.elasticity.rig import Rig
 
 MIN_MACHINE_RATIO = 1e-4
-"""Machine stiffness over block stiffness below which the unit is probably wrong."""
+"""Machine stiffness over block stiffness below which the unit is
+probably wrong."""
 MIN_HEIGHT_RATIO, MAX_HEIGHT_RATIO = 0.025, 10.0
-"""Height of blocks over length between which the response takes seconds and less than 1 GB."""
+"""Height of blocks over length between which the response takes seconds
+and less than 1 GB."""
 NO_AREA = (
     "a force needs the area of the interface: give the thickness of the specimen, or"
     " interface.width of a line (m)"

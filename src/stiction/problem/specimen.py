@@ -57,7 +57,8 @@ UNFIT_FOR_SLIDER = {
     "normal_pressure": "follows from the rig of a slider. Give load.pressing_force (N)",
     "extent": "the whole slider can slip. Leave it out",
 }
-"""Advice about inputs that a slider does not accept, by the last part of the key."""
+"""Advice about inputs that a slider does not accept, by the last part
+of the key."""
 
 
 @model(kw_only=True)

@@ -66,13 +66,14 @@ SPECIMENS_PER_SAMPLE = 128
 CHARACTERISTIC = 0.05
 """Fraction of the specimens below the characteristic value."""
 FIRST_SAMPLES, MOST_STEP_SAMPLES = 500, 8_000
-"""Number of samples that are solved at first, and largest number in a later step."""
+"""Number of samples that are solved at first, and largest number in a
+later step."""
 COUNT_MARGIN = 1.1
 """Factor on the number of samples, because the error so far is itself
 an estimate."""
 SUBSET_EVALUATIONS = 50.0
-"""Evaluations of subset simulation for a coefficient of variation of 1, over log10(P)^2, fitted
-to measured costs."""
+"""Evaluations of subset simulation for a coefficient of variation of 1,
+over log10(P)^2, fitted to measured costs."""
 LONG_LIST, LIST_COST = 100, 5.0
 """Number of interfaces above which a list is long, and cost of an
 evaluation in chains over a long list, over the cost of an evaluation in

@@ -78,7 +78,8 @@ CONSTANTS = (
     "load.pressing_force", "solid.shear_modulus", "specimen.height", "specimen.drive.stiffness",
     "specimen.drive.height",
 )  # fmt: skip
-"""Dotted keys of constants that may be assumptions, if they are numbers in a problem."""
+"""Dotted keys of constants that may be assumptions, if they are numbers
+in a problem."""
 FAMILY = "distribution between specimens"
 
 

@@ -80,7 +80,8 @@ or MPa for Pa."""
 SHOWN_PROFILES = 20
 """Number of failing profiles in an answer."""
 COVERED = 0.8
-"""Fraction of the failures that the first stage must find to avoid a warning."""
+"""Fraction of the failures that the first stage must find to avoid a
+warning."""
 QUANTITIES = {"stress": "Pa", "force": "N", "friction_coefficient": "1"}
 """Units of the quantities in which a stress may be given."""
 

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 OVERHEAD = 2**16
 """Bytes of a NetCDF file apart from its arrays."""
 FEWEST_BLOCKS = 8
-"""Fewest blocks in a part, if there are enough, so that parts take similar times."""
+"""Fewest blocks in a part, if there are enough, so that parts take
+similar times."""
 
 
 def _part(value: Any) -> tuple[int, int]:
@@ -49,7 +50,10 @@ PartOfRun: TypeAlias = Annotated[Any, BeforeValidator(_part)]
 
 
 def samples_of_part(part: tuple[int, int], points: int, samples: int) -> NDArray[np.bool_]:
-    """Return a mask (points, samples) of the samples in a part. Blocks go to the parts in turn."""
+    """Return a mask (points, samples) of the samples in a part.
+
+    Blocks go to the parts in turn.
+    """
     (number, of), total = part, points * samples
     block = min(SAMPLES_PER_BLOCK, max(1, total // (FEWEST_BLOCKS * of)))
     mine = np.arange(total) // block % of == number - 1

@@ -497,7 +497,8 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _validated(given: dict[str, Any], folder: Path | None, files: list[Path]) -> Study:
     """Build a study from plain dictionaries.
 
-    Files that the study names are in `folder`, and their paths are appended to `files`.
+    Files that the study names are in `folder`, and their paths are
+    appended to `files`.
     """
     check("study", given, dict)
     if given and not {*keys_of(Study)} & {*given}:

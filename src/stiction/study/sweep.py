@@ -21,10 +21,12 @@ from stiction.ensemble.dataset import Coordinates, GridAxes
 from stiction.random.dotted_keys import SHORT_KEYS, full_key
 
 SWEPT = "problem", "random", "method", "seed"
-"""Keys of a study that a sweep may change, together with the keys below them."""
+"""Keys of a study that a sweep may change, together with the keys below
+them."""
 MOST_POINTS = 100_000
 SELECTION_KEYWORDS = ("method", "tolerance", "drop", "indexers", "missing_dims")
-"""Keywords of xarray's `sel` and `isel`, which cannot be names of dimensions."""
+"""Keywords of xarray's `sel` and `isel`, which cannot be names of
+dimensions."""
 
 Axis: TypeAlias = dict[str, list[Any]]
 """Keys that vary together, each with a value for each step."""

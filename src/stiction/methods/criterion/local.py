@@ -56,8 +56,8 @@ COARSE_LINE = (
     "if the strength varies within a quarter of this length, the local criterion is off by about"
     " 0.8 % (rms) at 8 nodes and 3 % at 4, and by far less for smoother strength",
 )
-"""Number of nodes in a nucleation length above which there is no warning, and error on coarser
-grids."""
+"""Number of nodes in a nucleation length above which there is no
+warning, and error on coarser grids."""
 INSTEAD = ". Use st.Equilibrium() or st.Rupture()"
 
 OF_PLANES = {

@@ -45,8 +45,9 @@ from stiction.problem.problem import Problem
 from stiction.problem.sample import Sample
 
 MAX_OPERATIONS = 4e9
-"""Operations on a sample above which it counts as undecided: cubes of the number of moving nodes
-and squares of the number of nodes, summed over steps."""
+"""Operations on a sample above which it counts as undecided: cubes of
+the number of moving nodes and squares of the number of nodes, summed
+over steps."""
 FROZEN_STEPS = 4
 """Steps with frozen strengths before Newton's method is tried again."""
 REST_RTOL, JOIN_RTOL = 1e-5, 1e-9

@@ -134,7 +134,8 @@ def largest_step(
 ) -> float:
     """Return the largest stable c_s dt, m, of the explicit predictor-corrector.
 
-    The result is 0 if the error of the kernel makes waves grow at every step.
+    The result is 0 if the error of the kernel makes waves grow at every
+    step.
     """
     kernels = [kernel_sum(mode, eta, tolerance) for mode in modes]
     static = static_stiffness(modes[0], eta)

@@ -101,7 +101,10 @@ class Mesh(NamedTuple):
 
 
 def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
-    """Return the mesh for a problem's block. The step is `courant` times the stability limit."""
+    """Return the mesh for a problem's block.
+
+    The step is `courant` times the stability limit.
+    """
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
 

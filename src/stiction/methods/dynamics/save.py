@@ -62,7 +62,8 @@ MAX_FRAME_BYTES = 2**36
 """Largest size of a file of frames, bytes."""
 FRAMES_PER_FILE = 64
 NEARLY_ZERO = 1e-6
-"""Distance of a place from the first node, in spacings, that exceeds round-off."""
+"""Distance of a place from the first node, in spacings, that exceeds
+round-off."""
 _MAX_STEPS_PER_FILE = 50_000  # steps between frames that lie far apart
 _CHECKPOINT, _SUMMARY, _FRAME_FILES = "checkpoint.npz", "summary.nc", "frames-*.nc"
 

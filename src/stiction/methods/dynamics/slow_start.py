@@ -109,9 +109,9 @@ def _state_at(
 ) -> RuptureState | None:
     """Steps 2 to 5: return the state at a distance (Pa) below the onset, or `None` if unknown.
 
-    The state is unknown if a node is beyond the first piece of its law, where
-    the linear programme does not hold, or if a front has arrived, since
-    the time of arrival is not known.
+    The state is unknown if a node is beyond the first piece of its law,
+    where the linear programme does not hold, or if a front has arrived,
+    since the time of arrival is not known.
     """
     nodes, grid, loading_rate = run.setting.nodes, run.medium.grid, run.slope(0.0)
     # 2. Two equilibria, and the slip rate between them.

@@ -54,8 +54,8 @@ from stiction.problem.sample import Sample
 from stiction.problem.specimen import Slider
 
 OPTIONS = ("courant", "arrival", "max_steps", "events")
-"""Options of `Rupture` with an effect on specimens. Other options need a load that rises in
-time."""
+"""Options of `Rupture` with an effect on specimens. Other options need
+a load that rises in time."""
 LOAD_RISE = 1e-5
 """Rise of the drive in an event, as a fraction of the mean strength
 drop."""

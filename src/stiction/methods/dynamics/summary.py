@@ -43,8 +43,9 @@ FREQUENCIES = 100
 SPEED_SPANS = {"rupture_speed": 2.0, "median_rupture_speed": 0.5}
 """Length over which a speed is a mean, in units of h_n."""
 BACKWARDS, MONOTONE = 1e-3, 1.0 - 1e-9
-"""Part of the time over a window in which the front goes back, from which on it has no speed, and
-the weight of a window in which it does not go back."""
+"""Part of the time over a window in which the front goes back, from
+which on it has no speed, and the weight of a window in which it does
+not go back."""
 _SCALARS: dict[str, Variable] = {
     "applied_load": Variable("Pa", "load factor applied at the onset"),
     "onset_time": Variable("s", "time from zero load to the onset"),
@@ -83,10 +84,10 @@ def rate_spectrum(
 ) -> tuple[tuple[Array, Variable], tuple[Array, Variable]]:
     """Return frequencies (Hz) and the amplitude spectrum of a moment rate, N, or N m on a plane.
 
-    The spectrum is the absolute value of int M'(t) exp(-2 pi i f t) dt, with
-    straight lines between the times (s), from one period in all to the waves
-    that the nodes and times resolve. The spectrum is empty with fewer than
-    three times.
+    The spectrum is the absolute value of int M'(t) exp(-2 pi i f t) dt,
+    with straight lines between the times (s), from one period in all to
+    the waves that the nodes and times resolve. The spectrum is empty
+    with fewer than three times.
     """
     frequencies = np.empty(0)
     if time.size > 2:

@@ -65,7 +65,8 @@ change."""
 COEFFICIENT_STEP = 1e-7
 """Rise of a friction coefficient in a difference quotient."""
 NODES_AT_ENDS = 16
-"""Number of nodes in a nucleation length above which no warning about the ends is issued."""
+"""Number of nodes in a nucleation length above which no warning about
+the ends is issued."""
 COARSE_ENDS = (
     "stress is singular at the ends of the slider. If 17 nodes are doubled, static friction changes"
     " by up to 0.04 %, and the first instability by up to 0.5 %"

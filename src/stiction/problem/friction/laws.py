@@ -146,7 +146,10 @@ class FrictionLaw(Listed):
 
     @cached_property
     def steepening(self) -> float:
-        """Steepest slope over the initial slope, at least 1. This ratio controls stability."""
+        """Steepest slope over the initial slope, at least 1.
+
+        This ratio controls stability.
+        """
         if isinstance(self.parameters, Linear | Exponential):
             return 1.0
         # The examined slopes of a law of the user have some error.

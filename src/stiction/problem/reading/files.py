@@ -183,9 +183,9 @@ def _lines(text: str, options: Options) -> Grid:
 def _separator(lines: Sequence[str], words: set[str]) -> str:
     """Return the separator that splits most lines into equally many numbers, times and words.
 
-    If several separators do, the heading is compared first, and then the order of
-    `SEPARATORS`. Blanks separate numbers with decimal commas, '0,1
-    1000,5', but commas '0.1, 1000.5'.
+    If several separators do, the heading is compared first, and then
+    the order of `SEPARATORS`. Blanks separate numbers with decimal
+    commas, '0,1 1000,5', but commas '0.1, 1000.5'.
     """
     step = max(1, len(lines) // MAX_LINES_COMPARED)
     shown = [line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step])]

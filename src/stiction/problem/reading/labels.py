@@ -295,7 +295,10 @@ def _chosen(
 
 
 def _by_rule(columns: Sequence[Column], quantity: str) -> Column:
-    """Return the column of a quantity by the rule. The name of another excludes a column."""
+    """Return the column of a quantity by the rule.
+
+    The name of another excludes a column.
+    """
     words, si = (quantity, *NAMES.get(quantity, ())), QUANTITIES[quantity].units
     others = {name: key for key in NAMES for name in NAMES[key] if name not in words}
     named = {c: others[name] for c in columns if (name := _plain(c.name)) in others}

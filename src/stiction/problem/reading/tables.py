@@ -39,7 +39,8 @@ _EMPTY = {
     "", "-", "--", "---", "nan", "na", "n/a", "<na>", "#n/a", "#na", "null", "none", "#div/0!",
     "1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "#wert!", "#value!", "#nv",
 }  # fmt: skip
-"""Words for a missing value, in lower case. A row of stars also marks a missing value."""
+"""Words for a missing value, in lower case. A row of stars also marks a
+missing value."""
 _STATISTICS = (
     "mean average avg median minimum maximum min max std stdev std.dev sd stddev standard deviation"
     " cv cov c.v variance count sum total range mittelwert mittel standardabweichung streuung"

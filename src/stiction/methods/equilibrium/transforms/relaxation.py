@@ -86,7 +86,8 @@ from stiction.methods.equilibrium.transforms.held_equilibrium import equilibrate
 # the time by hardly more than a tenth (planes of 64 and 96 squared,
 # with and without arrests).
 MAX_REVISIONS = 100
-"""Most revisions of the pieces in Newton's method, which usually ends by itself."""
+"""Most revisions of the pieces in Newton's method, which usually ends
+by itself."""
 MAX_JUMP_STEPS = 2000
 """Most steps of a jump, which may creep along in ever smaller steps."""
 PIECES_RESIDUAL = 0.03

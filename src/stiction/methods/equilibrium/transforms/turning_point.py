@@ -81,11 +81,11 @@ STALLED_SHARE = 0.7
 """Fraction of mu' that must remain after a step for the next step to be
 twice as long instead."""
 RESIDUAL_SHARE_OF_GAP = 0.05
-"""Residual stress, relative to the requested gap, at which the residual does not open the
-bounds."""
+"""Residual stress, relative to the requested gap, at which the residual
+does not open the bounds."""
 LOAD_BELOW_BOUND = 0.3
-"""Distance of the load below the upper bound, as a fraction of the gap, at which a state closes
-the gap."""
+"""Distance of the load below the upper bound, as a fraction of the gap,
+at which a state closes the gap."""
 PATCH_EIGENVALUE_RTOL, MAX_PATCH_ITERATIONS = 1e-3, 12
 """Residual of the eigenvector of another patch, as a fraction of the
 largest W, and iterations."""
