@@ -371,8 +371,8 @@ def profile_in_si(
     for name, (array, valid, given) in parts.items():
         with prefixed(name, " "):
             converted[name] = in_si(array, valid, given)
-        known = given or stated_unit(array) or converted[name][1] == "1"
-        if value.attrs.get("read") and not known:  # a table, whose headings state units
+        stated = given or stated_unit(array) or converted[name][1] == "1"
+        if value.attrs.get("read") and not stated:  # a table, whose headings state units
             assumed.append(f"{name} is read in {converted[name][1]}")
     values, si = converted.pop(quantity)
     shown = value.values if isinstance(value.data, np.ndarray) else values

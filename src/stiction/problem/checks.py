@@ -46,6 +46,9 @@ superlubricity to adhesive gels."""
 RIGIDITY = (1e-8, 1.0), (0.0, math.inf)
 """Usual and possible ratios of strength and shear modulus. Steel (8e10
 Pa) under 10 kPa at a coefficient of 0.1 has 1e-8."""
+STIFF, STRONG = 1e8, 0.05
+"""Shear modulus above which a solid is no rubber or gel, Pa, and the largest usual strength over
+it. The ideal strength of a crystal is about a tenth of its modulus."""
 INITIAL = (1e-5, math.inf), (0.0, math.inf)
 """Usual and possible sizes of an initial stress, if there is any, over
 the strength."""
@@ -246,12 +249,13 @@ def doubt_strengths(
     """
     friction, modulus = problem.friction, problem.solid.shear_modulus
     pressure = problem.given_pressure if pressure is None else pressure
-    compared = [("strength", strength, "shear modulus", modulus, RIGIDITY)]
+    rigidity = (RIGIDITY[0][0], STRONG if modulus > STIFF else RIGIDITY[0][1]), RIGIDITY[1]
+    compared = [("strength", strength, "shear modulus", modulus, rigidity)]
     if pressure is not None:
         mean = float(np.mean(pressure))
         compared.append(("strength", strength, "normal pressure", mean, FRICTION))
     if residual:
-        compared.append(("residual_strength", residual, "shear modulus", modulus, RIGIDITY))
+        compared.append(("residual_strength", residual, "shear modulus", modulus, rigidity))
     doubts = [
         Doubt(
             f"{name}: its mean, {mean:.4g} Pa, is {mean / of:.2g} times the {what}. Check the"
