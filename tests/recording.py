@@ -131,10 +131,9 @@ def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
     return test
 
 
-def refusals(file: str, scope: dict[str, Any]) -> Callable[..., None]:
-    """A test of each call that the records of a file hold as text, with words of its refusal."""
-    path = Path(file).parents[1] / "records" / f"{Path(file).stem.removeprefix('test_')}.json"
-    words: Mapping[str, Any] = read(path)
+def refusals(name: str, scope: dict[str, Any]) -> Callable[..., None]:
+    """A test of each call that a record of this name holds as text, with words of its refusal."""
+    words: Mapping[str, Any] = read(Path(__file__).parent / "records" / f"{name}.json")
 
     @pytest.mark.parametrize("call", words)
     def test(call: str) -> None:

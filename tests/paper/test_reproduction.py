@@ -77,23 +77,11 @@ def test_readings_that_differ_leave_a_statement_to_the_text_and_limits_are_varie
     # A reading that decides nothing does not make the others differ.
     assert finding({"a": 0.2, "c": 0.9}).verdict is OPEN
     assert [series.label for series in found.judged] == ["(a) n", "(c) n"]
-    for number, rule, otherwise in (
-        (0.55, rules.below(1.0, "why"), {"half": OPEN}),
-        (1.5, rules.below(1.0, "why"), {"twice": HOLDS}),
-        (0.55, LOW, {}),  # a printed limit is no choice
-        (4.7, rules.within(3.0, 5.0, "why"), {"half": FAILS}),  # 3.5 to 4.5 would be half
-        (5.5, rules.within(3.0, 5.0, "why"), {"twice": HOLDS}),
-        (-4.7, rules.within(-5.0, -3.0, "why"), {"half": FAILS}),
-        (0.2, rules.within(-1.0, 1.0, "why"), {}),
-        (0.6, rules.within(0.0, 1.0, "why"), {"half": FAILS}),  # nothing is its limit
-        # of shares 0.9 becomes 0.82 and 0.95, and one half a third and two thirds
-        (0.93, rules.above(0.9, "why", share=True), {"twice": FAILS}),
-        (0.85, rules.above(0.9, "why", share=True), {"half": HOLDS}),
-        (0.6, rules.above(0.5, "why", share=True), {"twice": FAILS}),
-        (0.62, rules.below(0.5, "why", share=True), {"twice": HOLDS}),
-    ):
+    # A limit of a paper is varied if it is a choice, a share by its odds; zero is no such limit.
+    for rule, number, otherwise in recorded("limits"):
+        rule, verdicts = eval(rule), {way: Verdict[name] for way, name in otherwise.items()}
         error = 0.1 if rule.text.startswith("below 1") else 0.005
-        assert finding({"a": number}, rule, error).otherwise == otherwise, rule.text
+        assert finding({"a": number}, rule, error).otherwise == verdicts, rule.text
 
 
 def test_only_public_names_are_used():
@@ -105,21 +93,10 @@ def test_only_public_names_are_used():
         assert not re.search(r"^\s*(from stiction|import stiction\.)", text, re.MULTILINE), path
 
 
-@pytest.mark.parametrize(
-    ("function", "exact"),
-    [
-        (estimates.mean, 2.0),
-        (estimates.deviation, 1.0),
-        (estimates.skewness, 0.0),
-        (lambda v: estimates.quantile(v, 0.25), 2.0 - 0.67449),
-        (estimates.lower_spread, 0.67449),
-        (estimates.root_mean_square, 5.0**0.5),
-        (lambda v: estimates.share(v > 2.0), 0.5),
-    ],
-)
+@pytest.mark.parametrize(("function", "exact"), recorded("estimates"))
 def test_errors_are_the_scatter_of_repeated_samples(function, exact):
     samples = np.random.default_rng(0).normal(2.0, 1.0, (300, 400))
-    found = [function(values) for values in samples]
+    found = list(map(eval(function), samples))
     values = np.array([number.value for number in found])
     assert values.mean() == pytest.approx(exact, abs=5 * values.std() / 300**0.5 + 0.01)
     assert np.mean([n.error for n in found]) == pytest.approx(values.std(), rel=0.2)
@@ -327,43 +304,18 @@ def test_the_page_is_written_with_every_figure_and_one_figure_needs_its_studies_
     assert studies == {"theory", "moments"}
 
 
-OWN = """
-correlation_ratios = [0.5, 1.0, 3.0]
-loading_rate = 3e7
-[problem.interface]
-length = 0.15
-nodes = 1536
-[problem.friction]
-weakening_rate = 0.4e12
-residual_strength = 2e5
-[random.strength.marginal]
-type = "lognormal"
-mean = 1e6
-cv = 0.2
-"""
-
-
 SETS = {
-    path.stem: path.read_text("utf-8") for path in ROOT.glob("reproduction/parameters/*.toml")
+    path.stem: path.read_text("utf-8")
+    for folder in ("reproduction/parameters", "tests/records")
+    for path in (ROOT / folder).glob("*.toml")
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "parts"),
-    [
-        (OWN, ("L = 0.15 m, 1536 nodes", "30 MPa/s", "correlation lengths 0.5, 1, 3")),
-        (
-            SETS["rubber"],
-            ("L = 0.2 m", "G</i>* = 1.96 MPa", "because an event is arrested in their samples"),
-        ),
-        (SETS["fault"], ("L = 100 km", "residual strength of 60 MPa", "0.67 kPa/s")),
-    ],
-    ids=["lognormal", "rubber", "fault"],
-)
-def test_samples_and_parameters_of_ones_own(text, parts, tmp_path):
+@pytest.mark.parametrize(("name", "parts"), recorded("own_parameters"))
+def test_samples_and_parameters_of_ones_own(name, parts, tmp_path):
     """The page speaks of these parameters, with units by the size of the numbers."""
-    (tmp_path / "my.toml").write_text(text)
+    (tmp_path / "my.toml").write_text(SETS[name])
     call = ("--quick", "--parameters", tmp_path / "my.toml", "--out", tmp_path / "out")
     assert "figure 12" in python(ROOT / "reproduction", *call)
     page = re.sub(r'data:image[^"]*', "", (tmp_path / "out/report.html").read_text("utf-8"))

@@ -38,7 +38,6 @@ FIELD = beta_strength(2e-3)
 PRESSED = make_problem(load=st.Load(normal_pressure=2e6))
 OTHER = make_problem(weakening_rate=0.9 * RATE, load=st.Load(initial_stress=3e4))
 PAIR = ("strength", "residual_strength")
-THREE = {PAIR: 0.9, ("strength", "initial_stress"): 0.9, (PAIR[1], "initial_stress"): -0.9}
 
 
 def of(module):
@@ -52,7 +51,6 @@ def field(marginal=FIELD.marginal, spectrum=FIELD.spectrum, **options):
 
 COEFFICIENT = field(st.Lognormal(mean=0.5, cv=0.15), quantity="friction_coefficient")
 LOGNORMAL = field(st.Lognormal(mean=1.1e6, cv=0.2))
-FINE = field(LOGNORMAL.marginal, st.PowerLawSpectrum(2e-9))
 
 
 def several(*names, **options):
@@ -122,27 +120,15 @@ def judged(mean=1e6, **given):
 
 
 KNOWN = xr.DataArray(FIELD.sample(LINE, seed=9)[0][:90], {"x": LINE.x[:90]}, "x")
-LAID = dataclasses.replace(
-    make_problem(residual_ratio=0.7, load=st.Load(normal_pressure=4000.0)),
-    interface=st.Interface(0.1, 256, width=0.006),
-)
 LAP = dataclasses.replace(
     loaded(), interface=st.Interface(0.1, 256, width=0.03), load=st.Load(pressing_force=6e3)
-)
-CLAMPED = dataclasses.replace(
-    joint.PROBLEM, load=st.Load(pressing_force=5e6 * joint.PROBLEM.area)
 )
 STEEPENING = st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.7, 0.0], weakening_rate=0.25e12)
 EXPONENTIAL = st.ExponentialWeakening(weakening_rate=RATE)
 TAU_P = beta_strength(0.25 * LENGTH).sample(st.Interface(0.05, 512), seed=1)
-VARYING = make_problem(weakening_rate=RATE * (1.0 + 0.1 * np.cos(NODE / 41.0)))
-RISING = np.linspace(1e11, 2e11, 256)
 SPECIMEN = crooked(load=st.Load())
-ROUGH = rough(SPECIMEN, 1)
 EVENTS = crooked(nodes=64, drive=st.Pusher(height=0.006, width=0.004, stiffness=3e7))
 STRONG = rough(EVENTS, 3)
-FALLING = st.ExponentialWeakening(weakening_rate=1e11, residual_strength=5e5)
-STIFF = st.Platen(stiffness=float("inf"))
 FAULT = setups.within(make_problem(residual_strength=2e5), (0.02, 0.08))
 SHORT = make_problem(64, 0.04)
 

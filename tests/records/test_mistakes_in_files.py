@@ -11,7 +11,7 @@ import numpy as np
 import setups
 import small_study as studies
 import xarray as xr
-from recording import inside, mistakes
+from recording import inside, mistakes, refusals
 from setups import LOCAL, make_problem
 from small_study import altered, small_study
 
@@ -25,7 +25,6 @@ X = LINE.x
 SYSTEM = make_problem(NODES, weakening_rate=0.15e12)
 STRENGTH = 1e6 - 4e5 * np.exp(-(((X - 0.06) / 4e-3) ** 2)) + 1e6 * X
 MAP = xr.DataArray(np.full((32, 16), 1e6), PLANE.coordinates, ("x", "y"), name="strength")
-COARSE = np.linspace(0.0, 0.1, 41)[:-1] + 1e-3
 
 
 def labelled(strength=STRENGTH, x=X, **attributes):
@@ -109,13 +108,10 @@ def scanned(**given):
 
 BETWEEN = {"type": "lognormal", "mean": 1.0, "cv": 0.1}
 LENGTH = "random.strength.spectrum.correlation_length"
-POWER = {"type": "power_law", "correlation_length": 3e-3}
 COUNT, SPACING = 400, 2e-4
 PIECE = st.Interface(COUNT * SPACING, COUNT)
 FIELD = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), True)
 VALUES = FIELD.sample(st.Interface(3 * COUNT * SPACING, 3 * COUNT), seed=5)[0, :COUNT]
-REST = np.random.default_rng(1).standard_normal(COUNT)
-GIVEN = {"type": "exponential", "correlation_length": 1e-3}
 
 
 def fitted(values=VALUES, x=PIECE.x, spectrum="exponential", **options):
@@ -191,7 +187,6 @@ def with_law(law):
     return make_problem(512, 0.05, friction=law)
 
 
-SMALL_PLANE = make_problem((24, 20), (0.023, 0.0164), weakening_rate=0.28e12)
-TWO = {"problem.interface.nodes": [128, 256]}
 SCOPE = vars(setups) | vars(studies)
 test_each_mistake_is_refused_as_recorded = mistakes(__file__, SCOPE | globals())
+test_a_refusal_holds_the_words_that_lead_on = refusals("words", SCOPE | globals())

@@ -1,5 +1,6 @@
 """Imports run downwards (docs/developers/architecture.md); kernels depend on kernels only."""
 
+import configparser
 import dataclasses
 import os
 import re
@@ -64,7 +65,13 @@ def test_a_package_adds_one_of_each_kind_as_the_page_shows(tmp_path):
     (tmp_path / "torn.toml").write_text(study.replace('"square"', '"torn"'))
     offered = tomllib.loads(entries)["project"]["entry-points"]
     offered["stiction.laws"]["torn"] = "my_package:NoSuchLaw"
-    write_package(tmp_path, offered)
+    # What an installed package leaves beside its modules.
+    info, points = tmp_path / "my_package-1.0.dist-info", configparser.ConfigParser()
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+    points.read_dict(offered)
+    with (info / "entry_points.txt").open("w") as file:
+        points.write(file)
     places = {"cwd": tmp_path, "MPLBACKEND": "Agg"}
     places["PYTHONPATH"] = os.pathsep.join(map(str, (tmp_path, SOURCES.parent)))
     said = python("-c", READ, **places)
@@ -72,19 +79,6 @@ def test_a_package_adds_one_of_each_kind_as_the_page_shows(tmp_path):
     # What cannot be imported is an error where it is named.
     words = "'torn' of the package my-package (entry point of stiction.laws) cannot be used"
     assert words in said.splitlines()[-1]
-
-
-def write_package(folder: Path, entry_points: dict[str, dict[str, str]]) -> None:
-    """What an installed package leaves beside its modules."""
-    info = folder / "my_package-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
-    lines = [
-        line
-        for group, points in entry_points.items()
-        for line in (f"[{group}]", *(f"{name} = {place}" for name, place in points.items()))
-    ]
-    (info / "entry_points.txt").write_text("\n".join(lines))
 
 
 def test_a_class_is_named_by_files_once_it_is_registered():

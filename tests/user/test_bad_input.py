@@ -106,14 +106,6 @@ def test_what_people_study_raises_no_doubt():
                 doubt_strengths(system, 1e3 * strength)
 
 
-def test_a_mistake_in_a_list_names_its_place_whatever_holds_the_list():
-    """Positions; a misplaced argument is told every name that a class takes."""
-    words = "missing.1: must be a valid number"
-    refuses(words, lambda: st.read_profile([1.0, 2.0], missing=[1.0, [2.0]]))
-    words = "by name (valid: ... youngs_modulus)"
-    refuses(words, lambda: st.Solid(7e10, 0.3, 2700.0, "strain", 1.0))
-
-
 def test_a_model_of_others_may_hold_plain_dataclasses():
     """A key that such a dataclass does not have stands beside the other mistakes."""
 
@@ -132,9 +124,3 @@ def test_a_model_of_others_may_hold_plain_dataclasses():
     assert "Owner.plain: unknown 'q'" in problems
     assert "Owner.either: unknown 'r'" in problems
     assert any(text.startswith("Owner.plain.p: must be a valid number") for text in problems)
-
-
-def test_an_absent_file_of_interfaces_is_not_called_wrong_json(tmp_path):
-    (tmp_path / "study.toml").write_text('random = "gone.json"\n')
-    words = "gone.json: does not exist"
-    refuses(words, lambda: st.Study.from_toml(tmp_path / "study.toml"))

@@ -51,10 +51,8 @@ def test_interrupted_from_outside(runs, study):
     signal.signal(signal.SIGINT, signal.default_int_handler)
     study.write_text(TEXT.replace("samples = 100", "samples = 3_000_000"))
     command = [sys.executable, "-m", "stiction", "run", str(study), "--out", "run"]
-    environment = os.environ | {"COLUMNS": "200"}
-    with subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, env=environment
-    ) as process:
+    options = {"stderr": subprocess.PIPE, "text": True, "env": os.environ | {"COLUMNS": "200"}}
+    with subprocess.Popen(command, **options) as process:
         deadline = time.monotonic() + 120.0
         while not Path("run/study.json").exists():
             assert time.monotonic() < deadline

@@ -68,9 +68,8 @@ def test_files_of_testing_machines(tmp_path):
     folder.mkdir()
     refuses("no file", lambda: st.read_curve(folder))
     for name in ("a.csv", "b.txt"):
-        (folder / name).write_text(
-            "\n".join(["Prüfer;M. Muster", head, *rows]).replace(".", ",")
-        )
+        text = "\n".join(["Prüfer;M. Muster", head, *rows])
+        (folder / name).write_text(text.replace(".", ","))
     (folder / "remarks.md").write_text("ground with 400")
     (tmp_path / "blocks.csv").write_text("\n".join([head, *rows, "", head, *rows]))
     numbered = [f"{test};{row}" for test in (7, 9) for row in rows]
@@ -83,22 +82,14 @@ def test_files_of_testing_machines(tmp_path):
         curves = st.read_curve(source)
         assert [curve.name for curve in curves] == names
         assert all(is_machine(curve, 0.0) for curve in curves)
-    frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine(), "F2 (N)": machine()})
-    refuses("force='load (N)' or force='F2 (N)'", lambda: st.read_curve(frame))
-    over_time = st.read_curve(frame, force=1)
-    frame, both = frame[["time (s)", "load (N)"]], frame
-    refuses("test: line ... goes back", lambda: st.read_curve(pd.concat([frame, frame])))
-    assert (over_time[0].travel_unit, over_time[0].peak_travel) == ("s", pytest.approx(6.0))
-    assert is_machine(st.read_curve(both, speed=1e-4, force=2)[0], 0.0)
+    frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine()})
+    assert is_machine(st.read_curve(frame, speed=1e-4)[0], 0.0)
     with pytest.warns(st.AccuracyWarning, match="negative"):
-        assert is_machine(
-            st.read_curve(frame.assign(**{"load (N)": -machine()}), speed=1e-4)[0], 0.0
-        )
+        assert is_machine(st.read_curve(frame * [1.0, -1.0], speed=1e-4)[0], 0.0)
     with pytest.warns(st.AccuracyWarning, match="ends at its peak in test"):
         st.read_curve(frame[:1000], speed=1e-4)
-    several = [
-        st.read_curve((TRAVEL, k * machine() * u.N), travel_unit="m")[0] for k in (1, 2, 3)
-    ]
+    forces = (k * machine() * u.N for k in (1, 2, 3))
+    several = [st.read_curve((TRAVEL, force), travel_unit="m")[0] for force in forces]
     peaks = make_peaks(Curves(tuple(several)))
     assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
 
@@ -147,9 +138,9 @@ def test_predicted_curves_come_back_from_a_machine(paths):
 
 
 def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
-    def predicted(field):
-        method = st.Equilibrium(events=60)
-        return st.monte_carlo(BLOCKS, field, method=method, samples=60, seed=5, progress=False)
+    def predicted(field, events=60, samples=60):
+        given = {"method": st.Equilibrium(events=events), "samples": samples, "seed": 5}
+        return st.monte_carlo(BLOCKS, field, progress=False, **given)
 
     curves = curves_of(paths)
     own = predicted(FIELD)
@@ -160,9 +151,7 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     wrong = st.statistics.agreement(predicted(stronger), curves, replicates=400)
     assert wrong.p_values["first_load"] < 0.01
     assert "p-value, first_load" in str(wrong)
-    few = st.monte_carlo(
-        BLOCKS, FIELD, method=st.Equilibrium(events=1), samples=20, seed=5, progress=False
-    )
+    few = predicted(FIELD, events=1, samples=20)
     refuses("keeps 1 of", lambda: st.statistics.agreement(few, curves))
     axes = st.plot.monte_carlo(own, measured=curves)
     assert axes.lines[-1].get_xdata() == pytest.approx(curves.peaks)
@@ -180,44 +169,6 @@ def test_p_values_hold_for_four_tests():
         error = (level * (1.0 - level) / p.size) ** 0.5
         assert np.mean(p <= level) < level + 3.0 * error
         assert np.mean(p <= level) > 0.6 * level
-
-
-def test_slip_loads_over_clamping_forces(tmp_path):
-    """EN 1090-2, annex G: two surfaces, a force of each test, and two slip loads of a specimen."""
-    path = tmp_path / "slip.csv"
-    loads, forces = (
-        np.array([196.1, 173.4, 188.7, 183.6]),
-        np.array([392.0, 388.5, 390.1, 391.7]),
-    )
-
-    def written(loads=loads, forces=forces, names=(1, 1, 2, 3), head="clamping force [N]"):
-        rows = [f"{n};{a};{f}" for n, a, f in zip(names, loads, forces, strict=True)]
-        path.write_text("\n".join([f"specimen;slip load [kN];{head}", *rows]))
-        return path
-
-    expected = loads / (2.0 * forces)
-    peaks = st.read_peaks(written(forces=1e3 * forces), normal="clamping force [N]", surfaces=2)
-    np.testing.assert_allclose(peaks.values[0], expected, rtol=1e-12)
-    np.testing.assert_allclose(peaks.normal_forces[0], 1e3 * forces, rtol=1e-12)
-    assert (peaks.unit, peaks.specimens[0].tolist()) == ("1", ["1", "1", "2", "3"])
-    assert "normal force" in str(peaks)
-    peaks = st.read_peaks(written(), normal=196e3, surfaces=2)
-    np.testing.assert_allclose(peaks.values[0], loads / 392.0, rtol=1e-12)
-    clamping = {"normal": "clamping force [N]", "surfaces": 2}
-    refuses("0.05 and 1 ... swapped", lambda: st.read_peaks(written(), **clamping))
-    swapped = {"value": 2, "normal": "slip load [kN]"}
-    refuses("swapped", lambda: st.read_peaks(written(forces=1e3 * forces), **swapped))
-    holes = [392e3, "", 390e3, 391e3]
-    refuses(
-        "no positive force in line 3", lambda: st.read_peaks(written(forces=holes), **clamping)
-    )
-    refuses("2 specimens", lambda: st.read_peaks(written(names=(1, 1, 2, 2))))
-    refuses("unit ... normal force", lambda: st.read_peaks(
-        written(head="clamping force"), normal="clamping force"))  # fmt: skip
-    refuses("surfaces: needs normal", lambda: st.read_peaks(written(), surfaces=2))
-    mu = tmp_path / "mu.csv"
-    mu.write_text("test,COF\n1,0.3\n2,0.4\n3,0.35\n")
-    refuses("coefficients already", lambda: st.read_peaks(mu, normal=1e3))
 
 
 def test_readings_that_are_no_friction():

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recording import read
 
 import stiction as st
 
@@ -26,9 +27,7 @@ DATA = ROOT / "examples" / "data"
 def blocks(page, language):
     """Fenced blocks of a page, without the indentation that they have inside a list."""
     text = (ROOT / page).read_text("utf-8")
-    found = re.findall(
-        rf"^( *)```{language}\n(.*?)^ *```", text, flags=re.DOTALL | re.MULTILINE
-    )
+    found = re.findall(rf"(?sm)^( *)```{language}\n(.*?)^ *```", text)
     return [re.sub(rf"^{indent}", "", block, flags=re.MULTILINE) for indent, block in found]
 
 
@@ -66,36 +65,17 @@ def of_decisions(found):
     assert str(found["design"]).split()[2] == "value"
 
 
-SHOWN = {
-    "docs/guide/studies.md": (len, {r"\bsamples=[\d_]+": "samples=4"}),
-    "docs/tutorials/profile.md": (of_profile, {
-        "bootstrap=200": "bootstrap=20",
-        "joint, fit, ": "joint, fit.interfaces(4), ",
-    }),
-    "docs/tutorials/friction-test.md": (of_friction_test, {
-        "bootstrap=60": "bootstrap=20",
-        "samples=20": "samples=4",
-        "samples=100": "samples=40",
-    }),
-    "docs/guide/failure-probability.md": (len, {}),
-    "docs/tutorials/peak-forces.md": (len, {}),
-    "docs/tutorials/slip-factors.md": (len, {}),
-    "docs/guide/planes-and-ends.md": (len, {}),
-    "docs/guide/reading-data.md": (len, {}),
-    "docs/guide/specimens.md": (len, {}),
-    "docs/evidence/laboratory-fault.md": (len, {}),
-    "docs/tutorials/joint.md": (of_decisions, {
-        "between=True": "between=True, bootstrap=20",
-        "probability=1e-3, method": "probability=0.03, method",
-        "nodes=256": "nodes=128",
-    }),
-}  # fmt: skip
-SHOWN_OUTPUT = re.compile(
-    r"^```python\n(.*?)^```\n(?:```\n(.*?)^```)?", re.DOTALL | re.MULTILINE
-)
+SHOWN = read(ROOT / "tests" / "records" / "pages.json")
+"""Pages whose python runs, with the words that make it shorter."""
+CHECKS = {
+    "docs/tutorials/profile.md": of_profile,
+    "docs/tutorials/friction-test.md": of_friction_test,
+    "docs/tutorials/joint.md": of_decisions,
+}
+SHOWN_OUTPUT = re.compile(r"(?sm)^```python\n(.*?)^```\n(?:```\n(.*?)^```)?")
 
 
-def run_blocks(text, scope, replaced=()):
+def run_blocks(text, scope, replaced):
     """Run the blocks of a page and compare what they print with the output that follows them.
 
     A number may differ by two units of its last printed digit, because other processors round
@@ -104,7 +84,7 @@ def run_blocks(text, scope, replaced=()):
     exact = True
     for code, expected in SHOWN_OUTPUT.findall(text):
         block = code
-        for words, shorter in dict(replaced).items():
+        for words, shorter in replaced.items():
             block = re.sub(words, shorter, block)
         exact = exact and block == code
         printed = io.StringIO()
@@ -138,15 +118,14 @@ def test_python_of_a_page(page, monkeypatch, tmp_path):
     table = np.column_stack([problem.interface.x, strength.sample(problem.interface)[0]])
     np.savetxt("profile.csv", table, delimiter=",", header="x (m),strength (Pa)", comments="")
     scope = {"st": st, "problem": problem, "strength": strength}
-    check, less = SHOWN[page]
-    run_blocks((ROOT / page).read_text("utf-8"), scope, less)
-    check(scope)
+    run_blocks((ROOT / page).read_text("utf-8"), scope, SHOWN[page])
+    CHECKS.get(page, len)(scope)
 
 
 def test_the_readme_prints_what_it_shows(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert [bool(output) for _, output in SHOWN_OUTPUT.findall(README)] == 3 * [True]
-    run_blocks(README, {})
+    run_blocks(README, {}, {})
     assert (tmp_path / "joint.png").stat().st_size > 10_000
 
 

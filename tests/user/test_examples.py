@@ -103,7 +103,7 @@ def test_line_arrives_with_a_spectral_element_code():
     run = st.simulate_rupture(
         problem,
         np.full(300, FAULT.STRENGTH),
-        method=st.Rupture(load_history=still, implicit=False, stop="time", end_time=7.0),
+        method=st.Rupture(load_history=still, implicit=False, stop="time", end_time=5.3),
         save=st.Save([], every=1000),
     )
     places = [3e3, 6e3, 9e3, 12e3, 14.9e3]

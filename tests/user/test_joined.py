@@ -7,6 +7,7 @@ import pytest
 import scipy.stats
 from refusals import refuses
 from setups import make_problem
+from stand_ins import StandIn
 
 import stiction as st
 from stiction.inference.specimens import PRIOR_SCALE
@@ -155,3 +156,29 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     assert len(both.notes) == 1  # nine tests say more about the scatter than three
     with pytest.warns(st.AccuracyWarning, match="say little about the scatter"):
         st.infer(PROBLEM, ROUGH, PEAKS[:3], between="lognormal", **LOCAL)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.45])
+def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
+    """Correlations of 0.1 to 0.8: the onsets are those of a simulation at every node."""
+
+    def mixed(rows, stress):
+        """A share of the local onset, and the strength at one node for the rest."""
+        return share * stress + (1.0 - share) * 0.8 * rows.strength[:, 5]
+
+    peaks = np.array([0.78e6, 0.83e6, 0.8e6, 0.86e6])
+    given = LOCAL | {"prior": {"correlation_length": (2e-3, 6e-3)}, "method": StandIn(mixed)}
+    guided = st.infer(PROBLEM, ROUGH, peaks, **given)
+    options = {"samples": 300, "progress": False, "pilot": False}
+    onsets = [
+        st.monte_carlo(PROBLEM, ROUGH, method=method, **options).critical_stress.values
+        for method in (StandIn(mixed), st.LocalCriterion())
+    ]
+    alike = np.corrcoef(*onsets)[0, 1]
+    assert 0.1 < alike < 0.8
+    monkeypatch.setattr(st.LocalCriterion, "unfit_as_guide", lambda *_: "no guide")
+    alone = st.infer(PROBLEM, ROUGH, peaks, **given)
+    for one, other in zip(guided.likelihood.densities, alone.likelihood.densities, strict=True):
+        assert one.onsets.shape == other.onsets.shape
+    length = alone.mean["correlation_length"]
+    assert guided.mean["correlation_length"] == pytest.approx(length, rel=1e-6)

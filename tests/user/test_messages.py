@@ -73,18 +73,6 @@ def test_a_doubt_of_a_unit_comes_instead_of_advice_that_follows_from_it():
         assert ("interface.nodes: must be" in str(caught.value)) == (modulus == 1e8)
 
 
-def test_names_are_found_in_any_case_and_among_all_valid_keys():
-    words = "did you mean 'youngs_modulus' ... valid: shear_modulus, "
-    refuses(words, lambda: st.Solid(young_modulus=3e9, poisson_ratio=0.3, density=1e3))
-    for key, value, meant in (
-        ("random__strength__marginal__type", "BETA", "'beta'"),
-        ("method__type", "LOCAL_CRITERION", "'local_criterion'"),
-        ("problem__solid__Density", 1e3, "'density'"),
-    ):
-        plain = altered(small_study(256), **{key: value})
-        refuses(f"did you mean {meant}", lambda plain=plain: st.Study.from_dict(plain))
-
-
 def test_what_stands_in_the_place_of_a_random_field_gets_one_line():
     """An array was refused number by number; a field that goes into the wrong call is led on."""
     problem, field = make_problem(), beta_strength(4e-3)
@@ -159,6 +147,7 @@ def test_files_that_are_no_study_get_one_line_that_says_what_to_do(inside, runs)
     study = text(title="Größe")
     contents = {
         "tab.toml": (b'peaks = "data\\tau.csv"\n' + text().encode(), "write / for \\, or"),
+        "gone.toml": (b'random = "gone.json"\n', "gone.json: does not exist"),
         "letter.toml": (b'peaks = "data\\xau.csv"', "in paths, write / for \\, or"),
         "latin.toml": (study.encode("latin-1"), "save it as UTF-8"),
         "json.toml": (b'{"problem": 1}', "`stiction example FILE` writes a study"),

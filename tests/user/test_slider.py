@@ -25,7 +25,7 @@ def coefficient(value):
     return xr.DataArray(value, attrs={"units": "1"})
 
 
-test_what_a_slider_does_not_take = refusals(__file__, globals())
+test_what_a_slider_does_not_take = refusals("slider", globals())
 
 
 def test_coefficients_times_the_mean_pressure():

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from joint import FIELD, PROBLEM
+from joint import PROBLEM
 from refusals import refuses
 from setups import EXACT
 
@@ -86,7 +86,7 @@ def test_the_elastic_model_has_no_effect_on_a_joint_that_equals_the_specimens(wr
     softer = dataclasses.replace(JOINT, solid=dataclasses.replace(JOINT.solid, density=1.0))
     coefficients = []
     for joint, method in ((JOINT, None), (JOINT, st.LocalCriterion()), (softer, EXACT)):
-        posterior = st.infer(joint, None, peaks, method=method, **QUIET)
+        posterior = st.infer(joint, None, peaks, method=method, between="lognormal", **QUIET)
         design = st.design_stress(joint, posterior, probability=1e-3, **ASKED)
         coefficients.append(design.friction_coefficient)
     # Quantiles are found to 1e-6 of their logarithm; the grid moves with the strength.
@@ -100,7 +100,8 @@ def test_the_unit_is_a_specimen(written):
         named = written(lines_of(FACTORS, names="{0}{1}"))
     assert named.specimens[0].tolist() == twice.specimens[0].tolist()
     single = dataclasses.replace(twice, specimens=None)
-    unit, tens = (st.infer(JOINT, None, peaks, **QUIET) for peaks in (twice, single))
+    given = QUIET | {"between": "lognormal"}
+    unit, tens = (st.infer(JOINT, None, peaks, **given) for peaks in (twice, single))
     assert (unit.specimens, tens.specimens) == (5, 10)
     widths = [np.ptp(posterior.interval["between"]) for posterior in (unit, tens)]
     assert widths[0] > widths[1]
@@ -125,11 +126,29 @@ def test_values_of_the_standards(written):
     assert needed == (math.floor((cv / 3.5) ** 2) + 1 if cv > 8.0 else 5)
 
 
-def test_bad_input_is_refused(written):
-    peaks = written(lines_of(FACTORS))
-    refuses("method: is needed with a random", lambda: st.infer(JOINT, FIELD, peaks))
-    prior = {"marginal.cv": (0.1, 0.2)}
-    refuses("can hold mean and between", lambda: st.infer(JOINT, None, peaks, prior=prior))
+def test_slip_loads_over_clamping_forces(written):
+    """EN 1090-2, annex G: a force of each test, and two slip loads of a specimen."""
+    rows = lines_of(FACTORS)
+    loads, forces = np.array([row.split(";")[1:] for row in rows], dtype=float).T
+    peaks = written(rows, surfaces=2)
+    np.testing.assert_allclose(peaks.values[0], loads / (2.0 * forces), rtol=1e-12)
+    np.testing.assert_allclose(peaks.normal_forces[0], 1e3 * forces, rtol=1e-12)
+    assert (peaks.unit, peaks.specimens[0].tolist()) == ("1", [*"1122334455"])
+    assert "normal force" in str(peaks)
+    peaks = written(rows, normal=196e3, surfaces=2)
+    np.testing.assert_allclose(peaks.values[0], loads / 392.0, rtol=1e-12)
+    swapped = "specimen;clamping force (kN);slip load (kN)"
+    refuses("0.05 and 1 ... order of the two columns", lambda: written(rows, swapped))
+    units = "specimen;slip load (N);clamping force (kN)"
+    refuses("their units", lambda: written(rows, units))
+    holes = [*rows[:4], "3;180.0;", *rows[5:]]
+    refuses("no positive force in line 6", lambda: written(holes))
+    refuses("holds 2 specimens", lambda: written(rows[:4]))
+    bare = "specimen;slip load (kN);clamping force"
+    refuses("unit ... normal force", lambda: written(rows, bare, normal="clamping force"))
+    refuses("surfaces: needs normal", lambda: written(rows, normal=None, surfaces=2))
+    coefficients = ["1;0.3", "2;0.4", "3;0.35"]
+    refuses("coefficients already", lambda: written(coefficients, "test;COF", normal=1e3))
 
 
 def test_statistics_without_a_name_are_no_tests(written):

@@ -1,6 +1,5 @@
 """Runs on disk: they go on where they ended, however they ended, to the same bits."""
 
-import copy
 import errno
 import os
 import threading
@@ -23,38 +22,32 @@ from stiction.ensemble.experiment import Experiment
 from stiction.study.run import samples_of_part
 
 STUDY = small_study(
-    samples=120,
+    samples=60,
     seed=3,
     keep=["strength"],
     sweep=[*lengths(4e-3, 6e-3), {"problem.solid.poisson_ratio": [0.25, 0.33]}],
 )
-ALL = 4 * 120
+ALL = 4 * 60
 
 
-class Counting(Executor):
-    """Computes at once and keeps which samples, as spans, in `spans`."""
+class AtOnce(Executor):
+    """Computes at once, but for a piece that is lost, and keeps which samples, as spans."""
 
-    def __init__(self, **others):
-        self.spans, self.others = [], others
+    def __init__(self, lost=0, **others):
+        self.spans, self.lost, self.others = [], lost, others
 
     def submit(self, function, experiment, span):
         self.spans.append(span)
         future = Future()
-        future.set_result(function(experiment, span)._replace(**self.others))
+        if len(self.spans) == self.lost:
+            future.set_exception(OSError("the machine is gone"))
+        else:
+            future.set_result(function(experiment, span)._replace(**self.others))
         return future
 
 
-class Forbidding(Executor):
-    """Fails the test if anything is to be computed."""
-
-    def submit(self, *arguments):
-        pytest.fail("work was begun")
-
-
-def make_study(samples=120, **changes):
-    study = copy.deepcopy(STUDY)
-    study["samples"] = samples
-    return st.Study.from_dict(study | changes)
+def make_study(samples=60, **changes):
+    return st.Study.from_dict(STUDY | {"samples": samples} | changes)
 
 
 @pytest.fixture
@@ -71,25 +64,23 @@ def reference():
 
 def again(folder, executor=None):
     """Run the study again, which says nothing about the store."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        result = make_study().run(out=folder, workers=1, executor=executor)
-    assert not [one for one in caught if one.category is UserWarning]
-    return result
+    with warnings.catch_warnings(action="error", category=UserWarning):
+        warnings.simplefilter("ignore", st.AccuracyWarning)
+        return make_study().run(out=folder, workers=1, executor=executor)
 
 
 # -- what is stored is what is computed ----------------------------------------------------------
 
 
 def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
-    make_study(samples=80).run(out=tmp_path / "run")
-    counting = Counting()
+    make_study(samples=40).run(out=tmp_path / "run")
+    counting = AtOnce()
     assert make_study().run(out=tmp_path / "run", executor=counting).identical(reference)
-    assert min(span.first for span in counting.spans) == 80
-    assert sum(span.samples for span in counting.spans) == 4 * 40
-    assert again(tmp_path / "run", executor=Forbidding()).identical(reference)
-    fewer = make_study(samples=80)
-    words = "samples: 80 here, 120 there"
+    assert min(span.first for span in counting.spans) == 40
+    assert sum(span.samples for span in counting.spans) == 4 * 20
+    assert again(tmp_path / "run", executor=(none := AtOnce())).identical(reference)
+    assert none.spans == []
+    words, fewer = "samples: 40 here, 60 there", make_study(samples=40)
     refuses(words, lambda: fewer.run(out=tmp_path / "run"))
 
 
@@ -107,7 +98,7 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
 
 def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
     options = {"out": tmp_path / "run", "workers": 1, "pilot": False}
-    thread = threading.Thread(target=lambda: make_study().run(**options), daemon=True)
+    thread = threading.Thread(target=lambda: make_study(120).run(**options), daemon=True)
     thread.start()
     seen, done = 0, 0
     while thread.is_alive():
@@ -171,26 +162,10 @@ def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypa
             make_study().run(out=out, workers=1)
 
 
-class Dying(Executor):
-    """Loses its third piece of work."""
-
-    pieces = 0
-
-    def submit(self, function, *arguments):
-        self.pieces += 1
-        future = Future()
-        if self.pieces == 3:
-            future.set_exception(OSError("the machine is gone"))
-        else:
-            future.set_result(function(*arguments))
-        return future
-
-
 def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
-    options = {"out": tmp_path / "run", "executor": Dying(), "workers": 1}
-    refuses(
-        "items ... of point 0 ... is gone", lambda: make_study().run(**options), WorkerError
-    )
+    options = {"out": tmp_path / "run", "executor": AtOnce(lost=3), "workers": 1}
+    words = "items ... of point 0 ... is gone"
+    refuses(words, lambda: make_study().run(**options), WorkerError)
     assert 0 < st.open_run(tmp_path / "run").status().done < ALL
     assert again(tmp_path / "run").identical(reference)
 
@@ -200,17 +175,16 @@ def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
         patch.setattr(batches, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
         make_study(samples=40).run(out=tmp_path / "run")
     with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, not stiction"):
-        make_study(samples=60).run(out=tmp_path / "run")
+        make_study().run(out=tmp_path / "run")
     with pytest.raises(WorkerError, match="Install the same versions"):
-        make_study(samples=40).run(executor=Counting(versions="stiction 99.0"))
+        make_study(samples=40).run(executor=AtOnce(versions="stiction 99.0"))
 
 
 def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
     older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
     store.Store.open(tmp_path / "run", older)
     words = "cannot read its study: method: unknown 'weights'"
-    with pytest.raises(StoreError, match=words):
-        st.open_run(tmp_path / "run")
+    refuses(words, lambda: st.open_run(tmp_path / "run"), StoreError)
 
 
 # -- samples of any ensemble, Dask -----------------------------------------------------------------

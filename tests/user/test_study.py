@@ -175,11 +175,3 @@ def test_a_measured_profile_in_a_file_is_run_and_reported(tmp_path, monkeypatch,
     methods = [{"type": "local_criterion"}, {"type": "equilibrium"}]
     both = st.Study.from_dict(stored.study.to_dict() | {"sweep": [{"method": methods}]}).run()
     assert both.sizes == {"onset_method": 2, "sample": 1}
-    for wrong, words in (
-        ({"samples": 2}, "samples: must be 1"),
-        ({"random": STUDY["random"]}, "random: give either"),
-        ({"profiles": None}, "random: give either"),
-        ({"reliability": {"stress": 1e6}}, "reliability: has no effect"),
-        ({"profiles": {"strength": [1e6, 2e6]}}, "profiles"),
-    ):
-        refuses(words, lambda wrong=wrong: st.Study.from_dict(stored.study.to_dict() | wrong))
