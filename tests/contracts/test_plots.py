@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import itertools
 import re
 from typing import Any
 
@@ -11,6 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.patches import Rectangle
 from contracts.bodies import World, world
 from contracts.test_results import CALLS, LOCAL, QUIET, SHAKEN, design, table
 
@@ -93,6 +95,11 @@ def drawn(panels: Any) -> list[Any]:
         shapes = [(line.get_xydata(), line.get_transform()) for line in axes.lines]
         shapes += [(path.vertices, axes.transData) for lines in axes.collections
                    for path in lines.get_paths() if lines.get_array() is None]  # fmt: skip
+        shapes += [
+            (bar.get_bbox().corners(), axes.transData)
+            for bar in itertools.chain(*axes.containers)
+            if isinstance(bar, Rectangle)
+        ]
         for points, transform in shapes:
             for column, label in enumerate(labels):
                 if transform != across[1 - column]:  # else a share of the height or width
@@ -150,6 +157,77 @@ def test_a_figure_draws_the_numbers_of_its_result_in_their_units(name):
             assert largest == 0.0 or np.any((ratios > 0.05) & (ratios < 20.0)), (unit, largest)
     other = make(body).in_units(Pa=0.25, m=2.0, s=8.0)
     assert_drawn_alike(drawn(draw(other)), shown, 1e-3, other.factor)
+
+
+def points_of(name: str, w: World) -> Any:
+    """Points in SI that a figure has to show, each group as vertices of a single shape."""
+    result = RESULTS.get((CALL_OF.get(name, name), w))
+    if name == "onset":
+        yield w.interface.x, w.strength[0]
+        averaged = st.theory.nucleation_stress(w.problem, w.strength[0])
+        inside = np.isfinite(averaged)  # elsewhere no window fits
+        yield w.interface.x[inside], averaged[inside]
+        yield result.critical_position[:1], result.critical_load[:1]
+    elif name == "onset of a plane":
+        yield result.critical_position[0, :1], result.critical_position[0, 1:]
+    elif name == "specimen":
+        yield w.interface.x, w.strength[0] / w.strength[0].mean()
+    elif name == "field":
+        yield w.interface.x, w.strength[0]
+    elif name == "monte_carlo":
+        yield result.critical_force, 0.0 * result.critical_force
+    elif name == "quantiles":
+        for rank, index in ((0.25, 1), (0.5, 0), (0.75, 1)):
+            values = np.quantile(result.critical_force, rank, axis=1, method="median_unbiased")
+            yield result.correlation_length, values
+    elif name == "failure_curve":
+        for which in ("probability", "probability_low", "probability_high"):
+            yield result.stress, result[which]
+    elif name == "sensitivities":
+        table, place = result.sensitivities, np.arange(3.0)[::-1]
+        yield table.force_at_high, place
+        for bar, *ends in zip(place, table.force_at_low, table.force_at_high, strict=True):
+            yield ends, [bar - 0.25]
+    elif name == "agreement":
+        yield PEAKS * w.Pa, np.array([1.0, 2.0, 3.0]) / 3.0
+    elif name == "rupture":
+        yield [result.critical_position], [0.0]
+    elif name == "precursors":
+        yield result.travel[:3], result.force[:3]
+        yield result.event_travel, result.event_force
+        for start, length, at in zip(
+            result.event_start, result.event_length, result.event_travel, strict=True
+        ):
+            yield [at], [start]
+            yield [at], [start + length]
+
+
+CALL_OF = {"onset of a plane": "onset", "specimen": "onset", "quantiles": "sweep"}
+CALL_OF |= {"sensitivities": "sensitive", "rupture": "simulate_rupture"}
+CALL_OF |= {"precursors": "equilibrium_path"}
+
+
+@pytest.mark.parametrize("name", [*{*DRAWN} - {"specimen on a base"}])
+def test_a_figure_has_the_points_that_its_description_names(name):
+    make, body, draw = DRAWN[name]
+    w = make(body)
+    parts = drawn(draw(w))
+    shapes = [
+        np.stack([x, y]) for (x, _), (y, _) in itertools.pairwise(parts)
+        if x.shape == y.shape and x.ndim == 1
+    ]  # fmt: skip
+    for group in points_of(name, w):
+        points = np.broadcast_arrays(*(np.asarray(part, dtype=float) for part in group))
+        size = np.abs(points).max(axis=1)[:, None, None]
+        off = [
+            np.abs(np.stack(points)[:, :, None] - shape[:, None]) / (size + 1e-300)
+            for shape in shapes
+        ]
+        furthest = min(
+            np.nan_to_num(apart.max(axis=0), nan=9.0).min(axis=1, initial=9.0).max()
+            for apart in off
+        )
+        assert furthest < 1e-6, points
 
 
 @pytest.mark.parametrize("name", SAMPLES)
