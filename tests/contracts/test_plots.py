@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.patches import Rectangle
 from contracts.bodies import World, world
 from contracts.test_results import CALLS, LOCAL, QUIET, SHAKEN, design, table
+from matplotlib.patches import Rectangle
 
 import stiction as st
 
@@ -177,7 +177,7 @@ def points_of(name: str, w: World) -> Any:
     elif name == "monte_carlo":
         yield result.critical_force, 0.0 * result.critical_force
     elif name == "quantiles":
-        for rank, index in ((0.25, 1), (0.5, 0), (0.75, 1)):
+        for rank in (0.25, 0.5, 0.75):
             values = np.quantile(result.critical_force, rank, axis=1, method="median_unbiased")
             yield result.correlation_length, values
     elif name == "failure_curve":
