@@ -48,7 +48,7 @@ sampler = dynesty.NestedSampler(
 sampler.run_nested(dlogz=0.5, print_progress=False)
 draws = sampler.results.samples_equal(np.random.default_rng(2))
 posterior = st.infer(
-    problem, strength, peaks, prior=prior, method=method, load_cell_error=error
+    problem, strength, peaks, unit="Pa", prior=prior, method=method, load_cell_error=error
 )
 for i, name in enumerate(names):
     low, high = np.quantile(draws[:, i], [0.05, 0.95])

@@ -60,9 +60,8 @@ def by_tests(tests, seed):
     truth = strength(marginal, np.exp(rng.uniform(np.log(2e-3), np.log(1.2e-2))))
     known = onsets(truth, 20_000, 2000 + seed)
     peaks = rng.permutation(onsets(truth, max(TESTS), 1000 + seed))[:tests]
-    posterior = st.infer(
-        PROBLEM, truth, peaks, prior=PRIOR, method=LOCAL, samples=500, seed=seed, progress=False
-    )
+    options = {"prior": PRIOR, "method": LOCAL, "samples": 500, "seed": seed, "progress": False}
+    posterior = st.infer(PROBLEM, truth, peaks, unit="Pa", **options)
     *ends, length = map(posterior.mean, PRIOR)
     alone = strength(beta(*ends), length)
     stresses = [design(one, seed) for one in (alone, posterior.interfaces(INTERFACES, seed))]

@@ -288,7 +288,7 @@ def infer(machine, table, peaks, rows):
     problem, strength = rig(machine, CENTRAL[0]), strength_of(CENTRAL[1], 0.5, 0.2)
     found, _ = onsets(problem, strength)
     for name, some in (("without drift", peaks), ("as measured", table.before)):
-        agree = st.statistics.agreement(found, np.asarray(some))
+        agree = st.statistics.agreement(found, np.asarray(some), unit="N")
         print(f"agreement, {name}: p = {agree.p_values['cramer_von_mises']:.3f}")
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pint
 import pytest
 import xarray as xr
-from refusals import refuses
+from refusals import refuses, warning_texts
 from setups import LOCAL, make_problem
 
 import stiction as st
@@ -104,6 +104,15 @@ def test_a_profile_of_any_kind_is_its_values_at_the_nodes(kind, argument):
         np.testing.assert_allclose(outcome(call, given), outcome(call, expected), rtol=1e-12)
 
 
+@pytest.mark.parametrize("argument", [*{*ARGUMENTS} - {"fit_field", "read_profile"}])
+def test_a_place_beyond_the_interface_is_doubted(argument):
+    """It is taken modulo the length, and results count from the same origin."""
+    for shift, doubted in ((0.0, False), (0.1 * 100 / NODES, True), (-0.1 / NODES, True)):
+        given = xr.DataArray(STRENGTH, {"x": X + shift}, ("x",), attrs={"units": "Pa"})
+        texts = warning_texts(lambda given=given: ARGUMENTS[argument](given))
+        assert any("modulo the length" in text for text in texts) == doubted, shift
+
+
 PEAKS = np.array([700.0, 720.0, 750.0, 690.0])  # kPa
 TESTS = {
     "array": PEAKS * 1e3,
@@ -122,9 +131,15 @@ TESTS = {
 
 @pytest.mark.parametrize("kind", TESTS)
 def test_peaks(kind):
-    np.testing.assert_allclose(np.sort(make_peaks(TESTS[kind]).values[0]), np.sort(PEAKS) * 1e3)
+    given, unit = TESTS[kind], None
+    if kind in ("array", "list", "Series", "shuffled Series"):
+        unit = "Pa"
+        refuses("unit: is missing", lambda: st.infer(PROBLEM, None, given))
+        refuses("unit: is missing", lambda: st.statistics.agreement(ONSET, given))
+    values = make_peaks(given, unit).values[0]
+    np.testing.assert_allclose(np.sort(values), np.sort(PEAKS) * 1e3)
     if kind != "table":
-        peaks = make_peaks({0.1: TESTS[kind], 0.2 * u.m: TESTS[kind]})
+        peaks = make_peaks({0.1: given, 0.2 * u.m: given}, unit)
         assert peaks.lengths == (0.1, 0.2)
 
 

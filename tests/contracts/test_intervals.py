@@ -117,7 +117,7 @@ def test_intervals_of_a_posterior_hold_its_mean(more):
     field = st.RandomField(TRUTHS["beta"], st.PowerLawSpectrum(4e-3))
     peaks, prior = [5.9e5, 6.2e5, 6.6e5, 7.1e5], {"marginal.low": (5.6e5, 7.2e5)}
     posterior = st.infer(
-        problem, field, peaks, prior=prior | more, method=LOCAL, samples=300, **QUIET
+        problem, field, peaks, unit="Pa", prior=prior | more, method=LOCAL, samples=300, **QUIET
     )
     for name in posterior.names:
         low, high = posterior.interval[name]
@@ -139,9 +139,10 @@ def test_no_answer_takes_more_evaluations_than_allowed(algorithm, most, share):
 
 
 REFUSED = {  # values in another unit, at every call that takes peaks
-    "infer": lambda peaks: st.infer(PROBLEM, FIELD, peaks, method=LOCAL, samples=100, **QUIET),
+    "infer": lambda peaks: st.infer(
+        PROBLEM, FIELD, peaks, unit="Pa", method=LOCAL, samples=100, **QUIET),
     "infer with a prior": lambda peaks: st.infer(
-        PROBLEM, FIELD, peaks, prior={"correlation_length": (2e-3, 6e-3)}, method=LOCAL,
+        PROBLEM, FIELD, peaks, unit="Pa", prior={"correlation_length": (2e-3, 6e-3)}, method=LOCAL,
         samples=100, **QUIET,
     ),
 }  # fmt: skip
@@ -165,7 +166,7 @@ def test_the_field_of_a_fit_is_not_taken_for_the_fit():
     rough = GIVEN | {"target_cv": 0.5}
     peaks, few = [0.9e6, 1e6, 1.1e6], {"method": LOCAL, "samples": 100} | QUIET
     calls = (
-        lambda: st.infer(PROBLEM, fit.field, peaks, **few),
+        lambda: st.infer(PROBLEM, fit.field, peaks, unit="Pa", **few),
         lambda: st.failure_probability(PROBLEM, fit.field, stress, **rough),
         lambda: st.design_stress(PROBLEM, fit.field, probability=0.1, **rough),
         lambda: st.failure_curve(PROBLEM, fit.field, smallest=0.1, **rough),

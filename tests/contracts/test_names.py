@@ -35,7 +35,9 @@ def test_a_key_is_accepted_by_every_call(key):
     ends = {"correlation_length": (3e-3, 5e-3), "marginal.cv": (0.1, 0.2)}[key]
     peaks = {"peaks": [0.95e6, 1e6, 1.05e6], "progress": False, "samples": 100}
     for name in (key, *KEYS[key]):
-        posterior = st.infer(PROBLEM, FIELD, prior={name: ends}, method=LOCAL, **peaks)
+        posterior = st.infer(
+            PROBLEM, FIELD, unit="Pa", prior={name: ends}, method=LOCAL, **peaks
+        )
         assert posterior.names == (key,)
         study = st.Study(
             problem=PROBLEM, random=FIELD, method=LOCAL, samples=1, sweep=[{name: list(ends)}]
@@ -66,7 +68,7 @@ def stated(count):
     marginals = (st.Gamma(mean=0.2 + 0.01 * i, cv=0.15) for i in range(count))
     fields = [dataclasses.replace(FIELD, marginal=marginal) for marginal in marginals]
     given = {"method": LOCAL, "samples": 100, "progress": False}
-    return str(st.infer(PROBLEM, fields, [0.95e6, 1e6, 1.05e6], **given).assumptions)
+    return str(st.infer(PROBLEM, fields, [0.95e6, 1e6, 1.05e6], unit="Pa", **given).assumptions)
 
 
 COUNTED = {  # a text about so many things, and what it says of each that it shows
@@ -99,7 +101,13 @@ def test_a_fit_and_a_posterior_print_the_same_keys():
         quantity="friction_coefficient", progress=False,
     )  # fmt: skip
     posterior = st.infer(
-        PROBLEM, fit, [0.95e6, 1e6, 1.05e6], method=LOCAL, samples=100, progress=False
+        PROBLEM,
+        fit,
+        [0.95e6, 1e6, 1.05e6],
+        unit="Pa",
+        method=LOCAL,
+        samples=100,
+        progress=False,
     )
     assert {*posterior.names} <= {*fit.parameters}
     assert "correlation_length" in fit.parameters

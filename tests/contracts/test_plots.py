@@ -67,7 +67,7 @@ DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body
     "failure_curve": (LOCAL, "line", drawn_by("failure_curve", "failure_curve")),
     "sensitivities": (LOCAL, "line with ends", drawn_by("sensitivities", "sensitive")),
     "agreement": (LOCAL, "line", lambda w, **options: st.plot.agreement(
-        st.statistics.agreement(of("monte_carlo", w), PEAKS * w.Pa), **options)),
+        st.statistics.agreement(of("monte_carlo", w), PEAKS * w.Pa, unit="Pa"), **options)),
     "rupture": (SHAKEN, "line", drawn_by("rupture", "simulate_rupture", "problem")),
     "precursors": (world, "blocks", drawn_by("precursors", "equilibrium_path", "problem")),
 }  # fmt: skip

@@ -40,7 +40,9 @@ def fit(between: bool) -> st.FieldFit:
 
 
 def inferred(random: Any, peaks: Any = PEAKS, **more: Any) -> Any:
-    return st.infer(PROBLEM, random, peaks, method=LOCAL, samples=100, **more, **QUIET)
+    return st.infer(
+        PROBLEM, random, peaks, unit="Pa", method=LOCAL, samples=100, **more, **QUIET
+    )
 
 
 SOURCES: dict[str, Any] = {  # all kinds of random inputs, and what the package makes of them
@@ -72,9 +74,10 @@ CALLS: dict[str, Any] = {  # every call that takes what may be random, here p an
         lambda state: state(state.draws(0, 0, 8)))(st.external.limit_state(p, r, m)),
     "external.simulator": lambda p, r, m: st.external.simulator(
         p, r, ("marginal.cv",), method=m, samples=4)([0.2]),
-    "infer": lambda p, r, m: st.infer(p, r, PEAKS, method=m, samples=100, **QUIET).mean["mean"],
+    "infer": lambda p, r, m: st.infer(
+        p, r, PEAKS, unit="Pa", method=m, samples=100, **QUIET).mean["mean"],
     "infer with a prior": lambda p, r, m: st.infer(
-        p, r, PEAKS, prior={"marginal.cv": (0.1, 0.3)}, method=m, samples=100, **QUIET
+        p, r, PEAKS, unit="Pa", prior={"marginal.cv": (0.1, 0.3)}, method=m, samples=100, **QUIET
     ).mean["marginal.cv"],
     "infer from coefficients": lambda p, r, m: st.infer(
         p, r, PEAKS / 2e6, unit="1", method=m, samples=100, **QUIET).mean["mean"],

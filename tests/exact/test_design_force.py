@@ -124,7 +124,9 @@ def test_a_design_by_specimens_of_solved_samples_is_that_of_an_integral(probabil
 
 def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
     peaks = 0.8e6 * PEAKS
-    posterior = st.infer(LINE, scattering(1e6, 0.2, 0.1), peaks, samples=2000, **LOCAL)
+    posterior = st.infer(
+        LINE, scattering(1e6, 0.2, 0.1), peaks, unit="Pa", samples=2000, **LOCAL
+    )
     exact = Prediction(posterior.likelihood, posterior.grid).quantile(1e-2)
     given = LOCAL | {"probability": 1e-2, "target_cv": 0.2}
     low, high = st.design_stress(LINE, posterior, seed=1, **given).interval["stress"]

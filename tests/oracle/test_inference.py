@@ -86,7 +86,7 @@ def test_posterior_of_one_parameter(name):
     peaks = simulate(base, field(truth), method, count, 4)
     samples = 1500 if method is LOCAL else 150
     options = {"method": method, "samples": samples, "progress": False}
-    found = st.infer(base, field(prior[0]), peaks, prior={key: prior}, **options)
+    found = st.infer(base, field(prior[0]), peaks, unit="Pa", prior={key: prior}, **options)
     own = found.draws[key]
     near = np.linspace(*np.clip(truth + 0.2 * np.array([-1, 1]) * np.ptp(prior), *prior), 13)
     mean, deviation = by_counting(base, field, method, near, peaks, samples)
@@ -133,5 +133,5 @@ def test_a_posterior_by_a_criterion_that_does_not_hold_says_so():
     peaks = simulate(base, random, LOCAL, 40, 3)
     options = {"prior": {"marginal.cv": (0.3, 1.5)}, "samples": 300, "progress": False}
     with pytest.warns(st.AccuracyWarning, match="differs from the exact onset"):
-        found = st.infer(base, random, peaks, method=LOCAL, **options)
+        found = st.infer(base, random, peaks, unit="Pa", method=LOCAL, **options)
     assert any("Equilibrium" in note for note in found.notes)

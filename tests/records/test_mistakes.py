@@ -175,13 +175,13 @@ def with_residual(residual, method=EXACT):
 
 def inferred(peaks=(7e5, 7.1e5, 7.3e5), problem=PROBLEM, random=FIELD, prior=None, **options):
     prior = {"marginal.low": (0.4e6, 0.9e6)} if prior is None else prior
-    given = {"method": LOCAL, "samples": 100, "progress": False}
+    given = {"method": LOCAL, "unit": "Pa", "samples": 100, "progress": False}
     return st.infer(problem, random, peaks, prior=prior, **given | options)
 
 
 def weighed(random, peaks=None, **options):
     """Peaks of interfaces that need no prior."""
-    given = {"method": LOCAL, "samples": 100, "progress": False} | options
+    given = {"method": LOCAL, "unit": "Pa", "samples": 100, "progress": False} | options
     return st.infer(PROBLEM, random, SEVEN if peaks is None else peaks, **given)
 
 

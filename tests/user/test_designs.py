@@ -167,7 +167,7 @@ def test_a_posterior_and_peaks_are_stored_with_a_study(tmp_path, capsys, monkeyp
 
     study = st.Study(
         problem=PROBLEM, method=LOCAL, random=SimpleNamespace(interfaces=interfaces), samples=1,
-        peaks=np.array([0.7, 0.72, 0.9]) * 1e6,
+        peaks={"unit": "MPa", "values": [[0.7, 0.72, 0.9]]},
         reliability={"probability": 1e-1, "target_cv": 0.3},
     )  # fmt: skip
     study.to_toml(tmp_path / "study.toml")

@@ -18,7 +18,7 @@ def test_intervals_become_narrower_as_the_root_of_the_tests():
     factors = np.exp(0.1 * np.random.default_rng(2).standard_normal(8))
     onsets = st.monte_carlo(PROBLEM, FIELD, samples=8, pilot=False, **GIVEN)
     peaks = onsets.critical_stress.values * factors
-    posterior = st.infer(PROBLEM, FIELD, peaks, **FEW)
+    posterior = st.infer(PROBLEM, FIELD, peaks, unit="Pa", **FEW)
     designs = {"many": 56}
     found = st.design_of_tests(PROBLEM, posterior, designs=designs, repetitions=12, **GIVEN)
     assert found.design.values.tolist() == ["now", "many"]
@@ -40,7 +40,7 @@ def test_a_design_is_for_specimens_of_the_problem():
     stresses = []
     for lengths in ((0.025, 0.05), (0.05, 0.025)):
         groups = {length: peaks[length] for length in lengths}
-        posterior = st.infer(PROBLEM, FIELD, groups, **FEW)
+        posterior = st.infer(PROBLEM, FIELD, groups, unit="Pa", **FEW)
         found = st.design_of_tests(PROBLEM, posterior, **given)
         kinds = [posterior.likelihood.of(peaks.values(), [k, 1 - k]) for k in (0, 1)]
         stress = [Prediction(kind, posterior.grid).quantile(1e-3) for kind in kinds]
@@ -52,7 +52,9 @@ def test_a_design_is_for_specimens_of_the_problem():
     longer = make_problem(64, 0.1, weakening_rate=0.25e12)
     words = "problem of the posterior"
     refuses(words, lambda: st.design_of_tests(longer, posterior, **given))
-    other = st.infer(PROBLEM, FIELD, {0.025: peaks[0.025], 0.0375: peaks[0.05]}, **FEW)
+    other = st.infer(
+        PROBLEM, FIELD, {0.025: peaks[0.025], 0.0375: peaks[0.05]}, unit="Pa", **FEW
+    )
     words = "no peak is from a specimen of the problem"
     refuses(words, lambda: st.design_of_tests(PROBLEM, other, **given))
 

@@ -27,7 +27,7 @@ PEAKS = st.monte_carlo(PROBLEM, STRENGTH, **THIRTY, pilot=False).critical_stress
 
 
 def infer(peaks=PEAKS, problem=PROBLEM, random=STRENGTH, prior=LOW, **options):
-    options = {"method": LOCAL, "samples": 400} | options
+    options = {"method": LOCAL, "samples": 400, "unit": "Pa"} | options
     return st.infer(problem, random, peaks, prior=prior, **options)
 
 
@@ -54,7 +54,7 @@ def test_p_values_of_agreement_are_those_of_all_permutations():
     here = np.array(distance(np.arange(3)))
     exact = np.mean(all_of_them >= here * (1 - 1e-9), axis=0)
     predicted = xr.Dataset({"critical_stress": ("sample", others)})
-    found = st.statistics.agreement(predicted, own, replicates=8000)
+    found = st.statistics.agreement(predicted, own, unit="Pa", replicates=8000)
     ((at, share),) = found.predicted
     assert share[[0, 3, -1]] == pytest.approx([1 / 6, 3 / 6, 1.0])  # up to 1, 4 and 9
     assert np.interp(6.0, at, share) == pytest.approx(4.5 / 6)  # 4 of 6 up to 5, and 5 up to 7

@@ -56,7 +56,7 @@ def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
     """Within four errors of 4,000 draws; in newtons they are the same as in pascals."""
     groups = dict(zip(lengths, np.split(PEAKS, [4] if len(lengths) > 1 else []), strict=True))
     given = LOCAL | {"between": "lognormal", "load_cell_error": error}
-    found = st.infer(PROBLEM, EVEN, groups, **given)
+    found = st.infer(PROBLEM, EVEN, groups, unit="Pa", **given)
     mean, spread, scatter, of_scatter = by_hand(PEAKS, error)
     own = found.draws["mean"], found.draws["between"]
     assert own[0].mean() == pytest.approx(mean, abs=0.07 * spread)
@@ -70,16 +70,16 @@ def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
         forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
         given["load_cell_error"] = 0.0
         in_newtons = st.infer(PROBLEM, EVEN, forces, unit="kN", **given)
-        in_pascals = st.infer(PROBLEM, EVEN, groups, **given)
+        in_pascals = st.infer(PROBLEM, EVEN, groups, unit="Pa", **given)
         np.testing.assert_allclose(in_newtons.u, in_pascals.u, rtol=1e-6)
 
 
 def test_five_strengths_give_what_proportion_gives(monkeypatch):
     """The longer way, on a problem where both are possible; onsets by samples of the same draws."""
     given = LOCAL | {"samples": 200}
-    short = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
+    short = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, unit="Pa", **given)
     monkeypatch.setattr("stiction.inference.specimens.scales_with_strength", lambda *_: False)
-    long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, **given)
+    long = st.infer(PROBLEM, ROUGH, 0.8 * PEAKS, unit="Pa", **given)
     assert long.likelihood.onsets[0].ratios.shape == (1, 5, 200)
     for name in ("mean", "between"):
         assert long.mean[name] == pytest.approx(short.mean[name], rel=5e-3)
@@ -91,7 +91,7 @@ def test_an_onset_that_is_not_in_proportion_is_interpolated():
     friction = st.LinearWeakening(critical_slip=4e-6)
     problem = dataclasses.replace(PROBLEM, friction=friction)
     given = LOCAL | {"method": st.Equilibrium(), "samples": 100}
-    found = st.infer(problem, ROUGH, 0.8 * PEAKS, **given)
+    found = st.infer(problem, ROUGH, 0.8 * PEAKS, unit="Pa", **given)
     onsets = found.likelihood.onsets[0]
     x = 0.5 * (onsets.at[1] + onsets.at[2])
     between = np.exp(0.5 * np.log(onsets.ratios[0, 1:3]).sum(axis=0))
@@ -107,8 +107,8 @@ def test_profiles_and_peaks_are_joined():
     fit = st.fit_field(RECORDS, PROBLEM.interface, between=True, **QUICK)
     onsets = st.monte_carlo(PROBLEM, ROUGH, seed=3, **LOCAL | {"samples": 9})
     peaks = onsets.critical_stress.values * (PEAKS / 1.05e6)
-    both = st.infer(PROBLEM, fit, peaks, **LOCAL)
-    alone = st.infer(PROBLEM, ROUGH, peaks, between="lognormal", **LOCAL)
+    both = st.infer(PROBLEM, fit, peaks, unit="Pa", **LOCAL)
+    alone = st.infer(PROBLEM, ROUGH, peaks, unit="Pa", between="lognormal", **LOCAL)
     assert np.ptp(both.interval["mean"]) < np.ptp(alone.interval["mean"])
     assert np.ptp(both.interval["mean"]) < np.ptp(fit.interval["mean"])
     assert min(both.agreement.p_values.values()) > 0.05
@@ -121,7 +121,7 @@ def test_profiles_and_peaks_are_joined():
         200 * both.families["lognormal"], abs=28
     )
     with pytest.warns(st.AccuracyWarning, match="contradict the prediction, p = 0.0"):
-        apart = st.infer(PROBLEM, fit, 1.5 * peaks, between="lognormal", **LOCAL)
+        apart = st.infer(PROBLEM, fit, 1.5 * peaks, unit="Pa", between="lognormal", **LOCAL)
     assert any("contradict" in note for note in apart.notes)
     # A design repeats the doubts, and says what so few specimens cannot exclude.
     design = st.design_stress(
@@ -138,11 +138,11 @@ def test_profiles_and_peaks_are_joined():
     assert f"up to {share:.0%} of all" in text
     # The prior of the scatter decides where it is narrow, and that of the mean.
     prior = {"between": (0.2, 0.21), "mean": scipy.stats.norm(1.2e6, 1e3)}
-    told = st.infer(PROBLEM, fit, peaks, prior=prior, between=["weibull"], **LOCAL)
+    told = st.infer(PROBLEM, fit, peaks, unit="Pa", prior=prior, between=["weibull"], **LOCAL)
     assert 0.2 < told.mean["between"] < 0.21
     assert told.mean["mean"] == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
-    refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, **LOCAL))
+    refuses("State the unit", lambda: st.infer(PROBLEM, fit, 1e-6 * peaks, unit="Pa", **LOCAL))
 
 
 def test_a_single_specimen_leaves_the_scatter_to_its_prior():
@@ -152,10 +152,10 @@ def test_a_single_specimen_leaves_the_scatter_to_its_prior():
     median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))
     assert fit.parameters["between"] == pytest.approx(median, rel=0.1)
     with pytest.warns(st.AccuracyWarning, match="profiles come from one specimen"):
-        both = st.infer(PROBLEM, fit, PEAKS, **LOCAL)
+        both = st.infer(PROBLEM, fit, PEAKS, unit="Pa", **LOCAL)
     assert len(both.notes) == 1  # nine tests say more about the scatter than three
     with pytest.warns(st.AccuracyWarning, match="say little about the scatter"):
-        st.infer(PROBLEM, ROUGH, PEAKS[:3], between="lognormal", **LOCAL)
+        st.infer(PROBLEM, ROUGH, PEAKS[:3], unit="Pa", between="lognormal", **LOCAL)
 
 
 @pytest.mark.parametrize("share", [0.2, 0.45])
@@ -168,7 +168,7 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
 
     peaks = np.array([0.78e6, 0.83e6, 0.8e6, 0.86e6])
     given = LOCAL | {"prior": {"correlation_length": (2e-3, 6e-3)}, "method": StandIn(mixed)}
-    guided = st.infer(PROBLEM, ROUGH, peaks, **given)
+    guided = st.infer(PROBLEM, ROUGH, peaks, unit="Pa", **given)
     options = {"samples": 300, "progress": False, "pilot": False}
     onsets = [
         st.monte_carlo(PROBLEM, ROUGH, method=method, **options).critical_stress.values
@@ -177,7 +177,7 @@ def test_a_guide_that_hardly_correlates_is_not_used(share, monkeypatch):
     alike = np.corrcoef(*onsets)[0, 1]
     assert 0.1 < alike < 0.8
     monkeypatch.setattr(st.LocalCriterion, "unfit_as_guide", lambda *_: "no guide")
-    alone = st.infer(PROBLEM, ROUGH, peaks, **given)
+    alone = st.infer(PROBLEM, ROUGH, peaks, unit="Pa", **given)
     for one, other in zip(guided.likelihood.densities, alone.likelihood.densities, strict=True):
         assert one.onsets.shape == other.onsets.shape
     length = alone.mean["correlation_length"]

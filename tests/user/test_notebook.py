@@ -37,7 +37,7 @@ def objects():
     interface, load = st.Interface(0.1, 256, width=0.01), st.Load(normal_pressure=5e6)
     pressed = st.Problem(problem.solid, interface, problem.friction, load)
     prior = {"marginal.low": (0.5e6, 0.8e6)}
-    posterior = st.infer(problem, strength, PEAKS, prior=prior, samples=200, **how)
+    posterior = st.infer(problem, strength, PEAKS, unit="Pa", prior=prior, samples=200, **how)
     curves = st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m")
     kinds = {"marginal": "lognormal", "spectrum": "exponential", "noise": 0.0}
     return {
@@ -50,7 +50,7 @@ def objects():
         "probability": st.failure_probability(problem, strength, stress=0.7e6, **how),
         "design": st.design_stress(pressed, coefficient, probability=0.1, target_cv=0.3, **how),
         "posterior": posterior,
-        "agreement": st.statistics.agreement(posterior, np.add(PEAKS, 4e3)),
+        "agreement": st.statistics.agreement(posterior, np.add(PEAKS, 4e3), unit="Pa"),
         "problem": pressed,
         "field": strength,
         "method": st.Rupture(loading_rate=2e7),

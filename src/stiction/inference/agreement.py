@@ -124,7 +124,7 @@ def agreement(
     prediction: xr.Dataset | Posterior,
     peaks: Any,
     *,
-    unit: str = "Pa",
+    unit: str | None = None,
     load_cell_error: NotNegative = 0.0,
     replicates: Annotated[Count, Field(ge=100)] = 999,
     seed: Number = 0,
@@ -146,8 +146,9 @@ def agreement(
         As in `stiction.infer`. If curves are given and the prediction
         has events, for example from ``Equilibrium(events=20)``,
         precursors are also compared.
-    unit : str
-        Unit for the peaks and the load-cell error.
+    unit : str, optional
+        Unit of the peaks and the load-cell error. Numbers without a
+        unit need it.
     load_cell_error : float
         Standard error of a peak. Needed for a dataset
         only, because a posterior contains its load-cell error.

@@ -107,7 +107,7 @@ def infer(
     between: Any = None,
     method: MethodObject | None = None,
     load_cell_error: NotNegative = 0.0,
-    unit: str = "Pa",
+    unit: str | None = None,
     samples: Annotated[Count, Field(ge=100)] | None = None,
     seed: Number = 0,
     workers: Count | None = None,
@@ -143,8 +143,8 @@ def infer(
         Method that computes the onset. May be left out if `random` is None.
     load_cell_error : float
         Standard error of a peak, in `unit` (SI if `Peaks` are given).
-    unit : str
-        Unit of peaks and error. Forces need an area, coefficients ("1") a pressure.
+    unit : str, optional
+        Unit of peaks and error, needed by plain numbers. Forces need an area, "1" a pressure.
     samples : int, optional
         Simulated specimens at each point (2000 by the local criterion,
         else 500), or for each field within a specimen (200, else 100).

@@ -159,7 +159,9 @@ def title_of(peaks: Peaks) -> str:
     return ", ".join(kinds)
 
 
-def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peaks, float]:
+def peaks_and_error(
+    peaks: Any, unit: str | None, load_cell_error: float
+) -> tuple[Peaks, float]:
     """Return the mean peak of each specimen, and the standard deviation of its error, in SI.
 
     Each specimen counts once, because its slip loads do not show how
@@ -170,7 +172,7 @@ def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peak
     measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
         raise InputError(
-            f"load_cell_error: {load_cell_error:g} {unit} exceeds the largest peak. Check its unit"
+            f"load_cell_error: {error:g} {measured.unit} exceeds the largest peak. Check its unit"
         )
     if measured.specimens is None:
         return measured, error
@@ -188,7 +190,7 @@ def peaks_and_error(peaks: Any, unit: str, load_cell_error: float) -> tuple[Peak
     return of_specimens, math.hypot(error, repeated)
 
 
-def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
+def make_peaks(peaks: Any, unit: str | None = None) -> Peaks:
     """Return valid peaks, given an array, a mapping from lengths to arrays, a table or curves."""
     if isinstance(peaks, Peaks):
         return peaks
@@ -206,14 +208,16 @@ def make_peaks(peaks: Any, unit: str = "Pa") -> Peaks:
             f" got {describe(list(groups))}"
         )
     lengths = tuple(None if length is None else float(length) for length in groups)
-    values = tuple(_in_si(given, unit) for given in groups.values())
+    values, units = zip(*(_in_si(given, unit) for given in groups.values()), strict=True)
     different = np.unique(np.concatenate([np.zeros(0), *values])).size
     if different < MIN_PEAKS:
         raise InputError(
             f"peaks: at least {MIN_PEAKS} different values are needed, got {different}. Test more"
             " specimens, or pass the fit of profiles alone to st.design_stress"
         )
-    return Peaks(lengths, values, si_of(unit))
+    if len({*units}) > 1:
+        raise InputError(f"peaks: must be in one unit, got {' and '.join(sorted({*units}))}")
+    return Peaks(lengths, values, units[0])
 
 
 def si_of(unit: str) -> str:
@@ -221,19 +225,24 @@ def si_of(unit: str) -> str:
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
-def factor_of(unit: str, peaks: Any = None) -> float:
+def factor_of(unit: str | None, peaks: Any = None) -> float:
     """Return the factor that converts a unit of peaks to SI, or 1 for peaks in SI."""
-    if isinstance(peaks, Peaks | Curves):
+    if unit is None or isinstance(peaks, Peaks | Curves):
         return 1.0
     with prefixed("unit"):
         return conversion(unit, (si_of(unit),))[0]
 
 
-def _in_si(given: Any, unit: str) -> Array:
-    """Return peaks for a specimen type in SI, from the unit of the values or the given unit."""
+def _in_si(given: Any, unit: str | None) -> tuple[Array, str]:
+    """Return peaks for a specimen type in SI, and this unit, stated by the values or given."""
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
-    if si_of(stated or unit) != si_of(unit):
+    if not (stated or unit):
+        raise InputError(
+            "unit: is missing. Peaks are stresses, forces or coefficients of friction. Pass their"
+            " unit, such as unit='MPa', unit='kN' or unit='1'"
+        )
+    if stated and unit and si_of(stated) != si_of(unit):
         raise InputError(f"peaks: are in {stated}, but unit = {unit!r}. Pass unit={stated!r}")
     values: Array = check("peaks", numbers, RealArray)
     if values.ndim != 1:
@@ -247,7 +256,8 @@ def _in_si(given: Any, unit: str) -> Array:
             f"peaks: must be positive numbers, but number {bad[0]} is {values[bad[0]]:g}. Leave out"
             " tests without a peak, or pass missing= to st.read_peaks"
         )
-    return values * factor_of(stated or unit)
+    known = stated or unit or ""
+    return values * factor_of(known), si_of(known)
 
 
 @checked

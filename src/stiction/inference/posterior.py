@@ -234,7 +234,7 @@ class Posterior(WithFactors, Result):
         >>> problem = st.paper.problem(nodes=256)
         >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
         >>> posterior = st.infer(
-        ...     problem, strength, [0.69e6, 0.70e6, 0.73e6, 0.68e6, 0.71e6],
+        ...     problem, strength, [0.69, 0.70, 0.73, 0.68, 0.71], unit="MPa",
         ...     prior={"marginal.low": (0.5e6, 0.8e6)}, method=st.LocalCriterion(), samples=200,
         ... )
         >>> len({one.strength.marginal.low for one in posterior.interfaces(10)})

@@ -184,6 +184,13 @@ def on_nodes(value: Any, quantity: str, interface: Interface) -> Placed:
             )
     else:
         flat = np.ravel_multi_index(steps, interface.shape, mode="wrap")
+        for dim, step, count in zip(interface.dims, steps, interface.shape, strict=True):
+            if step.min() < 0 or step.max() > count:
+                ends = f"{places[dim].min():g} to {places[dim].max():g} m"
+                warn_accuracy(
+                    f"{dim} extends from {ends}. It is taken modulo the length of the interface,"
+                    " and results count from 0. Shift it to keep your positions"
+                )
     node, first, twins = np.unique(flat, return_index=True, return_inverse=True)
     if node.size < flat.size:
         _check_repeats(values, places, first[twins], interface)

@@ -84,8 +84,9 @@ class WithFactors:
         >>> import stiction as st
         >>> problem = st.paper.problem(nodes=512)
         >>> strength = st.paper.strength(problem, correlation_ratio=0.5)
+        >>> method = st.LocalCriterion()
         >>> tests = st.infer(
-        ...     problem, strength, [0.70e6, 0.71e6, 0.74e6], method=st.LocalCriterion(), samples=100
+        ...     problem, strength, [0.70, 0.71, 0.74], unit="MPa", method=method, samples=100
         ... )
         >>> joints = tests.with_between({"normal_pressure": st.Lognormal(mean=1.0, cv=0.05)})
         >>> sorted(joints.interfaces(1)[0].between)

@@ -227,7 +227,8 @@ class Counts:
         values, members = self.values.ravel(), self.members.ravel()
         level = Population(math.inf, 0.0, values, ancestors, members, self)
         descent = Descent(samples, [level], -math.inf, samples, complete=True)
-        reason = f"counting takes fewer evaluations: {specimens} specimens of each sample"
+        reason = "counting takes fewer evaluations"
+        reason += f", with {specimens} specimens of each sample" * (specimens > 1)
         return Tail([descent], "plain", reason, samples)
 
     def characteristic(self, confidence: float) -> float:

@@ -248,11 +248,11 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
     carried = f", and {count} of {shares.size} different ones carry {CARRIED_SHARE:.0%}"
     advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
     if random.source is not None:
-        advice = "Take more repetitions of the fit (bootstrap=), or give infer a longer list"
+        advice = "Take more repetitions of the fit (bootstrap=)"
     return [
-        f"the interfaces are a sample{f'{carried} of the mean' * bool(shares[-1])}. This choice"
-        f" alone gives a coefficient of variation of {by_list:.2g} (target {target_cv:g})."
-        f" {advice}, or measure more"
+        f"the interfaces are a sample{f'{carried} of the mean' * bool(shares[-1])}. The"
+        f" coefficient of variation is {estimate.cv:.2g} (target {target_cv:g}), of which this"
+        f" choice makes {by_list:.2g}. {advice}, or measure more"
     ]
 
 

@@ -135,7 +135,7 @@ def _peaks_of(given: Any) -> Any:
         return make_peaks(given)
     lengths = given.get("lengths", [None] * len(given["values"]))
     groups = dict(zip(lengths, given["values"], strict=True))
-    return make_peaks(groups, given.get("unit", "Pa"))
+    return make_peaks(groups, given.get("unit"))
 
 
 def _plain_peaks(peaks: Peaks) -> dict[str, Any]:
