@@ -124,7 +124,9 @@ def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
     with prefixed("prior"):
         distributions = distributions_of(given)
     if not isinstance(random, RandomField | RandomInterface):
-        raise InputError("prior: needs a single interface as random. With a list or fit, omit prior")
+        raise InputError(
+            "prior: needs a single interface as random. Omit prior with a list or fit"
+        )
     random = as_random_interface(random)
     refuse_conditioned([random])
     prior = Prior(problem, random, distributions)
