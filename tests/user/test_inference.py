@@ -69,7 +69,7 @@ def test_forces_need_an_area_that_the_prior_leaves_alone():
     prior = {"problem.interface.width": (0.008, 0.012)}
     forces = PEAKS * wide.area
     refuses(
-        "the prior changes the area, 0.0008 to 0.0012 m2",
+        "the area varies over the prior, 0.0008 to 0.0012 m2",
         lambda: infer(forces, wide, prior=prior, unit="N"),
     )
     found = infer(forces, wide, unit="N")

@@ -52,7 +52,7 @@ def test_words_and_numbers_for_missing_values(tmp_path):
     assert np.isnan(profile.values[4:]).all()
     assert is_read(profile[:4])
     zero = "\n".join(["x (mm);strength (MPa)", *ROWS, "4;0", "5;-9999"])
-    refuses("is 0 in line 6 (wrong values: 2) ... missing=0", lambda: read(tmp_path, zero))
+    refuses("is 0 in line 6 (2 such values) ... missing=0", lambda: read(tmp_path, zero))
     assert is_read(read(tmp_path, zero, missing=[0, -9999])[:4])
     heights = zero.replace("strength (MPa)", "height (um)")
     with pytest.warns(st.AccuracyWarning, match="-9999 occurs in line 7"):

@@ -175,7 +175,7 @@ def test_a_pressure_without_places_is_the_mean_between_glued_plates():
         rows = glued.sample(given)
         np.testing.assert_allclose(rows.normal_pressure, np.tile(expected, (64, 1)))
     given["initial_stress"] = np.zeros((3, 64))
-    words = "initial_stress: must have 1 or 64 samples, as the strength, got 3"
+    words = "initial_stress: must have 1 or 64 samples, like the strength, got 3"
     refuses(words, lambda: glued.sample(given))
 
 

@@ -35,7 +35,7 @@ def register(kind: T) -> T:
     known = _registered.setdefault(getattr(kind, "family", "methods"), {})
     holder = known.setdefault(name, kind)
     if (holder.__module__, holder.__qualname__) != (kind.__module__, kind.__qualname__):
-        raise InputError(f"{kind.__name__}: type {name!r} belongs to {holder}. Choose another")
+        raise InputError(f"{kind.__name__}: type {name!r} is taken by {holder}. Rename it")
     known[name] = kind
     return kind
 
@@ -79,7 +79,7 @@ class Kinds(Mapping[str, Any]):
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
         try:
             if len(points) > 1:
-                raise ImportError("two packages offer this type. Uninstall either")
+                raise ImportError("two packages offer this type. Uninstall one package")
             kind = register(points[0].load())
             if self._registered.get(name) is not kind:
                 raise ImportError(f"{kind} is not of this family, or has another type")

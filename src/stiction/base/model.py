@@ -443,7 +443,7 @@ def to_plain(value: Any) -> Any:
         reason = str(error).rsplit(words, 1)[-1].rsplit("Error: ", 1)[-1]
         raise InputError(f"{type(value).__name__}: {words}{reason}") from None
     except pydantic.errors.PydanticSchemaGenerationError:
-        raise InputError(f"{type(value).__name__}: exists in Python only") from None
+        raise InputError(f"{type(value).__name__}: exists only in Python") from None
 
 
 def checked(function: Function) -> Function:

@@ -124,7 +124,7 @@ def _letters_in_attributes(item: Any, content: bytes) -> int:
         count = math.prod(attribute.shape or ())
         if h5py.check_string_dtype(attribute.dtype):
             if count > 1 and count * len(content) > MAX_FILE_BYTES:
-                raise InputError(f"attribute {name!r} is a list of {count} texts. Delete it")
+                raise InputError(f"attribute {name!r} holds too many texts, {count}. Delete it")
             letters += sum(map(len, np.ravel(item.attrs[name]).tolist()))
         else:
             letters += count

@@ -327,7 +327,7 @@ def check_measured(
         number = f"{shown[wrong][0]:.9g}"
         raise InputError(
             f"{quantity} must be positive, but is {number} in {_entry(wrong, lines)}"
-            f" (wrong values: {np.count_nonzero(wrong)}). If {number} marks a missing value, pass"
+            f" ({np.count_nonzero(wrong)} such values). If {number} marks a missing value, pass"
             f" missing={number} to st.read_profile, or write NaN"
         )
     for end in (known.min(), known.max()) if doubted and known.size else ():
@@ -336,7 +336,7 @@ def check_measured(
         if usual and rest.size and min(abs(rest - end)) > np.ptp(rest):
             warn_user(
                 f"{quantity}: {end:.9g} occurs in {_entry(shown == end, lines)}"
-                f" ({known.size - rest.size} in all), and often marks a missing value. Pass"
+                f" ({known.size - rest.size} such values), and often marks a missing value. Pass"
                 f" missing={end:.9g}, or missing=() to keep it",
                 AccuracyWarning,
             )

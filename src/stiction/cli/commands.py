@@ -292,7 +292,7 @@ def description(study: Any) -> dict[str, str]:
     points = study.experiments
     samples = f"{study.samples} (seed {study.seed})"
     if study.sweep:
-        samples += f" at each of {len(points)} points: {len(points) * study.samples} in all"
+        samples += f" at each of {len(points)} points: {len(points) * study.samples} in total"
     methods = ", ".join(dict.fromkeys(point.method.label for point in points))
     lines = {"method": methods, "samples": samples}
     for number, (dim, coordinates) in enumerate(study.axes.items(), start=1):
@@ -372,7 +372,7 @@ def reliability(
     question = loaded.reliability
     if question is None:
         raise InputError(
-            "reliability: the study asks no question. Add a table [reliability] with force (N),"
+            "reliability: the study has no table [reliability]. Add this table with force (N),"
             " stress (Pa), friction_coefficient, or the probability of a design"
         )
     for point, experiment in zip(loaded.points, loaded.experiments, strict=True):

@@ -283,7 +283,7 @@ def _result(future: Future[Table], span: Span) -> Table:
         ) from error
     if table.versions != versions():
         raise WorkerError(
-            f"a worker has {table.versions}, but the run {versions()}. Install the same versions"
+            f"a worker has {table.versions}, not {versions()}. Install the same versions"
         )
     return table
 

@@ -262,7 +262,7 @@ def _read(file: Path, max_bytes: int) -> bytes:
     try:
         return read_regular(file, max_bytes=max_bytes, follow_links=False)
     except InputError as error:
-        raise InputError(f"{file}: {error}. Remove it, or choose another run") from None
+        raise InputError(f"{file}: {error}. Remove this file, or choose another run") from None
     except FileNotFoundError:
         advice = "there is no run here. Give the folder of `stiction run --out`"
         if file.name == STUDY and (file.parent / CHUNKS).is_dir():
@@ -316,7 +316,7 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
     now, before = here["samples"], there["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
-        differences.append(f"samples: {now} here, {before} there. A run can only grow")
+        differences.append(f"samples: {now} given, {before} stored. A run can only grow")
     if differences:
         raise InputError(
             f"{path}: holds another study. Choose another folder, or make the study the same:\n"
@@ -335,4 +335,4 @@ def _differences(here: Any, there: Any, path: str = "") -> list[str]:
             for text in _differences(here.get(key), there.get(key), f"{path}.{key}".strip("."))
         ]
     shown = ["nothing" if one is None else describe(one) for one in (here, there)]
-    return [f"{path}: {shown[0]} here, {shown[1]} there"] if here != there else []
+    return [f"{path}: {shown[0]} given, {shown[1]} stored"] if here != there else []

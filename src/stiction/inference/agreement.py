@@ -231,7 +231,7 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
     if int(prediction["arrested_events"].max()) > prediction.sizes["event"]:
         raise InputError(
             f"prediction: keeps {prediction.sizes['event']} of up to"
-            f" {int(prediction['arrested_events'].max())} events. Predict with more events="
+            f" {int(prediction['arrested_events'].max())} events. Predict with a larger events="
         )
     high = prediction[event].transpose("sample", "event").values
     low = high - prediction[drop].transpose("sample", "event").values

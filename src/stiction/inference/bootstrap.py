@@ -86,10 +86,11 @@ class NotRepeated(InputError):
     """Error for a family that cannot be fitted to most records simulated from the family itself."""
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
-        super().__init__(
+        self.reason = (
             f"marginal: {family.label!r} could be fitted to only {fits} of {count} records"
-            " that were simulated from its fit. Take another marginal"
+            " that were simulated from its fit"
         )
+        super().__init__(f"{self.reason}. Use another marginal")
         self.family = family
 
 

@@ -213,7 +213,7 @@ class Curves(Sequence[Curve], Result):
         for reading in self.read:
             alike.setdefault(reading._replace(source="", values=0), []).append(reading)
         notes = [
-            f"{files[0]}" + f" (and {len(files) - 1} files alike)" * (len(files) > 1)
+            f"{files[0]}" + f" (and {len(files) - 1} similar files)" * (len(files) > 1)
             for files in alike.values()
         ]
         rows = [curve._row(curve.name) for curve in self]
@@ -452,7 +452,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
         sizes = force[starts] - force[ends]
         full = ends[sizes >= 0.5 * np.median(np.sort(sizes)[-3:])] + 1
         if full.size == 0:
-            raise InputError("split: the record has no full slide. Leave split out")
+            raise InputError("split: the record has no full slide. Leave out split")
         return readings.part(slice(full[-1])).cut(full[:-1], "cycle")
     # Readings above HIGH, or else below LOW of the peak, and how often the force returns.
     high = force >= HIGH * force.max()
@@ -469,7 +469,7 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
 def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
     """Return the noise of a reading and the smallest fall that counts (steps 1 and 2)."""
     if force.size < MIN_READINGS:
-        raise InputError(f"holds {force.size} readings, fewer than {MIN_READINGS}")
+        raise InputError(f"holds {force.size} readings, but at least {MIN_READINGS} are needed")
     top = int(np.argmax(np.abs(force)))
     if noise is None:
         noise = noise_of(force[: top + 1] if top >= MIN_READINGS else force)

@@ -252,7 +252,7 @@ def _plans(
             raise InputError(unknown)
         free = [place for place, parameter in enumerate(names) if parameter not in known]
         if not free:
-            raise InputError(f"{path}: lists all parameters. Leave one unknown to the tests")
+            raise InputError(f"{path}: lists all parameters. Leave out at least one")
         plans[name] = dict(tests), free
     return plans
 
@@ -305,8 +305,8 @@ def _further(designs: dict[str, Any]) -> dict[str, tuple[int, int]]:
         plans[name] = table["tests"], table.get("profiles", 0)
         if not all(is_whole(number, 0) for number in plans[name]) or not any(plans[name]):
             raise InputError(
-                f"designs: {name}: tests and profiles must be whole numbers >= 0, at least one"
-                f" >= 1, got {' and '.join(map(str, plans[name]))}"
+                f"designs: {name}: tests and profiles must be whole numbers >= 0, and at least"
+                f" one of them >= 1, got {' and '.join(map(str, plans[name]))}"
             )
     return plans
 

@@ -86,9 +86,9 @@ parameters well."""
 MIN_P_VALUE = 0.01
 """p-value below which a family does not fit."""
 ADVICE = {
-    "marginal": "The values are far from its family. Compare families",
-    "spectrum": "The periodogram is far from its family. Take another spectrum or a higher detrend",
-    "level": "Means of records scatter more than means of one field. Designs under the fit omit"
+    "marginal": "The values are far from this family. Compare families",
+    "spectrum": "The periodogram is far from this family. Use another spectrum or a higher detrend",
+    "level": "Means of records scatter more than means of one field. Designs based on the fit omit"
     " this scatter. Pass between=True if records are of different specimens",
 }
 TOLD = 2.0
@@ -498,7 +498,7 @@ def _refitted(
         settings = [setting for setting in settings if setting.marginal != error.family]
         if not settings:
             raise
-        warn_accuracy(f"{error}: the family is left out, as the records are far from it")
+        warn_accuracy(f"{error.reason}, so this family is left out")
         return _refitted(settings, rows, count, seed, progress)
 
 
@@ -522,7 +522,7 @@ def _judged(
         p_values["level"] = fitted.chance_of_scatter(levels)
     doubts = _doubts(fitted, p_values)
     if failed := len(repeated) * count - sum(len(one.fits) for one in repeated):
-        doubts.append(f"intervals omit the repetitions that no fit reached: {failed}")
+        doubts.append(f"intervals omit the {failed} repetitions whose fit failed")
     if fitted.setting.between:
         # The bootstrap scales records as if all came from one specimen,
         # so its means and scatter lack the scatter between specimens.
@@ -538,7 +538,7 @@ def _judged(
         if len(rows) < FEW_SPECIMENS:
             doubts.append(
                 f"the scatter between specimens, {low:.2g} to {high:.2g}, follows mostly from the"
-                f" prior. Measure {FEW_SPECIMENS} specimens rather than {len(rows)}, or state it:"
+                f" prior. Measure {FEW_SPECIMENS} specimens, not {len(rows)}, or state the scatter:"
                 " RandomInterface(fit.field, between={'strength': Lognormal(mean=1.0, cv=0.1)})"
             )
     return {
@@ -562,7 +562,7 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
     if held < ENOUGH_LENGTHS:
         doubts.append(
             f"the records hold {held:.2g} correlation lengths, too few for reliable intervals."
-            f" Measure a longer profile, or several, of at least {ENOUGH_LENGTHS:g}"
+            f" Measure longer or more profiles, of {ENOUGH_LENGTHS:g} correlation lengths or more"
         )
     left = max(_power_at_cutoff(fitted, window) for window in set(fitted.setting.windows))
     if left <= noise**2:
@@ -571,7 +571,7 @@ def _doubts(fitted: BestFit, p_values: Mapping[str, float]) -> list[str]:
             f" scatters by {math.sqrt(left):.3g}. The correlation length then depends on the family"
         )
     doubts += [
-        f"{name} {value:.3g} lies at an end of the searched range. Fix spectrum= or anisotropy="
+        f"{name} {value:.3g} lies at an end of the searched range. State spectrum= or anisotropy="
         for name, value in fitted.setting.spectrum.at_end(fitted.model).items()
     ]
     doubts += [

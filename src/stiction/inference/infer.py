@@ -321,7 +321,7 @@ def _notes(likelihood: Likelihood, error: float, u: Array) -> list[str]:
     if error > TOLERABLE:
         notes.append(
             f"the means are uncertain by about {error:.0%} of their standard deviations because"
-            " few samples were simulated at each point. Give more samples"
+            " few samples were simulated at each point. Use more samples"
         )
     return notes
 
@@ -416,6 +416,6 @@ def _specimen_notes(grid: FactorGrid, comparison: Agreement | None) -> list[str]
     if profiles.levels.size == 1:
         notes.append(
             "the profiles come from one specimen, and others are assumed to vary along their length"
-            " as it does. Scan further specimens, or pass between=True for records of several"
+            " in the same way. Scan further specimens, or pass between=True if there were several"
         )
     return notes

@@ -216,7 +216,7 @@ def area_of(prior: Prior, method: Any, length: float | None) -> float:
     least, most = (experiment.problem.area for experiment in at_ends)
     if least != most:
         raise InputError(
-            f"peaks: the prior changes the area, {least:g} to {most:g} m2. Give stresses in Pa"
+            f"peaks: the area varies over the prior, {least:g} to {most:g} m2. Give stresses (Pa)"
         )
     return least or math.nan
 
@@ -336,7 +336,7 @@ def out_of_reach(
     )
     return [
         f"peaks: {far.sum()} of {far.size} are out of reach, such as {value:g}. The prior can reach"
-        f" {low:g} ({lowest}) to {high:g} ({highest}). Widen it, or state the unit of the peaks"
+        f" {low:g} ({lowest}) to {high:g} ({highest}). Widen the prior, or state the unit"
     ]
 
 
@@ -445,7 +445,7 @@ def warn_if_long(experiment: Experiment, samples: int, workers: int | None) -> N
     if seconds > WARN_SECONDS:
         warn_user(
             f"the likelihood takes about {duration(seconds)}: {samples:,} onsets of"
-            f" {duration(experiment.seconds)}. Take fewer samples, nodes or unknown parameters",
+            f" {duration(experiment.seconds)}. Use fewer samples, nodes or unknown parameters",
             UserWarning,
         )
 

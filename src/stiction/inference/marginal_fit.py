@@ -212,7 +212,7 @@ class Family:
         if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
                 f"marginal: {outside} of {values.size} values lie outside the bounds of"
-                f" {self.name!r}, {low:.6g} and {high:.6g}. Widen them, or pass noise=True"
+                f" {self.name!r}, {low:.6g} and {high:.6g}. Widen the bounds, or pass noise=True"
             )
 
 

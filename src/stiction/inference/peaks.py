@@ -380,7 +380,7 @@ def _of_table(
         forces = _normal_forces(used.get("normal force"), normal, si, table, options)[kept]
         values, si = _coefficients(values, forces, si, surfaces), "1"
     elif surfaces != 1:
-        raise InputError("surfaces: needs normal=, the normal force. Leave it out")
+        raise InputError("surfaces: needs normal=, the normal force. Pass both or neither")
     labels: Array | None = None
     if names:
         labels = np.array(names[0].cells or [f"{n:g}" for n in names[0].values])[kept]
@@ -411,7 +411,7 @@ def _of_table(
         sizes = column_in_si(lengths[0], "length", None, ("m",))[0][kept]
         if np.isnan(sizes).any():
             line = table.lines[kept][np.isnan(sizes).argmax()]
-            raise InputError(f"length: missing in line {line}. Give each specimen a length")
+            raise InputError(f"length: is missing in line {line}. Give each specimen a length")
         groups = {size: sizes == size for size in np.unique(sizes)}
     made = make_peaks({size: values[rows] for size, rows in groups.items()}, si)
     return replace(
@@ -441,8 +441,8 @@ def _refuse_statistics(table: Table, peak: Column) -> None:
         if away.min() <= 0.5001 * 10.0 ** -max(digits):
             raise InputError(
                 f"line {table.lines[row]} holds the mean or the deviation of the tests above,"
-                f" {values[row]:g}. Write 'mean' or 'SD' in front of it, or delete it. If it is a"
-                " test, give the number of its specimen, or remove the empty line"
+                f" {values[row]:g}. Write 'mean' or 'SD' in front of this value, or delete the"
+                " line. If it is a test, give the number of its specimen, or remove the empty line"
             )
 
 
@@ -451,7 +451,7 @@ def _normal_forces(
 ) -> Array:
     """Return the normal force (or stress) of each test, in the unit of the peaks."""
     if si == "1":
-        raise InputError("normal: the peaks are friction coefficients already. Leave it out")
+        raise InputError("normal: the peaks are coefficients already. Leave normal out")
     if column is None:
         return np.full(table.lines.size, float(given))
     values = without_missing(column.values, options)
@@ -459,7 +459,7 @@ def _normal_forces(
     if (missing := np.flatnonzero(~(forces > 0.0))).size:
         raise InputError(
             f"normal: {column.label!r} has no positive force in line {table.lines[missing[0]]}"
-            f" (tests in all: {missing.size}). Remove these tests, or give their forces"
+            f" ({missing.size} such tests). Remove these tests, or give their forces"
         )
     return forces
 

@@ -244,7 +244,7 @@ class Posterior(WithFactors, Result):
         if of_problem:
             raise InputError(
                 f"interfaces: {', '.join(of_problem)} belong to the problem, not to an interface."
-                " Take `at(draw)`, which returns a problem and an interface for each draw"
+                " Use `at(draw)`, which returns a problem and an interface for each draw"
             )
         # Each draw counts once, unless more interfaces than draws are
         # wanted.

@@ -88,8 +88,8 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     _doubt_lengths(records)
     if (again := len(records) - len({one.values.tobytes() for one in records})) > 0:
         warn_accuracy(
-            f"{again} of {len(records)} profiles repeat another profile, value by value. They are"
-            " taken as measurements and make intervals too narrow. Leave them out"
+            f"{again} of {len(records)} profiles repeat another profile, value by value, which"
+            " makes intervals too narrow. Leave out the repeated profiles"
         )
     return records
 
@@ -125,7 +125,7 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
         spacings.append(spacing)
     shape = [number.max() + 1 for number in index]
     if np.unique(np.ravel_multi_index(index, shape)).size < index[0].size:
-        raise InputError("x and y repeat: a place of the map has two values. Keep either")
+        raise InputError("x and y repeat: a place of the map has two values. Keep only one")
     rows = values.reshape(-1, values.shape[-1])
     full = np.full((rows.shape[0], *shape), np.nan)
     full[(slice(None), *index)] = rows
@@ -173,11 +173,11 @@ def _checked(record: Record, quantity: str) -> Record:
         raise InputError(f"must be finite, but entry {first} is not")
     if values.size < MIN_RECORD_POINTS or min(record.values.shape) < NARROWEST:
         raise InputError(
-            f"holds {values.size} measured points, too few for a spectrum. A fit needs at least"
-            f" {MIN_RECORD_POINTS}, {NARROWEST} in each direction, and ten correlation lengths"
+            f"holds {values.size} measured points, too few for a spectrum. A fit needs"
+            f" {MIN_RECORD_POINTS} points, {NARROWEST} along each axis, and ten correlation lengths"
         )
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
-        raise InputError(f"is constant, {values[0]:g} everywhere. A fit needs scatter")
+        raise InputError(f"is constant ({values[0]:g}). A fit needs values that vary")
     check_measured(record.values, quantity, doubted=False)
     # The median absolute deviation of a normal sample is its deviation
     # over 1.4826.
@@ -238,5 +238,5 @@ def _doubt_jumps(record: Record) -> None:
         entry = int(np.argmax(size))
         warn_accuracy(
             f"{int(far.sum())} of {record.values.size} values differ from their neighbours far more"
-            f" than usual, such as {middle.flat[entry]:.4g}. Make dropouts NaN to leave them out"
+            f" than usual, such as {middle.flat[entry]:.4g}. Set dropouts to NaN to leave them out"
         )

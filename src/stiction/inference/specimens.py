@@ -150,7 +150,7 @@ class FactorPrior(NamedTuple):
         low, high = prior.scatter.cdf([0.0, MOST_CV])
         if not low < high:
             raise InputError(
-                f"prior: {SCATTER_KEY}: must be a coefficient of variation, 0 to {MOST_CV:g}"
+                f"prior: {SCATTER_KEY}: must be a coefficient of variation from 0 to {MOST_CV:g}"
             )
         return prior
 

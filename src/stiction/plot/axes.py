@@ -69,14 +69,14 @@ def problem_of(result: Any, problem: Problem | None = None) -> Problem:
         sizes = check("problem", problem, Problem).interface.shape
         shape = tuple(result.sizes[dim] for dim in ("x", "y") if dim in result.sizes)
         if shape not in ((), sizes):
-            raise InputError(f"problem: has {sizes} nodes, but the result {shape}")
+            raise InputError(f"problem: has {sizes} nodes, but the result has {shape}")
         return problem
     try:
         plain = json.loads(result.attrs["study"])["problem"]
         return pydantic.TypeAdapter(Problem).validate_python(plain)
     except (KeyError, TypeError, ValueError, InputError):
         raise InputError(
-            "problem: is not complete in the result, because a part exists in Python only or was"
+            "problem: is incomplete in the result, because a part exists only in Python or was"
             " swept. Pass problem="
         ) from None
 

@@ -114,7 +114,7 @@ def _peaks_of(measured: Any, quantity: str, variable: xr.DataArray) -> NDArray[n
     if peaks.unit != variable.attrs.get("units", "1"):
         raise InputError(
             f"measured: peaks are in {peaks.unit}, but {quantity} in {variable.attrs.get('units')}."
-            f" Draw quantity={peaks.variable!r}"
+            f" Pass quantity={peaks.variable!r}"
         )
     return np.concatenate(peaks.values)
 
@@ -170,7 +170,7 @@ def quantiles(
     dims = sorted(_swept(variable), key=lambda dim: -variable.sizes[dim])
     if not 1 <= len(dims) <= 2:
         raise InputError(
-            "result: quantiles need a sweep over a parameter or two, got"
+            "result: quantiles need a sweep over one or two parameters, got"
             f" {', '.join(dims) or 'no sweep'}"
         )
     along, *others = dims
@@ -322,7 +322,7 @@ def sensitivities(design: Answer, *, ax: Axes | None = None) -> FigureAxes:
     """
     table = design.sensitivities
     if not table.sizes.get("source"):
-        raise InputError("design: has no sensitivities. Design with sensitivities=True")
+        raise InputError("design: has no sensitivities. Compute it with sensitivities=True")
     quantity = "force" if np.isfinite(design.area) else "stress"
     ends = np.stack([table[f"{quantity}_at_low"].values, table[f"{quantity}_at_high"].values])
     factor, unit = unit_for("N" if quantity == "force" else "Pa", ends.ravel())

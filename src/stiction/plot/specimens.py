@@ -238,7 +238,7 @@ def precursors(
     paths = [curve_of(path) for path in results]
     _, _, name, event = paths[0]
     if any(path[2] != name for path in paths):
-        raise InputError("result: some paths contain forces, others stresses. Draw two figures")
+        raise InputError("result: some paths hold forces, and some stresses. Draw two figures")
     si = str(results[0][name].attrs["units"])
     if tests and (tests.unit, tests[0].travel_unit) != (si, "m"):
         raise InputError(

@@ -155,7 +155,7 @@ def check_resolution(problem: Any, weakening_rate: float) -> None:
     raise InputError(
         f"interface.nodes: must be {_finer(problem, resolution, least)} or more. The nucleation"
         f" length, {length:.3g} m, spans {min(*resolution, least - 0.01):.3g} nodes, but must span"
-        f" {least}. Check the unit of interface.length (m)"
+        f" at least {least}. Check the unit of interface.length (m)"
     )
 
 
@@ -169,7 +169,7 @@ def _check_extent(interface: Interface, resolution: Array) -> None:
             spacing = interface.spacings[axis]
             raise InputError(
                 f"interface.extent: is {width * spacing:.3g} m wide along {dim}, less than"
-                f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen it"
+                f" the nucleation length, {resolution[axis] * spacing:.3g} m. Widen the extent"
             )
 
 

@@ -209,7 +209,7 @@ class Interface(Listed):
         if self.is_free and self.is_plane:
             raise InputError("ends: a plane is periodic. Only lines have free ends")
         if self.size > MOST_NODES:
-            raise InputError(f"nodes: must be at most 2^24 in all, got {self.nodes}")
+            raise InputError(f"nodes: must be at most 2^24 in total, got {self.nodes}")
         if min(self.spacings) < SHORTEST:
             raise InputError(
                 f"length: nodes are {min(self.spacings):g} m apart. Check the unit"

@@ -230,8 +230,8 @@ class Problem(Listed):
         if not pressure.min() > 0.0:
             place = self.interface.describe_node(int(np.argmin(pressure)))
             raise InputError(
-                f"specimen.pressing: opens the interface at {place} ({pressure.min():.3g} of the"
-                " mean pressure). Pass 'frictionless'"
+                f"specimen.pressing: opens the interface at {place}, where the pressure is"
+                f" {pressure.min():.3g} times its mean. Pass 'frictionless'"
             )
         assert self.specimen is not None  # else there is no drive
         machine, depth = self.specimen.drive.stiffness, self.specimen.thickness or 1.0
@@ -456,4 +456,4 @@ def refusals(problem: Problem, method: Any) -> list[str]:
     reasons = method.supports(problem)
     if not isinstance(reasons, list):
         return [f"method: supports must return a list of reasons, got {describe(reasons)}"]
-    return [f"method: the {method.label} cannot take this: {reason}" for reason in reasons]
+    return [f"method: the {method.label} cannot be used: {reason}" for reason in reasons]

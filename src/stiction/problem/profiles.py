@@ -74,7 +74,7 @@ def named_profiles(given: Any) -> dict[str, Any]:
         raise InputError(unknown)
     profiles = {name: given[name] for name in given if name in known}
     if not {"strength", "friction_coefficient"} & {*profiles}:
-        raise InputError("strength: is missing in the profiles")
+        raise InputError("strength: is missing from the profiles")
     return profiles
 
 
@@ -105,7 +105,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     problems = given_twice(problem, {*given, *quantities.values()}, "profiles")
     problems += [text for name in given for text in mistakes.get(name, ())]
     problems += [
-        f"{name}: must have 1 or {len(strength)} samples, as the strength, got {len(values)}"
+        f"{name}: must have 1 or {len(strength)} samples, like the strength, got {len(values)}"
         for name, values in rows.items()
         if strength is not None and values.ndim and len(values) not in (1, len(strength))
     ]
@@ -301,7 +301,7 @@ def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
     """Return strengths, Pa, from heights, m. Missing heights give NaN."""
     values = as_numbers(strength(heights.copy()))
     if values.shape != heights.shape:
-        shapes = f"got shape {values.shape} for {heights.shape}"
+        shapes = f"got an array of shape {values.shape} for heights of shape {heights.shape}"
         raise InputError(f"strength: must return a strength for each height, {shapes}")
     values = np.where(np.isnan(heights), np.nan, values)
     check_measured(values, "strength", doubted=False)

@@ -223,7 +223,7 @@ def _offset(dim: str, x: Array, interface: Interface) -> float:
         period = np.ptp(x) + spacing * np.median(np.diff(at))  # both ends are not one place
         raise InputError(
             f"{dim} extends from {x.min():g} to {x.max():g} m on an interface of {length:g} m."
-            f" Check the unit of {dim}, crop the record, or make interface.length {period:.6g}"
+            f" Check the unit of {dim}, crop the record, or set interface.length to {period:.6g}"
         )
     first = at[0] - np.ceil(at[0] - 0.5 - TOLERANCE)
     if interface.is_free and first > 0.5 - 2.0 * TOLERANCE:
@@ -304,8 +304,8 @@ def refuse_missing(values: Array, interface: Interface) -> None:
     raise InputError(
         f"values are missing (NaN) at {rows[row].sum()} of {interface.size} nodes"
         f"{f' of sample {row}' * (len(rows) > 1)}, the first at"
-        f" {interface.describe_node(int(np.argmax(rows[row])))}. Make interface.length the"
-        " length of the record, or draw values there with RandomField.given(profile)"
+        f" {interface.describe_node(int(np.argmax(rows[row])))}. Set interface.length to"
+        " the length of the record, or draw the missing values with RandomField.given(profile)"
     )
 
 

@@ -47,7 +47,7 @@ cell loads another cell forwards."""
 
 
 _NEEDS_COEFFICIENTS = (
-    "a slider takes friction coefficients instead of stresses. Give a DataArray with the unit 1, a"
+    "a slider needs friction coefficients instead of stresses. Give a DataArray with the unit 1, a"
     " random field of coefficients, or friction.residual_ratio"
 )
 UNFIT_FOR_SLIDER = {
@@ -371,7 +371,7 @@ class Slider(Listed):
         """Return messages about a slider that does not fit an interface (m) and a material."""
         problems, base = [], self.base
         if mode != "II":
-            problems.append("mode: a slider is sheared in its plane. Leave 'II'")
+            problems.append("mode: a slider is sheared in its plane. Keep mode='II'")
         if base.solid is not None and base.solid.plane != solid.plane:
             problems.append(f"specimen.base.solid.plane: must be the slider's {solid.plane!r}")
         sizes = {"height": self.height, "base.height": base.height}

@@ -119,8 +119,8 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
         names = sorted(getattr(value, "dims", ()))
         if names not in (["x"], ["x", "y"]) or not set(names) <= set(value.coords):
             raise ValueError(
-                "must be a DataArray over x (m), on a plane over x and y, with coordinates, as"
-                " st.read_profile(path) returns it"
+                "must be a DataArray with coordinates x (m), or x and y on a plane, such as"
+                " st.read_profile(path) returns"
             )
         axes = (in_si(value[name], ("m",))[0] for name in names)
         rows = [*np.meshgrid(*axes, indexing="ij"), _values(value.transpose(*names))]

@@ -139,12 +139,12 @@ class RandomField(Listed):
             Standard deviation of the measurement error, in this unit.
         """
         if self.conditions is not None:
-            raise InputError("profile: the field already has a profile. Combine both in one")
+            raise InputError("profile: the field already has a profile. Combine both profiles")
         stated = str(getattr(profile, "attrs", {}).get("units") or "")
         if stated and is_in(stated, "1") != (self.quantity is not None):
             raise InputError(
                 f"profile: has the unit {stated}. Only a field with quantity='friction_coefficient'"
-                " takes coefficients (unit 1), and takes no other unit"
+                " accepts coefficients (unit 1), and it accepts no other unit"
             )
         conditions: Any = {"profile": profile, "noise": noise}
         return dataclasses.replace(self, conditions=conditions)
@@ -187,8 +187,8 @@ class RandomField(Listed):
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
-                f"the grid of {nodes} nodes is coarser than the spectrum: values at nodes are"
-                f" exact, but {100.0 * lost:.2g} % of the variance is not resolved. Check the unit"
+                f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes are"
+                f" exact, but {100.0 * lost:.2g} % of the variance is not resolved. Check lengths"
                 f" (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
             )
         if self.mean_mode:

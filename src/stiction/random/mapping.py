@@ -221,7 +221,7 @@ def hermite_coefficients(
     # A negative rest above round-off and the error of the rule shows
     # inconsistent moments.
     if not rest > -max(MAX_REST, step**2) * variance:
-        raise InputError("marginal: scipy's quantiles of it are inaccurate. Choose another")
+        raise InputError("marginal: its quantiles by scipy are inaccurate. Use another")
     # 6.
     with_rest = np.array([*coefficients, np.sqrt(max(rest, 0.0))])
     with_rest.flags.writeable = False

@@ -276,7 +276,7 @@ class TruncatedNormal(_ByMoments):
         if solution is None or not np.abs(moments(solution.x)).max() < 1e-8:
             raise InputError(
                 f"cv: no normal distribution between low={self.low:g} and high={high:g} has"
-                f" mean={self.mean:g} and cv={self.cv:g}. Lower cv, or take st.Lognormal"
+                f" mean={self.mean:g} and cv={self.cv:g}. Lower cv, or use st.Lognormal"
             )
         return frozen(scipy.stats.truncnorm, *parameters(solution.x))
 

@@ -29,8 +29,8 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
         value = (constants | forces).get(name)
         if name not in random.names and (value is None or not np.any(value)):
             raise InputError(
-                f"between.{name}: is a factor on the {name} of the problem, which is not given."
-                " Give it there, make it random, or leave the factor out"
+                f"between.{name}: multiplies {name}, but the problem has no {name}. Give {name} in"
+                " the problem, make it random, or leave this factor out"
             )
     for name in sorted({*random.names} & {*UNFIT_FOR_SLIDER} - {*names}):
         if isinstance(problem.specimen, Slider):
@@ -131,4 +131,4 @@ def check_residual(problem: Problem, profiles: Mapping[str, Array]) -> None:
             " the residual strength, or check the unit of both (Pa)"
         )
     if share:
-        warn_accuracy(f"{text}, so that these nodes do not weaken. Lower it if they should")
+        warn_accuracy(f"{text} and do not weaken. If they should, lower the residual strength")

@@ -152,7 +152,7 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
         return None
     return (
         f"{CHAIN_EVALUATIONS:,} evaluations of subset simulation by {method.type!r} take about"
-        f" {seconds / 3600.0:.1g} h. Allow them with max_evaluations, or pass algorithm='plain'"
+        f" {seconds / 3600.0:.1g} h. Allow so many with max_evaluations, or pass algorithm='plain'"
     )
 
 
@@ -246,9 +246,9 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
     shares = np.cumsum(np.sort(np.bincount(random.kinds, members))[::-1])
     count = 1 + int(np.searchsorted(shares, CARRIED_SHARE * shares[-1]))
     carried = f", and {count} of {shares.size} different ones carry {CARRIED_SHARE:.0%}"
-    advice = "Give the fit or posterior itself, from which more are drawn, or a longer list"
+    advice = "Pass the fit or posterior itself, which gives more interfaces, pass a longer list"
     if random.source is not None:
-        advice = "Take more repetitions of the fit (bootstrap=)"
+        advice = "Use more repetitions of the fit (bootstrap=)"
     return [
         f"the interfaces are a sample{f'{carried} of the mean' * bool(shares[-1])}. The"
         f" coefficient of variation is {estimate.cv:.2g} (target {target_cv:g}), of which this"

@@ -68,7 +68,7 @@ KEPT_POPULATIONS = 3
 """Number of the last populations that keep their draws."""
 NO_DRAWS = np.empty((0, 0))
 STORED_COPIES = KEPT_POPULATIONS + 2  # the states of the chains and their noise
-ADVICE = "Take fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
+ADVICE = "Use fewer nodes, truncate the spectrum earlier, or use algorithm='plain'"
 
 
 def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:

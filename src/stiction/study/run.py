@@ -258,13 +258,13 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     names = [str(name) for name, values in result.data_vars.items() if "event" in values.dims]
     if not names:
         raise InputError(
-            "result: has no events. Give the method events=, as in st.Equilibrium(events=20), or"
+            "result: has no events. Set events= of the method, as in st.Equilibrium(events=20), or"
             " call st.equilibrium_path or st.simulate_rupture"
         )
     if "sample" in result.dims:
         most, kept = int(result["arrested_events"].max()), result.sizes["event"]
         if most > kept:
-            warn_accuracy(f"events: {kept} of up to {most} a sample are kept. Raise events=")
+            warn_accuracy(f"events: only {kept} of up to {most} per sample kept. Raise events=")
     frame = _frame_of(result[names])
     return frame[frame["event_load (Pa)"].notna()].reset_index(drop=True)
 

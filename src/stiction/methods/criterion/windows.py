@@ -206,7 +206,7 @@ def windows_of(
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(W)[0]
-    advice = "The local criterion does not hold there. Use st.Equilibrium()"
+    advice = "The local criterion does not hold in this case. Use st.Equilibrium()"
     if not interface.is_plane:
         if length > interface.measure:
             raise InputError(
@@ -244,8 +244,8 @@ def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
         return fitting
     extents = " x ".join(f"{length:.4g}" for length in windows[0].extents)
     raise InputError(
-        f"interface.extent: no critical patch ({extents} m) fits in it. Widen it, or use"
-        " st.Equilibrium()"
+        f"interface.extent: is too small for a critical patch ({extents} m). Widen the extent,"
+        " or use st.Equilibrium()"
     )
 
 

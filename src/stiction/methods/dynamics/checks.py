@@ -54,9 +54,9 @@ def warn_of_slip(run: Run, state: RuptureState) -> None:
     steep = np.flatnonzero((state.slip > 0.0) & (steepest < W))
     if steep.size:
         warn_accuracy(
-            f"slip reached {interface.describe_node(steep[0])} (nodes in all: {steep.size}), where"
-            f" the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply"
-            " for this grid. Take more nodes, or end the interface there (interface.extent)"
+            f"slip reached {steep.size} nodes, the first at {interface.describe_node(steep[0])},"
+            f" where the strength falls by up to {W[steep].max():.3g} Pa/m, too steeply for this"
+            " grid. Use more nodes, or end the interface before these nodes (interface.extent)"
         )
     if now["reverse_margin"] < -_MIN_REVERSE * now["scale"]:
         warn_accuracy(
@@ -104,8 +104,8 @@ def warn_of_survival(stop: str, results: list[Any]) -> None:
         stuck = any(np.isnan(result["kinetic_stress"]) for result in results)
         what = "slide" if stop == "sliding" and stuck else "become unstable"
         warn_accuracy(
-            f"load: an interface did not {what} before its run ended. Its values for this event"
-            " are NaN, and failure_probability counts it as survived"
+            f"load: an interface did not {what} before its run ended. The values for this event"
+            " are NaN, and failure_probability counts the interface as a survivor"
         )
 
 
@@ -127,7 +127,7 @@ def warn_of_missed_jumps(found: Any, in_equilibrium: Any) -> None:
     warn_of_samples(
         "first_instability is up to {worst:.2g} % above the first instability in equilibrium in"
         " {samples}. A jump that lowered the mean stress by less than 1e-4 of the stress scale was"
-        " missed. Take more nodes, load more slowly, or use st.Equilibrium()",
+        " missed. Use more nodes, load more slowly, or use st.Equilibrium()",
         excess > MISSED_PERCENT,
         excess,
     )

@@ -86,7 +86,7 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
     modes, pairs = interface.wavenumbers.size, sum(kernel.poles.size for kernel in kernels)
     tables = 6 * modes / 2 if interface.is_plane else 10 * modes
     size = 8.0 * (pairs * (4 * modes + tables) + 40 * interface.size)
-    check_memory("interface.nodes", size, "Take fewer nodes, or a larger kernel_tolerance")
+    check_memory("interface.nodes", size, "Use fewer nodes, or a larger kernel_tolerance")
     limit = largest_step(names, eta, tolerance, interface.spacings) / speed
     if limit == 0.0:
         error = max(kernel.error for kernel in kernels)

@@ -59,7 +59,7 @@ def _load_history(load: Any) -> PiecewiseLinear | None:
         raise InputError("must be two arrays of numbers, (times, values)") from None
     finite = np.isfinite(times).all() and np.isfinite(values).all()
     if times.ndim != 1 or times.shape != values.shape or times.size < 2 or not finite:
-        raise InputError("needs two arrays of equal length, 2 or more, of finite numbers")
+        raise InputError("needs two arrays of finite numbers, of equal length (2 or more)")
     if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
         raise InputError("times must begin at 0 s and increase")
     return PiecewiseLinear(times, values)

@@ -122,7 +122,7 @@ def simulate_rupture(
     if problem.specimen is not None:
         return simulate_event(problem, rows, method, save, event, progress)
     if event is not None:
-        raise InputError("event: only specimens have numbered events. Leave it out")
+        raise InputError("event: only specimens have numbered events. Leave event out")
     stations = save.nodes(problem.interface)
     checks.warn_of_coarse_grid(problem, rows)
     run = make_run(method, method.medium(problem), rows, 0, stations)

@@ -74,7 +74,7 @@ def _check_loads(loads: Any) -> Array:
     rises = given.ndim == 1 and given.size and np.all(np.diff(given, prepend=-1e-300) > 0.0)
     if not (rises and np.isfinite(given[-1])):
         text = describe(given.tolist())
-        raise InputError(f"loads: must be finite, not negative, and rise, got {text}")
+        raise InputError(f"loads: must be finite, non-negative and increasing, got {text}")
     return given
 
 

@@ -68,8 +68,8 @@ NODES_AT_ENDS = 16
 """Number of nodes in a nucleation length above which no warning about
 the ends is issued."""
 COARSE_ENDS = (
-    "stress is singular at the ends of the slider. If 17 nodes are doubled, static friction changes"
-    " by up to 0.04 %, and the first instability by up to 0.5 %"
+    "stress is singular at the ends of the slider. If the 17 nodes are doubled, static friction"
+    " changes by up to 0.04 %, and the first instability by up to 0.5 %"
 )
 WARNINGS = (
     "the path was not followed to its end in {samples}: static friction is a lower bound",

@@ -315,17 +315,17 @@ class OnsetSolver:
         # divide them.
         share = values["certificate_gap"] / np.maximum(np.abs(first), 1e-300)
         warn_of_samples(
-            f"the bounds of the first instability did not close to {self.search.widest_gap:g} of"
-            " the load in {samples}. The bounds hold, but are up to {worst:.2g} of the load apart."
-            " Take more nodes",
+            f"the bounds of the first instability did not close to within {self.search.widest_gap}"
+            " of the load in {samples}. The bounds hold, but are up to {worst:.2g} of the load"
+            " apart. Use more nodes",
             ~unproved & ~(share <= self.search.widest_gap),
             share,
         )
         if self.problem.interface.is_plane:
             warn_of_samples(
                 "nodes reach a corner of the law or their residual strength before the first"
-                " instability in {samples}. It was found by following equilibria, to {worst:.2g}"
-                " of the load, and has no certificate",
+                " instability in {samples}. This instability was found by following equilibria, to"
+                " within {worst:.2g} of the load, and has no certificate",
                 unproved & np.isfinite(first),
                 share,
             )
@@ -342,9 +342,9 @@ class OnsetSolver:
             ~known,
         )
         warn_of_samples(
-            "a slipping node stops before the first instability in {samples}. Equilibria are no"
-            " longer the least, so the first instability has no upper bound and certificate_gap is"
-            " NaN",
+            "a slipping node stops before the first instability in {samples}. From then on, the"
+            " computed equilibrium need not be the least, so the first instability has no upper"
+            " bound, and certificate_gap is NaN",
             stopped & np.isfinite(first),
         )
         # Compare the peak with the stress of sliding, on the scale of
@@ -356,8 +356,8 @@ class OnsetSolver:
         above /= np.maximum(np.median(falls, axis=1), 1e-300)
         warn_of_samples(
             "all but the last nodes are at their residual strength before the peak in {samples}:"
-            " static friction then equals the mean residual strength to {worst:.2g} of the strength"
-            " drop, and depends on little else",
+            " static friction then equals the mean residual strength to within {worst:.2g} of the"
+            " strength drop, and depends on little else",
             values["residual_reached"] & (above < MIN_PEAK_HEIGHT),
             above,
         )

@@ -1,7 +1,7 @@
 """The rule for columns: which column of a table is read.
 
 A wrong column gives a wrong number, so a column is never guessed. The
-rule has one sentence (`RULE`). Its steps are:
+rule is stated in `RULE`. Its steps are:
 
 1. A column that the caller names is read.
 2. The words of a heading give the column a role (`role_of`). Only
@@ -30,8 +30,8 @@ from stiction.base.errors import InputError, unknown_name
 from stiction.base.units import is_in
 
 RULE = (
-    "A column is read if its heading, or the caller, says that it is the wanted quantity; if more"
-    " than one column could be it, none is read"
+    "A column is read if its heading, or the caller, says that it is the wanted quantity. If"
+    " several columns could be this quantity, none is read"
 )
 Role = Literal[
     "pressing force", "travel", "time", "friction", "force", "length", "specimen", "other"

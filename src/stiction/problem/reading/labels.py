@@ -257,8 +257,8 @@ def several_tables(table: Table) -> str:
     """Return the message about remarks that separate several tables in a file."""
     lines = ", ".join(map(str, table.begins[:5])) + ", ..." * (len(table.begins) > 5)
     return (
-        f"holds {len(table.begins)} tables with remarks between them, which begin at lines {lines}."
-        " Pass skip= with the number of lines above the last one, or save the wanted table alone"
+        f"holds {len(table.begins)} tables, separated by remarks. They begin at lines {lines}. Pass"
+        " skip= with the number of lines above the last table, or save the wanted table alone"
     )
 
 

@@ -196,8 +196,8 @@ def table_of(grid: Grid, options: Options, source: str) -> Table:
         # The first column may be an index.
         if headed and number and not heading[-1] and not np.isnan(array).all():
             raise InputError(
-                f"column {number} has numbers, such as in line {rows[0].number}, but no heading."
-                " If commas mark thousands, separate columns with ';'"
+                f"column {number} has numbers, for example in line {rows[0].number}, but no"
+                " heading. If commas mark thousands, separate columns with ';'"
             )
         columns.append(
             Column(*heading[:2], array, number, heading[-1], text, cells if text else ())
@@ -297,8 +297,8 @@ def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[R
         if len(row.cells) < width:
             most = next(row.number for row in rows if len(row.cells) >= width)
             raise InputError(
-                f"line {row.number} has {len(row.cells)} columns, but line {most} has {width}."
-                " Remove the line, or give it the same number of cells"
+                f"line {row.number} has {len(row.cells)} cells, but line {most} has {width}."
+                f" Remove line {row.number}, or give it {width} cells"
             )
     return rows
 
