@@ -264,7 +264,7 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     if "sample" in result.dims:
         most, kept = int(result["arrested_events"].max()), result.sizes["event"]
         if most > kept:
-            warn_accuracy(f"events: only {kept} of up to {most} per sample kept. Raise events=")
+            warn_accuracy(f"events: kept only {kept} of up to {most} per sample. Raise events=")
     frame = _frame_of(result[names])
     return frame[frame["event_load (Pa)"].notna()].reset_index(drop=True)
 
