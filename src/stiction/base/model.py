@@ -367,7 +367,10 @@ class _Listing(ABCMeta):
     """Type of `Listed`."""
 
     def __dir__(cls) -> list[str]:
-        """Return public names, less fields, which the signature shows, and internal members."""
+        """Return the public names without internal members and without fields.
+
+        The signature shows the fields.
+        """
         hidden = {*getattr(cls, "__dataclass_fields__", ())}
         for kind in cls.__mro__:
             if "_shown" in vars(kind):

@@ -328,8 +328,8 @@ def _cost(study: Any) -> dict[str, str]:
 def _seconds(point: Any) -> float:
     """Return the processor time of a sample, s, or its estimate if samples are slow or fail.
 
-    Batches double until a batch takes long enough. Each batch runs
-    twice, because kernels compile in its first run.
+    The size of batches doubles until a batch takes long enough. Each
+    batch runs twice, because kernels compile in its first run.
     """
     seconds, count = point.seconds, 1
     with suppress(InputError, RuntimeError, ArithmeticError), collect_warnings():

@@ -1,10 +1,10 @@
-"""Stiffness of a rectangular body on its surface, from columns across it.
+"""Stiffness of a rectangular body at its surface, assembled from columns of elements.
 
 Problem
 -------
 A body has n cells of width h along its surface. The displacement u
-along x is defined on the lines through the middles of the cells, and
-the displacement v into the body on the lines at their edges. y is the
+along x is defined on lines through the middles of the cells, and the
+displacement v into the body on lines through their edges. y is the
 depth below the surface. With Lame's lambda and G of the plane state,
 and P = lambda + 2 G, the elastic energy is
 
@@ -17,26 +17,26 @@ with the forces of a push on the left side.
 
 Algorithm: our own
 ------------------
-Staggered differences along x, elements of degree 6 across. Each
-derivative along x has the symbol 2i sin(k h/2)/h, so that a half-plane
+Use staggered differences along x, and elements of degree 6 across the
+body. Each derivative along x has the symbol 2i sin(k h/2)/h, so that a half-plane
 has the symbol E* sin(k h/2)/h of the lattice.
 
-1. Elements across (`graded`, `Elements`): their sizes are 2 h, 6 h, 18
-   h and so on, away from the surface and from both edges of a push. All
-   integrals are exact.
-2. Terms of a cell, an edge between two cells, and an edge at an end,
-   where sigma_xx = 0 or -p in the half cell between the line and the
-   end (`Columns`).
-3. A piece is a matrix with labels. `merge` adds pieces and eliminates
-   labels by Cholesky.
-4. Cell 0 and edge 1 are a period. n - 1 periods are two copies of half
-   of them, and one period more if n - 1 is odd (`_repeated`). A piece
-   keeps its first and last two lines, and its points on the surface and
-   the far side.
-5. Columns beyond the surface in contact grow outwards. Merge them
-   inwards (`_beyond`).
-6. Merge the cells with the last cell and the ends. If the far side is
-   held, its points are left out of each term.
+1. Choose elements across the body (`graded`, `Elements`) with the sizes
+   2 h, 6 h, 18 h and so on, away from the surface and from both edges
+   of a push. All integrals are exact.
+2. Integrate the energy of a cell, of an edge between two cells, and of
+   an edge at an end (`Columns`). At an end, sigma_xx is 0 or -p in the
+   half cell between the outermost line and the end.
+3. Store each piece of the body as a matrix with labels. To join pieces,
+   add them and eliminate labels by Cholesky (`merge`).
+4. A period consists of cell 0 and edge 1. To assemble n - 1 periods,
+   merge two copies of half as many periods, and add one period if n - 1
+   is odd (`_repeated`). Of each piece, keep the first and last two
+   lines, and the points on the surface and on the far side.
+5. Beyond the contact, columns become wider with distance. Merge them
+   from the outermost column inwards (`_beyond`).
+6. Merge the result with the last cell and both ends. If the far side is
+   held, leave its points out of each term.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 Problem
 -------
 The top is on rollers (v = 0, s_xy given). On the interface u is given,
-and s_yy = 0. Both edges are mirrors, so that the stresses follow from
-Airy's function (S. Timoshenko and J. Goodier, Theory of Elasticity,
-article 24) as a sum of independent harmonics,
+and s_yy = 0. Top and interface act as mirrors, so the stresses
+follow from Airy's function (S. Timoshenko and J. Goodier, Theory of
+Elasticity, article 24) as a sum of independent harmonics,
 
     phi = sum Phi_k(x) sin(k y),   s_xx = -k² Phi_k sin(k y),   s_yy = Phi_k'' sin(k y),
     s_xy = -k Phi_k' cos(k y),     k = pi/(2 H), 3 pi/(2 H), ...     (1)
@@ -22,12 +22,13 @@ k² int (d²g_k/dx ds) d ds there, with E* = 8 G/(kappa + 1).
 
 Algorithm
 ---------
-1. Write g_k as the beam without ends, (1 + k r) exp(-k r)/(4 k³) at a
-   distance r, minus two parts: the single reflection at each clamp,
+1. Write g_k as the solution for a beam without ends,
+   (1 + k r) exp(-k r)/(4 k³) at a distance r, minus two parts: the
+   single reflection at each clamp,
    (1 + k (x + s) + 2 k² x s) exp(-k (x + s))/(4 k³) for the left clamp,
    and a `remainder`, the reflections between the clamps.
-2. Sum the beam without ends and the single reflections over k in closed
-   form (`sums`).
+2. Sum the solution without ends and the single reflections over k in
+   closed form (`sums`).
 3. The remainder falls as exp(-k L), so that few harmonics give it to
    round-off (`reflected`). The remainder is a combination of the four
    solutions of (2) without load: exp(-k x), k x exp(-k x) and the same

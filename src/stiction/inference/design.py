@@ -1,15 +1,15 @@
-"""Designs of tests: what further tests will tell, before any test is made.
+"""Designs of tests: what further tests would tell, before any test is made.
 
-Problem. Two questions are answered. With a prior of parameters theta:
-how much information about each parameter will a design, such as ten
-tests, give? The information is the mean over campaigns of the
+Problem. Two questions are answered. Given a prior of the parameters
+theta: how much information about each parameter would a design, such as
+ten tests, give? The information is the mean over campaigns of the
 divergence of the posterior from the prior,
 
     I = E int p(theta_i | y) log (p(theta_i | y)/p(theta_i)) dtheta_i.
 
-After measurements, with a fit or a posterior: how wide will the
-intervals of mean and scatter be after further tests, and how large the
-design stress?
+After measurements, given a fit or a posterior: how wide would the
+intervals of mean and scatter be after further tests, and how large
+would the design stress be?
 
 Source. Lindley (1956), Annals of Mathematical Statistics 27, 986,
 defined this information. It is computed by nested Monte Carlo. The
@@ -23,13 +23,13 @@ Steps for the information, for each design and each simulated campaign:
    (`stiction.inference.posterior`). Known parameters keep their drawn
    values. If the posterior lies between the points of a coarse grid,
    make the box smaller around the true parameters.
-4. Compute the divergence of each marginal
-   posterior. I is the mean over campaigns.
+4. Compute the divergence of each marginal posterior. I is the mean over
+   campaigns.
 
 Steps for the widths, for each design and each simulated campaign:
 
-5. Draw true values (field, family, s and mean) from the posterior given
-   the present measurements.
+5. Draw true values (field, family, scatter s between specimens, and
+   mean) from the posterior given the present measurements.
 6. Draw further peaks, and levels of further profiles, with these values.
 7. Compute the posterior given all measurements
    (`stiction.inference.specimens`).

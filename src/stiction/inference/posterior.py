@@ -71,7 +71,7 @@ MAX_BATCH = 5_000
 
 @dataclass(frozen=True, eq=False)
 class PosteriorGrid:
-    """Posterior probabilities of cells with equal prior mass in a box."""
+    """Posterior probabilities of the cells of a box. All cells have the same prior mass."""
 
     box: Array  # corners, as u, (2, parameters)
     mass: Array  # of the cells, (n_1, ..., n_parameters); sums to 1
@@ -366,10 +366,11 @@ class SpecimenPosterior(Posterior):
     def prediction(
         self, problem: Problem, method: Any, changes: Mapping[str, float], workers: int | None
     ) -> Prediction:
-        """Return the prediction for a problem with constants changed by full key.
+        """Return the prediction for a problem in which some constants are changed.
 
-        The strength is inferred again with the changed constants. A
-        constant of the tests changes if it has the same value as in the
+        `changes` names the constants by full key. The strength is
+        inferred again with the changed constants. A constant of the
+        tests changes too if it has the same value there as in the
         problem.
         """
         of_problem = {key[8:]: v for key, v in changes.items() if key[:8] == "problem."}

@@ -273,7 +273,7 @@ def chosen_row(
 def _mark(
     axes: Axes, interface: Interface, results: Mapping[str, xr.Dataset], factor: float
 ) -> None:
-    """Mark the positions of onsets. On a line, marks are at the loads times `factor`."""
+    """Mark the positions of onsets. On a line, their heights are the loads times `factor`."""
     length, length_unit = unit_for("m", interface.lengths)
     for number, (name, result) in enumerate(results.items()):
         place = np.atleast_1d(result["critical_position"].values[0]) * length

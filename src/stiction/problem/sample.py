@@ -212,7 +212,7 @@ def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
 
 
 def _offset(dim: str, x: Array, interface: Interface) -> float:
-    """Return the offset of the points from the nodes, in spacings, in (-0.5, 0.5]."""
+    """Return the offset of points from nodes over the spacing, within (-0.5, 0.5]."""
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
     formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"

@@ -3,11 +3,11 @@
 `EquallyLikely` is the only protocol for random inputs, so that one search
 for failures covers all members. For several members:
 
-1. Collect the draws of all members. Members use one draw for the same
+1. Collect the draws of all members. Members share one draw for the same
    property and mode (`_shared`).
-2. A first draw, mapped to a uniform number, selects the member
+2. Map the first draw to a uniform number, which selects the member
    (`EquallyLikely.member`).
-3. The member maps the other draws that it uses to profiles
+3. Let this member map the other draws that it uses to profiles
    (`EquallyLikely.from_draws`).
 """
 

@@ -142,7 +142,7 @@ def quantile_table(marginal: Any) -> Array:
 
 
 def from_normal(marginal: Any, z: Array) -> Array:
-    """Compute F^-1(Phi(z)) for an array with any shape, to a relative 1e-9 (Grigoriu, 1995)."""
+    """Compute F^-1(Phi(z)) for an array, with a relative error below 1e-9 (Grigoriu, 1995)."""
     if hasattr(marginal, "of_normal"):
         return np.asarray(marginal.of_normal(np.asarray(z, np.float64)))
     flat = np.ascontiguousarray(z, dtype=np.float64).ravel()

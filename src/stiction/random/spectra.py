@@ -4,19 +4,19 @@ With a density g(k), the correlation of z on a line at the lag x is
 
     rho(x) = int_0^K g(k) cos(k x) dk / int_0^K g(k) dk,                                      (1)
 
-with the truncation K. Samples have the truncated spectrum, so
-correlations and lengths also refer to the truncated spectrum.
+where K is the largest wavenumber. Samples have the truncated spectrum,
+so correlations and lengths refer to this spectrum too.
 
 1. Integrate (1) octave by octave, because densities span decades, with
    QUADPACK's rule for a cosine (R. Piessens, E. de Doncker-Kapenga, C.
    Ueberhuber and D. Kahaner, QUADPACK, 1983) (`_integrate`).
-2. Find the length at which the correlation falls to 1/e by marching and
-   a search (`lag_of_correlation`).
+2. Find the length at which the correlation falls to 1/e by marching,
+   then by a search (`lag_of_correlation`).
 
-On a plane the field is isotropic, and along any
-straight line it has the same correlation as a field on
-a line. Therefore, in D dimensions the exponent of 1 +
-k^2 grows by (D - 1)/2, and a Gaussian keeps its form.
+On a plane the field is isotropic, and along any straight line it has
+the same correlation as a field on a line. Therefore, in D dimensions
+the exponent of a power law in 1 + k^2 grows by (D - 1)/2, and a
+Gaussian keeps its form.
 
 To add a spectrum, write a subclass of `ScaledSpectrum` and `register` it.
 """

@@ -110,7 +110,7 @@ class _Guard:
         return self._of_laws[state]
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        """Return the compiled form for types of arguments, if it is stored."""
+        """Return the compiled form for the given types of arguments, if it is stored."""
         cache = self._cache_of(signature)
         compiled = cache.load_overload(signature, target) if cache else None
         if compiled is None:

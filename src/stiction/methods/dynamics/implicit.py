@@ -118,7 +118,7 @@ def _choose_size(now: Any, setting: Setting, step: float) -> Any:
 def _assemble(
     state: RuptureState, setting: Setting, tables: ImplicitTables, attempt: _Attempt
 ) -> Any:
-    """Step 2: write matrix, stress without slip and first guess.
+    """Step 2: write the matrix, the stress without slip, and the first guess of u.
 
     Return the accuracy of u, Pa.
     """

@@ -122,9 +122,9 @@ class Run:
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
 
     def start(self, time: float, slip: Floats | None = None) -> RuptureState:
-        """Phase 1: return the state at rest, or in equilibrium with a slip, with an empty memory.
+        """Phase 1: return the state at rest, or in equilibrium at a given slip.
 
-        If any stress exceeds the strength by more than round-off,
+        The memory is empty. If any stress exceeds the strength by more than round-off,
         explicit steps come first.
         """
         interface, impedance = self.medium.interface, self.medium.impedance
@@ -247,13 +247,11 @@ class Run:
         return taken, Reason.DONE
 
     def _follow_event(self, state: RuptureState, rests: bool) -> None:
-        """Keep the open event if it has ended.
-
-        Open the event that has just begun.
+        """Keep the open event if it has ended, and open the event that has just begun.
 
         An event ends when its fast slip has settled (`rests`). If the
-        next event begins before, the open event ends at the maximum of
-        the mean stress at which the next event begins.
+        next event begins before then, the open event ends where the
+        next event begins: at a maximum of the mean stress.
         """
         now, event = state.now, state.now["event"]
         if rests:

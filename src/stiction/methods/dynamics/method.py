@@ -1,4 +1,4 @@
-"""Ruptures with inertia as a method: options, solver, and thresholds for a run."""
+"""The method `Rupture`, with inertia: its options, its solver, and the thresholds of a run."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def _write_table(path: Path, header: list[str], columns: list[Any], form: str) -
 
 
 def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
-    """Return names with as few decimals as distinguish places along strike and down-dip (m)."""
+    """Return file names with as few decimals as distinguish the places along both axes (m)."""
     for decimals in range(MOST_DECIMALS + 1):
         width = 3 if decimals == 0 else 4 + decimals
         texts = [

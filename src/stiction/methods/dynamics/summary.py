@@ -227,10 +227,11 @@ def summary(run: Run, state: RuptureState) -> dict[str, Any]:
 def front_speeds(
     interface: Interface, axis: int, arrival: Floats, nucleation: float
 ) -> dict[str, float]:
-    """Return the speeds of a front along a line of nodes, m/s, or NaN, by name as in `SPEEDS`.
+    """Return the speeds of a front along a line of nodes (m/s, or NaN).
 
-    `arrival` (s) holds the times along this axis, and `nucleation` is
-    the nucleation length (m).
+    The names are the names in `SPEEDS`. `arrival` holds the arrival
+    times (s) along `axis`, and `nucleation` is the nucleation length
+    (m).
     """
     spacing, longest = interface.spacings[axis], 0.25 * interface.lengths[axis]
     front = {}

@@ -126,15 +126,16 @@ class Kink(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A slider on its path.
+    """State of a slider on its path of equilibria.
 
-    Nodes are cells 0 to n-1 and edges n to 2n. Arrays are changed.
+    Nodes are cells 0 to n-1 and edges n to 2n. Functions change the
+    arrays in place.
 
     `columns` is M transposed. `difference` is mu_p - mu_r, and
     `weakening` is W. Both are 0 from the corner on. `loads` holds the
     load D, the force F and the largest F so far. `counts` holds the
-    sizes of S and E, the number of events, and how often S was bordered
-    again.
+    sizes of S and E, the number of events, and the number of times that
+    all of S was bordered again.
     """
 
     columns: Array  # (m, m): row s is column s of M, Pa

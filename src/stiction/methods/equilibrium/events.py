@@ -257,9 +257,9 @@ def place_of(interface: Interface, node: int) -> list[float]:
 
 
 def moment_of(problem: Problem, slip: Array) -> float:
-    """Return the moment of a slip (m), N, or the rate from a slip rate, N/s.
+    """Return the moment (N) of a slip in m, or the moment rate (N/s) of a slip rate in m/s.
 
-    N m on a plane.
+    On a plane, the units are N m and N m/s.
     """
     return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
 

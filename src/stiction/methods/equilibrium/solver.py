@@ -3,15 +3,15 @@
 Problem
 -------
 The load (Pa) rises slowly from zero. K is the stiffness (Pa/m), d >= 0
-the slip (m), s(d) the strength minus initial stress (Pa), which falls
-with slip, and p the load profile. Slip d is an equilibrium at a load if
+the slip (m), s(d) the strength minus the initial stress (Pa), which
+falls with slip, and p the load profile. Slip d is an equilibrium at a load if
 
     load p - K d <= s(d),  with '=' where d > 0.                     (1)
 
 Follow the least equilibrium, which an interface without inertia takes,
 from rest to the load at which (1) has no solution: there the whole
-interface slides. Slip never goes back. The first instability is the
-load at which the path of equilibria turns first, and a patch jumps.
+interface slides. Slip never decreases. The first instability is the
+load at which the path of equilibria first turns and a patch jumps.
 
 Algorithm for a sample
 ----------------------

@@ -140,7 +140,7 @@ def stress_tolerance(sample: StaticSample, load: float) -> float:
 
 @jit_inside
 def _solve(state: SlipState, load: float, n_slipping: int) -> None:
-    """Write the slip in S at a load to `workspace.solution`. Also write K d."""
+    """Write the slip of S at a load to `workspace.solution`, and K d to `state.Kd`."""
     cholesky.solve_slip(state.workspace, n_slipping, load, state.workspace.solution)
     cholesky.multiply_slipping(state.workspace, n_slipping, state.workspace.solution, state.Kd)
 

@@ -132,7 +132,7 @@ class PathEvent(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Slipping set S after a node started to slip."""
+    """Slipping set S after a node has started to slip."""
 
     bounded: bool  # whether rates of slip exist; if not, the path ends
     n_slipping: int
