@@ -24,8 +24,8 @@ Steps for a predicted sample:
    of the remaining values, and the integral is over all values.
 2. Choose n values at random, and compute both distances between these
    and the remaining values.
-3. The p-value is the fraction of choices whose distance is at least the
-   distance of the measured values.
+3. Compute the p-value: the fraction of choices whose distance is at
+   least the distance of the measured values.
 
 Steps for a posterior. All peaks of a campaign have the same unknown
 parameters.
@@ -35,8 +35,8 @@ parameters.
 5. Draw each simulated campaign from one of these distributions, and
    compute its distances from their mean. If a campaign has several
    kinds of specimens, add W^2 over the kinds and take the largest D.
-6. The p-value is the fraction of campaigns whose distance is at least the
-   distance of the measured campaign.
+6. Compute the p-value: the fraction of campaigns whose distance is at
+   least the distance of the measured campaign.
 """
 
 from collections.abc import Iterable

@@ -30,8 +30,8 @@ Steps:
    are unknown, and steps 4 and 5 give too short an interval. Also
    include the quantiles of the repetitions themselves (Efron's
    percentiles; Davison and Hinkley, section 5.3).
-7. A likely field is the estimate minus the error of one repetition
-   times the width.
+7. Compute each likely field: the estimate minus the error of one
+   repetition times the width.
 
 Departures. Only one step of the inversion is made, and the correlation
 length is varied for all parameters.

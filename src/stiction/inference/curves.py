@@ -25,7 +25,7 @@ Steps:
    parabola to the readings around it that lie within the threshold of
    it. The peak is the largest value of the parabola, and its error that
    of the fit. Fewer readings than `MIN_FITTED` are not fitted.
-5. Drops that begin before the peak are precursors.
+5. Count the drops that begin before the peak as precursors.
 6. Plateau. Readings after the last reading within the threshold of the
    peak, from three quarters of the fall to their median on. A final fall
    below half of this median is unloading, and does not count.

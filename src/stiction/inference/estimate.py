@@ -20,7 +20,7 @@ Steps:
    repeat both steps once with the estimated noise.
 3. Increase the variance of the marginal by the amount that removal of
    the mean and the trend takes from the values on average.
-4. A family's score is its mean log likelihood times the number of
+4. Score each family by its mean log likelihood times the number of
    independent values (step 5), minus one for each estimated parameter.
 5. Families fitted to the same values have the same mean and variance.
    The log ratio of their densities therefore begins with Hermite order

@@ -24,7 +24,7 @@ Steps:
    information M. Divide the damping by 10 after a step that raises the
    likelihood, and multiply it by 10 otherwise. Hold parameters that are
    at their limits. Stop after a small gain.
-4. A normal marginal has the mean of the values, and the variance that
+4. Give a normal marginal the mean of the values, and the variance that
    they would have without noise.
 """
 

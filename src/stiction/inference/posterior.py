@@ -15,9 +15,9 @@ Steps:
 
 1. Divide a box into equal cells, and
    compute log L at the centre of each cell.
-2. The mass of a cell is L over the sum of L. Z is
-   the sum of L times the volume of a cell (midpoint
-   rule). The part outside the box is neglected.
+2. Divide L by the sum of L to find the mass of a cell. Compute Z, the
+   sum of L times the volume of a cell (midpoint rule). Neglect the part
+   outside the box.
 3. Shrink the box. For each parameter, cut off cells with a mass up to
    `OUTSIDE_MASS` on either side, but keep one more cell on either side.
 4. Repeat, at most `MAX_GRID_ZOOMS` times, until no side of the box

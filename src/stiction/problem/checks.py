@@ -2,11 +2,13 @@
 
 Each check takes values in SI. The steps of a sample are:
 
-1. Profiles with valid values fit together (`contradictions_of`).
-2. The nodes resolve the nucleation length h_n, and h_n fits the
-   interface (`check_resolution`). Methods warn with the error that they
-   expect (`warn_if_coarse`).
-3. Strengths and stresses are in the assumed units (`doubt_sample`).
+1. Check that profiles with valid values fit together
+   (`contradictions_of`).
+2. Check that the nodes resolve the nucleation length h_n, and that h_n
+   fits the interface (`check_resolution`). Methods warn with the error
+   that they expect (`warn_if_coarse`).
+3. Check that strengths and stresses are in the assumed units
+   (`doubt_sample`).
 """
 
 from __future__ import annotations

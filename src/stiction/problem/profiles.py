@@ -3,13 +3,14 @@
 `placed_sample` takes labelled or plain arrays through five steps. Each
 returns a new value:
 
-1. Names: of the profiles (`named_profiles`), and of their variables and
-   dimensions (`named` in `reading/labels.py`).
-2. SI units (`profile_in_si` in `base/units.py`).
-3. Nodes (`on_nodes` in `sample.py`).
-4. Checks: of values (`as_rows`), and that each is given once
+1. Find the names of the profiles (`named_profiles`), and of their
+   variables and dimensions (`named` in `reading/labels.py`).
+2. Convert the profiles to SI units (`profile_in_si` in
+   `base/units.py`).
+3. Assign values to nodes (`on_nodes` in `sample.py`).
+4. Check the values (`as_rows`), and that each property is given once
    (`given_twice`).
-5. The sample, with what the problem gives (`made`).
+5. Make the sample with the constants of the problem (`made`).
 
 `at_nodes` takes steps 1 to 3 for a profile of a load, a law or a
 picture. `read_profile` reads a file, and `profile_in_file` a profile

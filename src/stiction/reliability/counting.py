@@ -33,8 +33,8 @@ Steps for specimens (`count_tail`):
    spread over these interfaces, and by factors at stratified quantiles
    of their distributions. This gives `SPECIMENS_PER_SAMPLE` specimens
    for each solved sample.
-7. The specimens from one solved sample form a family. The error follows
-   from the fraction of each family among the failures
+7. Treat the specimens from one solved sample as a family. Compute the
+   error from the fraction of each family among the failures
    (`subset.ancestral_variance`), as in subset simulation.
 8. Solve more samples until the error is small enough.
 

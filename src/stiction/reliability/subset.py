@@ -16,32 +16,33 @@ Steps. A level is the set of z with g(z) below its ceiling.
 
 1. Draw N samples and evaluate them. They form the first level, whose
    ceiling is infinite.
-2. A tenth of N samples, with the lowest values, goes on. The next
-   ceiling is the lowest value that does not go on. If this value is
-   below the requested threshold, take the threshold. If it is at the
-   floor of g, take the number just above the floor.
+2. Keep the tenth of the N samples with the lowest values. The next
+   ceiling is the lowest value that is not kept. If this value is below
+   the requested threshold, take the threshold. If it is at the floor of
+   g, take the number just above the floor.
 3. The next level's probability is the probability of this level times the
    fraction of its samples strictly below the ceiling.
-4. Stop if the threshold, the floor or the requested
-   probability is reached. The walk is incomplete if it
-   stops because no sample goes on, after `MOST_LEVELS`
-   levels, or because the evaluations are used up.
-5. Each sample that goes on begins a chain, about N states in all. A
+4. Stop if the threshold, the floor or the requested probability is
+   reached. The walk is incomplete if it stops because no sample is
+   kept, after `MOST_LEVELS` levels, or because the evaluations are used
+   up.
+5. Begin a chain at each kept sample, with about N states in total. A
    step moves z to z' = sqrt(1 - b^2) z + b w, with a standard normal w.
    This preserves the normal distribution. The chain stays at z if g(z')
-   is not below the ceiling. After step t, b is multiplied by exp((fraction
-   of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b = 1. The states
-   are the samples of the next level. Continue with step 2.
+   is not below the ceiling. After step t, b is multiplied by
+   exp((fraction of accepted steps - `ACCEPTANCE`) / sqrt(t)), up to b =
+   1. The states are the samples of the next level. Continue with step
+   2.
 6. P(g < y) is the probability of the rarest level whose ceiling is at
    least y, times the fraction of its samples below y. The error follows
    from their first ancestors (`ancestral_variance`).
 
-Departures. Only samples strictly below the ceiling go on. The product
-of the fractions is then unbiased, although the levels are chosen from the
-samples (Brehier, Gazeau, Goudenege, Lelievre and Rousset, 2016). If the
-lowest values are all equal, the next higher value is the ceiling. All
-chains move together, and the step size is adapted to their acceptance
-at every step.
+Departures. Only samples strictly below the ceiling are kept. The
+product of the fractions is then unbiased, although the levels are
+chosen from the samples (Brehier, Gazeau, Goudenege, Lelievre and
+Rousset, 2016). If the lowest values are all equal, the next higher
+value is the ceiling. All chains move together, and the step size is
+adapted to their acceptance at every step.
 """
 
 import math

@@ -26,10 +26,10 @@ Steps:
 5. Suppose that 'auto' chose the guide. If less than a fraction `POOR` of
    the samples that the guide selects are failures, sample again by
    subset simulation.
-6. The stress at a probability follows from p(s) by bisection. The
-   interval of the stress ends at the two stresses that belong to the
-   interval ends of p. If no sample is so low, the lower end is
-   the least possible stress.
+6. Find the stress at a probability from p(s) by bisection. The interval
+   of the stress ends at the two stresses that belong to the interval
+   ends of p. If no sample is so low, the lower end is the least
+   possible stress.
 """
 
 import math

@@ -44,10 +44,10 @@ local criterion is v with unit integral,
 Weights on a grid must not be negative, so that an average lies between
 the least and the greatest strength. The steps are:
 
-1. Galerkin's method gives lambda_0 and a_m (`eigenvalue_and_vector`).
-2. The midpoint rule gives the transform of g (`multiplier`).
-3. Nodes inside the patch have samples of g as weights. The weights at
-   the ends of the patch are fitted to the transform, by least squares
+1. Find lambda_0 and a_m by Galerkin's method (`eigenvalue_and_vector`).
+2. Compute the transform of g by the midpoint rule (`multiplier`).
+3. Take samples of g as the weights of nodes inside the patch. Fit the
+   weights at the ends of the patch to the transform, by least squares
    among weights that are not negative (`grid_weights`).
 """
 

@@ -2,16 +2,16 @@
 
 A run goes through phases (`Run.take_steps`):
 
-1. It begins at rest at the first slip, or at an equilibrium
-   (`Run.start`). Implicit steps come first, unless the stress is above
-   the strength by more than round-off.
-2. Implicit steps follow creep until their size falls below
-   `Thresholds.smallest_step`. Then the memory is rescaled and explicit
-   steps take over (`_to_explicit`).
-3. Explicit steps follow waves until the interface has been calm for a
-   while. Then implicit steps take over. The first of these is of first
-   order (`_to_implicit`).
-4. The run ends for one of the reasons in `Run.ending`.
+1. Begin at rest at the first slip, or at an equilibrium (`Run.start`).
+   Implicit steps come first, unless the stress is above the strength by
+   more than round-off.
+2. Follow creep by implicit steps until their size falls below
+   `Thresholds.smallest_step`. Then rescale the memory, and change to
+   explicit steps (`_to_explicit`).
+3. Follow waves by explicit steps until the interface has been calm for
+   a while. Then change to implicit steps. The first of these is of
+   first order (`_to_implicit`).
+4. End the run for one of the reasons in `Run.ending`.
 """
 
 import dataclasses

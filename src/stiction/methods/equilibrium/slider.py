@@ -19,7 +19,7 @@ The algorithm is our own (`press`, `begin_push`).
    strength. Change the sign of such cells, and press again.
 3. Push. Slip in the push is positive. Slip of both stages in either
    direction adds up in the weakening. Edges that are open begin in S.
-4. Instabilities and arrests alternate until the slider slides
+4. Follow instabilities and arrests in turn until the slider slides
    (`SliderPath.follow`). The first instability is the first of them
    during the push. Static friction is the largest force.
 

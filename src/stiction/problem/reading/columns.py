@@ -3,14 +3,14 @@
 A wrong column gives a wrong number, so a column is never guessed. The
 rule is stated in `RULE`. Its steps are:
 
-1. A column that the caller names is read.
-2. The words of a heading give the column a role (`role_of`). Only
+1. Read a column that the caller names.
+2. Give each column a role by the words of its heading (`role_of`). Only
    columns with numbers whose unit fits, or is not stated, can be the
    wanted quantity.
-3. The column is read whose heading says that it is the wanted quantity.
-   If no heading does, the column is read that is the only one besides
-   numbers of specimens, times and places.
-4. Otherwise the choice is refused. The message lists all columns, their
+3. Read the column whose heading names the wanted quantity. If no
+   heading does, read the only column that is left besides numbers of
+   specimens, times and places.
+4. Otherwise refuse the choice. The message lists all columns, their
    roles and the argument to add.
 
 `Reading` states what was read. Every reader adds it to its result.

@@ -5,18 +5,19 @@ mark and the place of the units. A wrong guess could change a value by a
 factor of a thousand, so a table that can be read in two ways is
 refused. The cells come from `files.py`. The steps are:
 
-1. Columns with numbers. Most rows with numbers have them in the same
-   columns.
-2. Rows. A row holds data if its cells in these columns are numbers or
-   empty. Rows above the first such row are headings, units or remarks.
-   Below, repeated headings, remarks and statistics (mean, SD, n) are
-   left out, and the table says so. A row with another text is refused.
+1. Find the columns with numbers. Most rows with numbers have them in
+   the same columns.
+2. Find the rows with data. A row holds data if its cells in these
+   columns are numbers or empty. Rows above the first such row are
+   headings, units or remarks. Below, repeated headings, remarks and
+   statistics (mean, SD, n) are left out, and the table says so. A row
+   with another text is refused.
 3. Decimal mark, which is the same in the whole file. If points or
    commas may also mark thousands, the file is refused unless the caller
    states `decimal`.
-4. Cells become numbers. Empty cells and words for a missing value
-   become NaN.
-5. Headings are split into names and units.
+4. Convert cells to numbers, and empty cells and words for a missing
+   value to NaN.
+5. Split headings into names and units.
 """
 
 from __future__ import annotations

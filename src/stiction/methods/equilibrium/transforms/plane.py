@@ -29,9 +29,9 @@ also for long lines:
    load. Each step is proved to be stable
    (`relaxation.stable_equilibrium`). If the proof fails, the step is
    shortened, down to the requested gap.
-6. The end of the path is then followed event by event (`fold`), to see
-   whether it turns, and how.
-7. A jump goes to the least equilibrium a little above the load of the
+6. Follow the end of the path event by event (`fold`), to see whether it
+   turns, and how.
+7. Let a jump go to the least equilibrium a little above the load of the
    turn (`relaxation.least_equilibrium`).
 """
 

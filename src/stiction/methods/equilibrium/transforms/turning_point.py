@@ -36,8 +36,8 @@ join, mu' falls in steps.
 4. With states of both signs, guess an a between these states,
    alternately as if mu' were linear in a and as if mu' had a single
    step (`_amplitude_between`).
-5. The next load is the load at which the spring would have no force at
-   the next a (`_load_at`), kept below the upper bound.
+5. Take as the next load the load at which the spring would have no
+   force at the next a (`_load_at`), kept below the upper bound.
 6. End if the bounds are close enough, or if successive states hardly
    narrow the bounds.
 
