@@ -1,0 +1,111 @@
+"""Laws of texts and limits: a number in a text is what it names, and a limit itself is allowed."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pint
+import pytest
+from refusals import refuses
+from setups import LOCAL, make_problem
+from small_study import small_study
+
+import stiction as st
+from stiction.base.progress import duration
+from stiction.cli.pages import write_report
+from stiction.ensemble import store
+from stiction.problem.reading import files
+from stiction.statistics import density
+
+Q = pint.UnitRegistry()
+NODES = 64
+PRESSED = make_problem(NODES, 0.05, load=st.Load(normal_pressure=2e6))
+STUDY = small_study(samples=5)
+
+
+@pytest.mark.parametrize("seconds", np.geomspace(2e-7, 4e7, 30))
+def test_a_duration_is_the_seconds_that_it_was(seconds):
+    value, unit = duration(seconds).split()
+    assert (float(value) * Q(unit)).to("s").magnitude == pytest.approx(seconds, rel=5e-3)
+
+
+@pytest.mark.parametrize("wrong", [1, 3])
+def test_a_refusal_counts_the_samples_after_the_first(wrong):
+    problem = make_problem(NODES, 0.05, load=st.Load(initial_stress=2e5))
+    strength = np.full((5, NODES), 1e6)
+    strength[1 : 1 + wrong, 7] = 1e5
+    with pytest.raises(st.InputError) as caught:
+        st.onset(problem, strength, method=LOCAL)
+    assert ("further samples: 2" in str(caught.value)) == (wrong == 3)
+    assert ("further" in str(caught.value)) == (wrong == 3)
+
+
+def test_a_table_of_the_largest_size_is_read(monkeypatch, tmp_path):
+    path = tmp_path / "table.csv"
+    for columns, letters in ((4, 12), (5, 12), (4, 13)):
+        names = ["x (mm)", "strength kPa", *"ab", "c"][:columns]
+        rows = [",".join([f"{x}.0", "1000", "0" * letters, "1", "2"][:columns]) for x in "0123"]
+        path.write_text("\n".join([",".join(names), *rows]))
+        monkeypatch.setattr(files, "MAX_COLUMNS", 4)
+        monkeypatch.setattr(files, "MAX_LETTERS", 12)
+        if (columns, letters) == (4, 12):
+            np.testing.assert_allclose(st.read_profile(path), 1e6)
+        else:
+            refuses(
+                "line ... 4" if columns > 4 else "line ... 12", lambda: st.read_profile(path)
+            )
+
+
+def test_values_at_both_bounds_have_a_density():
+    values = np.append(np.random.default_rng(0).uniform(size=400), [0.0, 1.0])
+    assert density(values, bounds=(0.0, 1.0)).value.min() >= 0.0
+    refuses("bounds", lambda: density(values, bounds=(1e-3, 1.0)))
+
+
+@pytest.mark.parametrize("profiles", [{"strength": 1e6}, {"friction_coefficient": 0.5}])
+def test_a_run_of_any_profiles_has_a_page(profiles, tmp_path):
+    profiles = {name: value * np.linspace(1.0, 1.2, NODES) for name, value in profiles.items()}
+    study = st.Study(problem=PRESSED, method=LOCAL, profiles=profiles)
+    study.run(out=tmp_path / "run", progress=False)
+    write_report(st.open_run(tmp_path / "run"), tmp_path / "page.html")
+    assert "critical" in (tmp_path / "page.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("lost", ["study.json", "chunks"])
+def test_a_run_goes_on_without_a_part_of_its_folder(lost, tmp_path):
+    out, study = tmp_path / "run", st.Study.from_dict(STUDY)
+    first = study.run(out=out, pilot=False, progress=False)
+    part = out / lost
+    part.unlink() if part.is_file() else shutil.rmtree(part)
+    again = study.run(out=out, pilot=False, progress=False)
+    np.testing.assert_array_equal(again.critical_stress, first.critical_stress)
+    fewer = st.Study.from_dict(STUDY | {"samples": 4})
+    refuses("5 ... 4 ... grow", lambda: fewer.run(out=out, pilot=False, progress=False))
+
+
+def test_a_run_of_another_format_is_refused_by_both_numbers(monkeypatch, tmp_path):
+    known = store.FORMAT
+    monkeypatch.setattr(store, "FORMAT", known + 3)
+    st.Study.from_dict(STUDY).run(out=tmp_path / "run", pilot=False, progress=False)
+    monkeypatch.setattr(store, "FORMAT", known)
+    with pytest.raises(st.RunError, match=f"format {known + 3}, but .* reads {known}"):
+        st.open_run(tmp_path / "run")
+
+
+@pytest.mark.parametrize("cycles", [2, 3])
+def test_curves_are_as_many_as_their_tests(cycles):
+    time = np.arange(400.0 * cycles)
+    force = 10.0 * (time % 400.0) / 400.0 + 1e-3 * np.sin(time)
+    curves = st.read_curve((time, force), unit="N", travel_unit="s", split="cycles")
+    assert len(curves) == len([*curves]) == curves.peaks.size
+    assert f"Peaks of {len(curves)} tests" in str(curves)
+    assert len(curves) in (cycles - 1, cycles)  # the last fall is not in the record
+
+
+def test_cracks_up_to_the_whole_period_are_found():
+    load = np.linspace(0.02e6, 0.4e6, 60)
+    lengths = st.theory.griffith_length(make_problem(NODES, 0.05), load, 8e-3)
+    reached = lengths[np.isfinite(lengths)] / 0.05
+    assert np.any((reached > 0.55) & (reached < 1.0))
+    assert np.all(np.diff(reached) <= 0.0)
