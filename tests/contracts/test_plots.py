@@ -297,3 +297,12 @@ def test_the_band_of_a_field_holds_the_fraction_that_its_label_names():
         ends = edge[np.isclose(band.get_paths()[0].vertices[:, 0], x)]
         inside = (samples[:, node] >= ends.min()) & (samples[:, node] <= ends.max())
         assert inside.mean() == pytest.approx(0.9, abs=4.0 * (0.9 * 0.1 / 400) ** 0.5)
+
+
+def test_the_unit_of_an_axis_suits_all_that_it_shows():
+    """Of two results, a thousand times apart, in either order."""
+    weak = of("monte_carlo", LOCAL("line"))[["critical_stress"]]
+    strong = weak.assign(critical_stress=1e3 * weak.critical_stress)
+    for results in ({"a": weak, "b": strong}, {"a": strong, "b": weak}):
+        axes = st.plot.monte_carlo(results, quantity="critical_stress")
+        assert axes.get_xlabel().endswith("(MPa)")

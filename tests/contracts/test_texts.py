@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import shutil
+import time
+from types import SimpleNamespace
 
 import numpy as np
 import pint
 import pytest
-from refusals import refuses
-from setups import LOCAL, make_problem
+from refusals import refuses, warning_texts
+from setups import LOCAL, beta_strength, make_problem
 from small_study import small_study
 
 import stiction as st
 from stiction.base.progress import duration
+from stiction.cli.commands import _seconds
 from stiction.cli.pages import write_report
 from stiction.ensemble import store
 from stiction.problem.reading import files
@@ -28,6 +31,47 @@ STUDY = small_study(samples=5)
 def test_a_duration_is_the_seconds_that_it_was(seconds):
     value, unit = duration(seconds).split()
     assert (float(value) * Q(unit)).to("s").magnitude == pytest.approx(seconds, rel=5e-3)
+
+
+@pytest.mark.parametrize("batch", [1, 7, 64])
+def test_the_time_of_a_sample_is_the_time_of_a_batch_over_its_samples(batch, monkeypatch):
+    clock = [0.0]
+
+    def results(first, count):
+        clock[0] += 0.01 * count
+
+    monkeypatch.setattr(time, "thread_time", lambda: clock[0])
+    point = SimpleNamespace(seconds=1e-3, batch=batch, results=results)
+    assert _seconds(point) == pytest.approx(0.01)
+
+
+THIN = st.Problem(
+    st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1170.0), st.Interface(0.073, NODES),
+    st.LinearWeakening(weakening_rate=0.3e12),
+    specimen=st.Blocks(height=0.005, drive=st.Pusher(height=0.002, width=0.001)),
+)  # fmt: skip
+CALLS = {
+    "onset": lambda rows: st.onset(THIN, rows, method=st.Equilibrium()),
+    "equilibrium_path": lambda rows: st.equilibrium_path(THIN, rows, [1e5]),
+    "Study": lambda rows: st.Study(
+        problem=THIN, method=st.Equilibrium(), profiles={"strength": rows}
+    ).run(pilot=False, progress=False),
+    "monte_carlo": lambda rows: st.monte_carlo(
+        THIN,
+        beta_strength(8e-3),
+        method=st.Equilibrium(),
+        samples=2,
+        pilot=False,
+        progress=False,
+    ),
+}
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_doubt_about_a_problem_is_told_by_every_call(call):
+    """Its stiffness has positive entries, so equilibria need not be the least."""
+    texts = warning_texts(lambda: CALLS[call](np.linspace(1e6, 1.2e6, NODES)))
+    assert sum("has positive entries off its diagonal" in text for text in texts) == 1
 
 
 @pytest.mark.parametrize("wrong", [1, 3])

@@ -112,7 +112,7 @@ def write_report(run: StoredRun, path: Path) -> None:
     with paper_style():
         if not axes and profiles is None:
             page.figure(densities(result), "Densities of the onset and of its position.")
-        elif not axes and "strength" in profiles:
+        elif not axes:  # profiles always contain the strength
             figure = Figure(figsize=(PAGE, 3.0))
             strength = np.array(profiles["strength"])
             plot.onset(result, strength, problem=run.study.problem, ax=figure.subplots())

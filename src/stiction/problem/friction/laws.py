@@ -455,7 +455,7 @@ def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
 
     parameters = law.parameters
     f, u = compiled(type(parameters)), np.linspace(0.0, law.reach, SLIPS)
-    values, slopes = np.array([f(parameters, slip) for slip in u]).T
+    values, slopes = np.array([f(parameters, slip) for slip in u], dtype=float).T
     return u, values, slopes
 
 
