@@ -57,6 +57,8 @@ UNITS = {name: variable.units for name, variable in PROFILES.items()} | {
     "height": "m",
     "thickness": "m",
     "width": "m",
+    "behind": "m",
+    "ahead": "m",
     "stiffness": "N m-1",
     "mass": "kg",
     "shear_modulus": "Pa",
