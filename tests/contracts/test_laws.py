@@ -50,6 +50,7 @@ def test_every_kind_has_an_example():
 
 
 LINE = st.Interface(0.05, 128)
+SOLID = st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1170.0)
 CLASSES = {  # examples of all classes that a study file names, by the key of their table
     "problem.friction": FRICTION, "random.strength.marginal": STRENGTHS,
     "random.strength.spectrum": DENSITIES,
@@ -69,9 +70,7 @@ def test_a_class_comes_back_from_a_file_and_a_subclass_is_not_written_as_its_par
     own = extensions.model(type("Own", (type(example),), {}))
     fields = [field.name for field in dataclasses.fields(example) if field.init]
     instance = own(**{field: getattr(example, field) for field in fields if field != "type"})
-    problem = st.Problem(
-        st.Solid(shear_modulus=1e9, poisson_ratio=0.3, density=1170.0), LINE, FRICTION["linear"]
-    )
+    problem = st.Problem(SOLID, LINE, FRICTION["linear"])
     field = st.RandomField(STRENGTHS["lognormal"], DENSITIES["power_law"])
     study = st.Study(
         problem=problem, random=field, method=CLASSES["method"]["rupture"], samples=2
@@ -125,6 +124,13 @@ def test_a_friction_law_agrees_with_itself(name):
     assert (1.0 - law.fraction(start)) / start == pytest.approx(law.initial_slope, rel=1e-5)
     steepest = (-np.diff(f) / np.diff(u)).max() / law.initial_slope
     assert max(1.0, steepest) == pytest.approx(law.steepening, rel=1e-2)
+    lengths = [
+        st.Problem(
+            SOLID, LINE, dataclasses.replace(kind, critical_slip=None, weakening_rate=1e11)
+        ).nucleation_length
+        for kind in (FRICTION["linear"], law)
+    ]
+    assert lengths[0] / lengths[1] == pytest.approx(max(1.0, steepest), rel=1e-2)
     for scale, value in (("critical_slip", 2e-6), ("fracture_energy", 0.7)):
         rate = law.weakening_rate_of(drop, scale, value)
         critical = law.critical_slip_of(drop, rate)
