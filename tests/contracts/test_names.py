@@ -5,6 +5,7 @@ import re
 
 import pytest
 from joint import FIELD, PROBLEM
+from scipy.stats import loguniform, uniform
 from setups import LOCAL
 
 import stiction as st
@@ -28,6 +29,27 @@ def test_every_way_to_name_a_parameter_is_printed_as_one_key(key):
     for name in (key, *KEYS[key]):
         assert short_key(name) == key
         assert full_key(name) == full_key(key)
+
+
+LOGNORMAL = st.Lognormal(mean=4e-3, cv=0.3)
+WAYS = {  # to state the same prior
+    "range": [(2e-3, 6e-3), [2e-3, 6e-3], {"low": 2e-3, "high": 6e-3}, uniform(2e-3, 4e-3)],
+    "range of logarithms": [
+        {"low": 2e-3, "high": 6e-3, "spacing": "log"}, loguniform(2e-3, 6e-3)],
+    "marginal": [
+        {"type": "lognormal", "mean": 4e-3, "cv": 0.3}, LOGNORMAL, LOGNORMAL.distribution],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("ways", WAYS.values(), ids=WAYS)
+def test_a_prior_is_the_same_however_it_is_stated(ways):
+    given = {"method": LOCAL, "samples": 100, "progress": False, "unit": "Pa"}
+    means = [
+        st.infer(PROBLEM, FIELD, [0.95e6, 1e6, 1.05e6], prior={"correlation_length": way}, **given)
+        .mean["correlation_length"]
+        for way in ways
+    ]  # fmt: skip
+    assert means == pytest.approx([means[0]] * len(ways), rel=1e-9)
 
 
 @pytest.mark.parametrize("key", ["correlation_length", "marginal.cv"])
