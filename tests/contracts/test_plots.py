@@ -300,9 +300,9 @@ def test_the_band_of_a_field_holds_the_fraction_that_its_label_names():
 
 
 def test_the_unit_of_an_axis_suits_all_that_it_shows():
-    """Of two results, a thousand times apart, in either order."""
-    weak = of("monte_carlo", LOCAL("line"))[["critical_stress"]]
-    strong = weak.assign(critical_stress=1e3 * weak.critical_stress)
+    """Of two results, ten thousand times apart, in either order."""
+    strong = of("monte_carlo", LOCAL("line"))[["critical_stress"]]
+    weak = strong.assign(critical_stress=1e-4 * strong.critical_stress)
     for results in ({"a": weak, "b": strong}, {"a": strong, "b": weak}):
         axes = st.plot.monte_carlo(results, quantity="critical_stress")
         assert axes.get_xlabel().endswith("(MPa)")
