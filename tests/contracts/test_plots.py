@@ -207,7 +207,7 @@ CALL_OF |= {"sensitivities": "sensitive", "rupture": "simulate_rupture"}
 CALL_OF |= {"precursors": "equilibrium_path"}
 
 
-@pytest.mark.parametrize("name", [*{*DRAWN} - {"specimen on a base"}])
+@pytest.mark.parametrize("name", sorted({*DRAWN} - {"specimen on a base"}))
 def test_a_figure_has_the_points_that_its_description_names(name):
     make, body, draw = DRAWN[name]
     w = make(body)
