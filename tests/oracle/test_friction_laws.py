@@ -19,6 +19,9 @@ LAWS = {
         slip=[0.3, 0.6, 1.0], strength=[0.5, 0.2, 0.0], **SLIP
     ),
     "plateau": st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[1.0, 0.0], **RATE),
+    "long plateau": st.PiecewiseWeakening(
+        slip=[0.8, 1.0], strength=[1.0, 0.0], weakening_rate=0.1e12, residual_strength=0.2e6
+    ),
     "plateau, then steepening": st.PiecewiseWeakening(
         slip=[0.2, 0.5, 1.0], strength=[1.0, 0.8, 0.0], **GENTLE
     ),
