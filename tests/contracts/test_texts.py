@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -153,3 +154,16 @@ def test_cracks_up_to_the_whole_period_are_found():
     reached = lengths[np.isfinite(lengths)] / 0.05
     assert np.any((reached > 0.55) & (reached < 1.0))
     assert np.all(np.diff(reached) <= 0.0)
+
+
+def test_a_stress_below_minus_the_strength_is_told_with_its_amount():
+    """It grows with the load in reverse."""
+    strength = np.where(np.arange(NODES) // 20 == 1, 0.7e6, 1e6)
+    amounts = []
+    for last in (-1.5e6, -3e6):
+        history = [0.0, 1e-4, 3e-4], [0.0, 0.72e6, last]
+        method = st.Rupture(load_history=history, stop="rest", end_time=3e-4)
+        run = partial(st.simulate_rupture, make_problem(NODES, 0.05), strength, method=method)
+        texts = [text for text in warning_texts(run) if "below minus the strength" in text]
+        amounts += [float(text.split(", by ")[1].split(" Pa")[0]) for text in texts]
+    assert 0.0 < amounts[0] < amounts[1] < 3e6
