@@ -84,7 +84,7 @@ class Pushes(NamedTuple):
     width: float
 
     def edges(self, height: float) -> tuple[float, float]:
-        """Return the edges of the push, m, clipped to the side 0 <= y <= height."""
+        """Return both edges of the push, m, clipped to the side 0 <= y <= height."""
         low, high = self.height - 0.5 * self.width, self.height + 0.5 * self.width
         return max(low, 0.0), min(high, height)
 

@@ -107,7 +107,7 @@ def _columns(
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use."""
+    """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -265,7 +265,7 @@ def solve_spans(
 
 
 def _result(future: Future[Table], span: Span) -> Table:
-    """Return the results of a finished piece as a table."""
+    """Return the results from a finished piece as a table."""
     try:
         table = future.result()
     except InputError:

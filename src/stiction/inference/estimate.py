@@ -373,7 +373,7 @@ def ranking(
 
 
 def levels_of(rows: Sequence[Array]) -> Array:
-    """Return the means of records from different specimens."""
+    """Return the mean for each record from different specimens."""
     levels = np.array([row.mean() for row in rows])
     if levels.min() <= 0.0:
         raise InputError(f"between: needs records with a positive mean, got {levels.min():g}")

@@ -238,7 +238,7 @@ def _all_parameters(marginal: Any) -> dict[str, float]:
 
 
 def multiplied(marginal: Any, factor: float) -> Any:
-    """Return the marginal of values that are multiplied by a factor."""
+    """Return the marginal for values that are multiplied by a factor."""
     parameters = _all_parameters(marginal)
     larger = {name: factor * parameters[name] for name in parameters.keys() & SCALED}
     return marginal_of(with_values(marginal, larger))

@@ -151,7 +151,7 @@ class Peaks(Result):
 
 
 def title_of(peaks: Peaks) -> str:
-    """Return the numbers of peaks, by specimen length."""
+    """Return how many peaks there are, by specimen length."""
     pairs = zip(peaks.lengths, peaks.values, strict=True)
     kinds = [f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs]
     if peaks.loads is not None:

@@ -117,7 +117,7 @@ the grid resolves."""
 
 @lru_cache(maxsize=1024)
 def factor_of_family(family: str, cv: float) -> Any:
-    """Return the marginal of a factor with mean 1."""
+    """Return the marginal for a factor with mean 1."""
     return FACTOR_FAMILIES[family](mean=1.0, cv=cv)
 
 

@@ -200,7 +200,7 @@ class RecordWindow:
         return float(np.sum(self._of_trend * covariance))
 
     def correlation(self, power: Array) -> Array:
-        """Return the correlation of z at all lags."""
+        """Return the correlation at all lags."""
         whole: Array = fft.irfftn(power, self._period) * math.prod(self._period)
         return whole[self._lags]
 

@@ -73,7 +73,7 @@ class SpectralDensity(Listed):
         return 1e-6 * self.cutoff()
 
     def correlation(self, lag: Array) -> Array:
-        """Return the correlation of z at `lag` (m) on a line, with truncation."""
+        """Return the correlation at `lag` (m) on a line, with truncation."""
         edges, power = _truncated(self)
         lags = np.abs(np.ravel(lag)).tolist()
         integrals = [_integrate(self, edges, lag=lag, power=power) for lag in lags]

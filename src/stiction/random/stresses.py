@@ -17,7 +17,7 @@ MAX_SHARE = 0.5
 
 
 def coefficients_of(random: RandomInterface) -> list[str]:
-    """Return the names of the properties that are given as coefficients."""
+    """Return the properties that are given as coefficients, by name."""
     return [name for name, field in random.properties.items() if field.quantity is not None]
 
 

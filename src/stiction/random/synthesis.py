@@ -247,7 +247,7 @@ class Stream(NamedTuple):
     of_property: Any = None  # those `columns` that are modes of the property itself
 
     def places_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the columns of some draws in the stream."""
+        """Return the columns for some draws in the stream."""
         return self.columns.start + np.searchsorted(self.numbers, numbers)
 
     def draw(self, seed: int, first: int, samples: int) -> Array:

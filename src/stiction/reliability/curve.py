@@ -175,7 +175,7 @@ def curve_doubts(end: TailPoint, smallest: float, target_cv: float = CURVE_CV) -
 
 
 def chances(smallest: float) -> Array:
-    """Return the probabilities of the points on a curve."""
+    """Return the probability at each point on a curve."""
     # The last point lies at the smallest probability, also if it is no
     # power of ten.
     decades = max(np.log10(COMMONEST / smallest), 0.0)

@@ -157,7 +157,7 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
 
 
 def sampling_target(state: LimitState, target_cv: float) -> float:
-    """Return the part of the target that is left for the sampling error."""
+    """Return the target that is left for the sampling error."""
     return target_cv * (SAMPLING_SHARE if state.several else 1.0)
 
 

@@ -356,7 +356,7 @@ def repeat_until_precise(
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return the fraction of the weakest fiftieth in the weakest tenth by the guide."""
+    """Return which fraction of the weakest fiftieth lies in the weakest tenth by the guide."""
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())
