@@ -42,7 +42,7 @@ BASE: dict[str, dict[str, Any]] = {  # public call: arguments of a cheap example
         "profiles": NOISY, "interface": SHORT, "marginal": "lognormal",
         "spectrum": "exponential", "noise": False, "bootstrap": 20,
     },
-    "infer": DRAWN | {"peaks": PEAKS, "prior": PRIOR, "samples": 200},
+    "infer": DRAWN | {"peaks": PEAKS, "unit": "Pa", "prior": PRIOR, "samples": 200},
     "design_of_tests": DRAWN | {
         "prior": PRIOR, "designs": {"few": 3}, "repetitions": 10, "samples": 100,
         "load_cell_error": 9.0,

@@ -81,9 +81,9 @@ def as_text(table: Any, folder: Path) -> Path:
 
 
 def as_workbook(table: Any, folder: Path) -> Path:
-    """With a second sheet, whose numbers are half as large."""
+    """With a second sheet, whose numbers are twice as large."""
     book, path = openpyxl.Workbook(), folder / "table.xlsx"
-    for sheet, factor in ((book.active, 1.0), (book.create_sheet("more"), 0.5)):
+    for sheet, factor in ((book.active, 1), (book.create_sheet("more"), 2)):
         for row in table:
             numbers = [c if isinstance(c, str) else factor * c for c in row]
             sheet.append([None if c == "" else c for c in numbers])

@@ -258,7 +258,7 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     named = f"{low.size} of 4 samples ({', '.join(map(str, low))})"
     assert any(
         f"residual strength before the peak in {named}" in text
-        and f"to {above[low].max():.2g} of the strength drop" in text
+        and f"to within {above[low].max():.2g} of the strength drop" in text
         for text in texts
     )
     share = (found[0].certificate_gap / found[0].first_instability).max().item()

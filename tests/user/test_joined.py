@@ -146,7 +146,7 @@ def test_profiles_and_peaks_are_joined():
 
 
 def test_a_single_specimen_leaves_the_scatter_to_its_prior():
-    with pytest.warns(st.AccuracyWarning, match="mostly from the prior.* rather than 1"):
+    with pytest.warns(st.AccuracyWarning, match="mostly from the prior.* not 1"):
         fit = st.fit_field(RECORDS[:1], PROBLEM.interface, between=True, **QUICK)
     # The median of a half-Cauchy prior below 0.9.
     median = PRIOR_SCALE * np.tan(0.5 * np.arctan(0.9 / PRIOR_SCALE))

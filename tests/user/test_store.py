@@ -80,7 +80,7 @@ def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
     assert sum(span.samples for span in counting.spans) == 4 * 20
     assert again(tmp_path / "run", executor=(none := AtOnce())).identical(reference)
     assert none.spans == []
-    words, fewer = "samples: 40 here, 60 there", make_study(samples=40)
+    words, fewer = "samples: 40 given, 60 stored", make_study(samples=40)
     refuses(words, lambda: fewer.run(out=tmp_path / "run"))
 
 

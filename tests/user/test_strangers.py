@@ -275,7 +275,7 @@ def test_texts_of_a_netcdf_file_are_counted_one_by_one(tmp_path, monkeypatch):
     with h5py.File(tmp_path / "p.nc", "w") as file:
         file.create_dataset("strength", data=np.ones(8)).attrs["list"] = ["long" * 99] * 50
     monkeypatch.setattr(netcdf, "MAX_FILE_BYTES", 2**14)
-    refuses("'list' is a list of 50 texts", lambda: st.read_profile(tmp_path / "p.nc"))
+    refuses("'list' holds too many texts, 50", lambda: st.read_profile(tmp_path / "p.nc"))
 
 
 def test_netcdf_is_read_as_by_its_own_library(tmp_path):
