@@ -108,7 +108,7 @@ def test_a_class_is_named_by_files_once_it_is_registered():
     class Another(Unregistered):
         pass
 
-    refuses("Another: type 'unregistered' is taken by ...", lambda: register(Another))
+    refuses("Another: type 'unregistered' is taken by ... Rename it", lambda: register(Another))
     refuses("needs a field such as type", lambda: register(Marginal))
     Another.__abstractmethods__ = frozenset({"distribution"})
     refuses("Another: must define distribution", lambda: register(Another))
