@@ -16,7 +16,9 @@ from stiction.base.arrays import Array
 from stiction.base.errors import (
     InputError,
     UnitWarning,
+    Warned,
     collect_warnings,
+    issue,
     prefixed,
     unknown_name,
     warn_user,
@@ -233,14 +235,18 @@ class Measured(Experiment):
             problems.append("keep: has no effect, because the profiles are given")
         if problems:
             raise InputError(problems)
-        with prefixed("profiles"), collect_warnings():  # `check_fields` issues them
-            if (count := len(self._sample.strength)) != 1:
+        with prefixed("profiles"):
+            if (count := len(self.placed[0].strength)) != 1:
                 raise InputError(f"must be a single sample, got {count}")
 
     @cached_property
-    def _sample(self) -> Sample:
-        accepted = optional_member(self.method, "accepts")
-        return self.problem.sample(self.random, accept=accepted)
+    def placed(self) -> tuple[Sample, list[Warned]]:
+        """The sample, and the doubts about its profiles, which `check_fields` issues."""
+        with collect_warnings() as doubts:
+            sample = self.problem.sample(
+                self.random, accept=optional_member(self.method, "accepts")
+            )
+        return sample, doubts
 
     @property
     def given(self) -> Any:
@@ -259,7 +265,8 @@ class Measured(Experiment):
 
     def check_fields(self) -> None:
         """Warn about profiles that do not suit the grid or their units."""
-        self.problem.sample(self.random, accept=optional_member(self.method, "accepts"))
+        for doubt in self.placed[1]:
+            issue(doubt)
 
     def draws(self, first: int, count: int) -> Array:
         """Return an array (count, 0), because given profiles need no draws."""
@@ -271,7 +278,7 @@ class Measured(Experiment):
 
     def sample(self, profiles: Mapping[str, Array]) -> Sample:
         """Return the given profiles as a sample."""
-        return self._sample
+        return self.placed[0]
 
 
 def method_of(random: Any, method: Any) -> Any:

@@ -18,15 +18,7 @@ import pydantic
 import tomli_w
 from pydantic import BeforeValidator, Discriminator, PlainSerializer, Tag
 
-from stiction.base.errors import (
-    InputError,
-    StoreError,
-    collect_warnings,
-    issue,
-    merge_warnings,
-    merged,
-    prefixed,
-)
+from stiction.base.errors import InputError, StoreError, issue, merge_warnings, merged, prefixed
 from stiction.base.files import content_of, write_whole
 from stiction.base.kinds import OneOf
 from stiction.base.model import (
@@ -299,21 +291,16 @@ class Study(_Parts):
             unused.append("samples: must be 1, because profiles are given")
         if unused:
             raise InputError(unused)
-        measured = Measured(self.problem, self.profiles, self.method)
-        with collect_warnings() as placed:
-            measured.check_fields()
-        sample = measured._sample
+        sample, doubts = Measured(self.problem, self.profiles, self.method).placed
         names = [*self.profiles] if isinstance(self.profiles, Mapping) else ["strength"]
         fields = {"friction_coefficient": "strength"} | dict.fromkeys(SCALES, "weakening_rate")
         held = [fields.get(str(name), str(name)) for name in names]
         plain = {name: np.asarray(getattr(sample, name))[0].tolist() for name in held}
         object.__setattr__(self, "profiles", plain)
         # A run checks the plain values again. Doubts about their source are told here only.
-        with collect_warnings() as again:
-            Measured(self.problem, plain, self.method).check_fields()
-        for doubt in merged(placed):
-            if doubt.text not in [known.text for known in merged(again)]:
-                issue(doubt)
+        again = Measured(self.problem, plain, self.method).placed[1]
+        for doubt in merged(doubt for doubt in doubts if doubt not in again):
+            issue(doubt)
 
     @property
     def points(self) -> list[Point]:
