@@ -143,6 +143,7 @@ def command(monkeypatch, capfd):
 
     # pytest turns warnings into errors; on the command line they are lines of text.
     monkeypatch.setattr("warnings.showwarning", None, raising=False)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["stiction", *map(str, arguments)])

@@ -72,12 +72,19 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
+def _report_nothing(lost: object) -> None:
+    """Replace Python's report of a lost exception after an interruption.
+
+    An object whose construction was interrupted can fail again when Python deletes it.
+    """
+
+
 @contextmanager
 def _resumable(out: Path) -> Iterator[None]:
     """Let an interruption end a run as Ctrl-C does, so that stored results are kept."""
-    report = sys.unraisablehook
+    report: Callable[[Any], Any] = sys.unraisablehook
     # Python drops an exception in a callback from C and prints it. The run ends all the same.
-    sys.unraisablehook = lambda lost: lost.exc_type is KeyboardInterrupt or report(lost)
+    sys.unraisablehook = lambda lost: interrupted.is_set() or report(lost)
     signal.signal(signal.SIGTERM, _interrupt)  # of a batch system
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
         signal.signal(signal.SIGINT, _interrupt)
@@ -86,6 +93,7 @@ def _resumable(out: Path) -> Iterator[None]:
         if interrupted.is_set():
             raise KeyboardInterrupt
     except KeyboardInterrupt:
+        report = _report_nothing
         stored = "results are" if any(out.glob("chunks/*.npz")) else "no sample is stored"
         echo(f"interrupted: {stored} in {out}. Rerun the command to resume", err=True)
         raise typer.Exit(130) from None
