@@ -1,0 +1,130 @@
+"""Numbers, units and quantities that prints, commands, pages and figures show, as recorded.
+
+Words may change: a text is recorded as its numbers, and as the units and quantities between them.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import tomli_w
+from contracts.bodies import COEFFICIENTS, WITH_ENDS, World, world
+from contracts.test_plots import DRAWN
+from contracts.test_results import CALLS, LOCAL, QUIET
+from recording import compare
+from user.test_notebook import objects
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+RECORDS = Path(__file__).with_name("printed.json")
+NUMBER = r"(?<![\w.])[-\u2212]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
+UNIT = r"(?<![\w.])[GMk\u00b5mun]?(?:Pa|N|m|s|J|Hz)(?:[ /][msk]-?\d?)?(?![\w-])"
+QUANTITY = (
+    "stress|force|friction|coefficient|probability|mean|deviation|variance|length|strength|slip"
+    "|travel|time|position|pressure|load|weakening|quantile|interval|index|samples|points|values"
+)
+CLOSE = 0.011  # a number of three digits that is rounded the other way
+MARKUP = re.compile(r"<(style|script|pre).*?</\1>|<[^>]+>", re.DOTALL)
+CLOCK = re.compile(r"^ *time .*|Computed with .*|\d{4}-\d\d-\d\d|^ *computed .*", re.MULTILINE)
+
+
+def tokens(text: str) -> dict[str, Any]:
+    """The numbers of a text, and their order among units and quantities."""
+    text = CLOCK.sub("", text)
+    parts = re.findall(rf"({NUMBER})|({UNIT})|\b({QUANTITY})", text, re.IGNORECASE)
+    numbers = [
+        float(part[0].replace(",", "").replace("\u2212", "-")) for part in parts if part[0]
+    ]
+    words = " ".join("#" if part[0] else part[1] or part[2].lower() for part in parts)
+    return {"numbers": [float(f"{number:.6g}") for number in numbers], "words": words}
+
+
+@pytest.fixture
+def as_recorded(request):
+    """Compare texts by name with those recorded."""
+
+    def check(name: str, texts: dict[str, str]) -> None:
+        record = request.config.getoption("--record")
+        shown = {
+            f"{key}, {part}": value
+            for key, text in texts.items()
+            for part, value in tokens(text).items()
+        }
+        compare(RECORDS, name, shown, record, CLOSE)
+
+    return check
+
+
+@cache
+def printed() -> dict[str, Any]:
+    """Results and what they are of, of crooked bodies and of friction coefficients."""
+    line = st.Interface(0.4, 512)
+    rows = COEFFICIENTS.sample(line, samples=2, seed=3)
+    answers = {
+        f"{call} of {name}": CALLS[call][1](LOCAL(name))
+        for call in ("failure_probability", "design_stress")
+        for name in WITH_ENDS if name.split()[0] in ("line", "blocks")
+    }  # fmt: skip
+    kinds = {"marginal": "lognormal", "spectrum": "exponential", "noise": 0.0, "bootstrap": 20}
+    fit = st.fit_field(rows, line, quantity="friction_coefficient", **kinds, **QUIET)
+    samples = {name: world(name).problem.sample(world(name).profiles()) for name in WITH_ENDS}
+    return objects() | answers | samples | {"fit of coefficients": fit}
+
+
+def test_prints(as_recorded):
+    as_recorded("prints", {name: str(result) for name, result in printed().items()})
+
+
+def test_figures(as_recorded):
+    texts = {}
+    for name, (make, body, draw) in DRAWN.items():
+        figure = np.ravel(draw(make(body)))[0].figure
+        artists = figure.findobj(plt.Text)
+        texts[name] = "\n".join(sorted(artist.get_text() for artist in artists))
+        plt.close("all")
+    as_recorded("figures", texts)
+
+
+def swept(w: World, **tables: Any) -> dict[str, Any]:
+    """A study of two axes, the first of two lengths and the second of three pressures."""
+    length = w.random.strength.spectrum.correlation_length
+    sweep = [
+        {"random.strength.spectrum.correlation_length": [length, 1.5 * length]},
+        {"problem.load.normal_pressure": [1.9e6, 2.1e6, 2.6e6]},
+    ]
+    return w.plain | {"sweep": sweep, "samples": 4} | tables
+
+
+@pytest.mark.parametrize("name", ["line with ends", "blocks with an extent"])
+def test_commands(name, as_recorded, command, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    w = LOCAL(name)
+    study = swept(w, title="Two axes")
+    Path("study.toml").write_text(tomli_w.dumps(study))
+    peaks = {"unit": "N", "values": [[150.0, 160.0, 171.0, 166.0]]}
+    asked = {"probability": 0.1, "target_cv": 0.5}
+    question = study | {"sweep": study["sweep"][1:], "reliability": asked, "peaks": peaks}
+    Path("question.toml").write_text(tomli_w.dumps(question))
+    texts = {}
+    for line in (
+        "check study.toml", "run study.toml --out run --workers 1 --part 1/2", "status run",
+        "run study.toml --out run --workers 1", "status run", "report run --out page.html",
+        "export run all.csv", "reliability question.toml --workers 1 --page design.html",
+    ):  # fmt: skip
+        _, out, errors = command(*line.split())
+        texts[f"{len(texts)} {line}"] = out + errors
+    for page in sorted(Path().glob("*.html")):
+        body = re.sub(
+            r"<(style|script|pre).*?</\1>|<[^>]+>", " ", page.read_text("utf-8"), flags=re.S
+        )
+        texts[page.name] = html.unescape(body)
+    texts["all.csv"] = Path("all.csv").read_text("utf-8")
+    as_recorded(f"commands, {name}", texts)
