@@ -89,9 +89,9 @@ class Sample(Result, _Profiles):
     def _summary(self) -> Summary:
         rows = []
         for name, values in self._asdict().items():
-            if name in QUANTITIES and not np.isnan(values).all():
-                ends = float(np.min(values)), float(np.max(values))
-                rows.append(Row(name, float(np.mean(values)), ends, QUANTITIES[name].units))
+            if name in QUANTITIES and (known := values[np.isfinite(values)]).size:
+                ends = float(np.min(known)), float(np.max(known))
+                rows.append(Row(name, float(np.mean(known)), ends, QUANTITIES[name].units))
         nodes = " x ".join(map(str, self.shape))
         count = f"{self.samples} interface" + "s" * (self.samples != 1)
         return Summary(f"{count} of {nodes} nodes, means", rows, "range")
