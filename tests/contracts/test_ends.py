@@ -244,10 +244,19 @@ def test_frames_thin_no_record_of_steps(name):
     often, rarely = (
         st.simulate_rupture(
             problem, rough(problem.interface.size), method=method, progress=False,
-            save=st.Save(["slip"], every=every),
+            save=st.Save(["slip", "slip_rate"], every=every),
         )
         for every in (5, 20)
     )  # fmt: skip
+    # What a step says is what the frame at its end says.
+    rows = np.searchsorted(often.step_time, often.time[1:-1])
+    for key in (key for key in often if key.removeprefix("step_") in often if "step_" in key):
+        frames = often[key.removeprefix("step_")][1:-1]
+        np.testing.assert_allclose(often[key][rows], frames, rtol=1e-9, err_msg=key)
+    if name == "line":
+        mean = often.slip_rate.values[1:-1, problem.interface.breakable].mean(axis=1)
+        np.testing.assert_allclose(often.step_mean_slip_rate[rows], mean, rtol=1e-9)
+        np.testing.assert_allclose(often.step_size[1:], np.diff(often.step_time), rtol=1e-9)
     for key, values in often.items():
         if not {"time", "snapshot"} & {*values.dims}:
             count = rarely[key].shape[0] if "step" in values.dims else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 import re
 from functools import cache
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, WITH_ENDS, field_of, profiles_of, world
+from contracts.bodies import BODIES, FIELD, WITH_ENDS, field_of, profiles_of, world
 
 import stiction as st
 
@@ -85,6 +86,44 @@ def test_a_run_folder_and_its_exports_hold_the_study(name, tmp_path):
             assert values.units in column or values.units == "1", column
     again = st.Study.from_dict(study.to_dict())
     assert again == study == st.Study.from_result(whole)
+
+
+def crooked(name: str) -> st.RandomInterface:
+    """Three linked properties, of which the first was measured, and two factors."""
+    places = {"x": [0.004, 0.017], "y": [0.009, 0.0131, 0.0132]}
+    places = {key: places[key] for key in BODIES[name].interface.dims}
+    known = np.linspace(0.8e6, 1.2e6, 6).reshape(2, 3)[:, 0 if len(places) == 1 else slice(3)]
+    exponential, smooth = st.ExponentialSpectrum(5e-3), st.SquaredExponentialSpectrum(7e-3)
+    along = {"anisotropy": 1.7} if "y" in places else {}
+    strength = st.RandomField(FIELD.marginal, smooth, True, **along)
+    pressure = st.RandomField(st.Weibull(mean=2e6, cv=0.1), exponential)
+    return st.RandomInterface(
+        strength=strength.given(xr.DataArray(known, places, [*places]), noise=2e4),
+        normal_pressure=pressure,
+        initial_stress=st.RandomField(st.Gamma(mean=1e4, cv=0.3), smooth),
+        correlation={
+            ("strength", "initial_stress"): 0.4,
+            ("normal_pressure", "strength"): -0.3,
+        },
+        between={"normal_pressure": st.Lognormal(mean=1.0, cv=0.07)},
+    )
+
+
+@pytest.mark.parametrize("name", ["line", "plane with ends"])
+def test_whatever_is_random_comes_back_from_each_file(name, tmp_path):
+    """With the same profiles and onsets, also in a list."""
+    random = crooked(name)
+    problem = dataclasses.replace(BODIES[name], load=st.Load())
+    given = {"random": [random, random], "method": st.LocalCriterion(), "keep": random.names}
+    study = st.Study(problem=problem, samples=4, **given)
+    whole = study.run(pilot=False, out=tmp_path / "run", **QUIET)
+    study.to_toml(tmp_path / "study.toml")
+    for back in (
+        st.Study.from_toml(tmp_path / "study.toml"), st.Study.from_dict(study.to_dict()),
+        st.Study.from_result(whole), st.open_run(tmp_path / "run").study,
+    ):  # fmt: skip
+        assert back == study
+        assert back.run(pilot=False, **QUIET).drop_attrs().identical(whole.drop_attrs())
 
 
 @pytest.mark.parametrize("name", ["line", "blocks"])

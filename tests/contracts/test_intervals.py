@@ -55,6 +55,21 @@ def test_intervals_of_a_fit_hold_its_estimates(marginal, noise):
             assert abs(np.array([low, high]) - values.mean()).max() < 11.0 * np.ptp(values)
 
 
+def test_a_p_value_is_the_fraction_of_repetitions_that_differ_as_much():
+    """Of fits to different records, of which a fraction p of 20 repetitions scatters."""
+    of = dataclasses.replace(TRUTHS["beta"], alpha=1.1)
+    fits = [fitted("beta", False, 100 + seed, of)[0] for seed in range(4)]
+    fits += [fitted("beta", False)[0], fitted("gamma", True)[0]]
+    away = []
+    for fit in fits:
+        truth, repetitions = fit._repeated[0]
+        for name, distance in (("marginal", "distance"), ("spectrum", "roughness")):
+            far = [getattr(one, distance) >= getattr(truth, distance) for one in repetitions]
+            p = fit.p_values[name]
+            away.append((p - np.mean(far)) ** 2 / (p * (1.0 - p) / len(far)))
+    assert np.mean(away) < 2.0  # 1 for a fraction that is independent of p
+
+
 def test_ends_of_an_interval_are_admissible_with_ends_of_another():
     """With more noise, a bound may lie further inside the values: its interval says so."""
     inside = []

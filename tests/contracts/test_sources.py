@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import warnings
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from contracts.bodies import SOLID, attempt
 
 import stiction as st
@@ -218,3 +220,37 @@ def test_what_a_result_holds_gives_its_numbers_again():
     onsets = drawn.critical_stress
     labelled, plain = (inferred(FIELD, peaks).mean["mean"] for peaks in (onsets, onsets.values))
     assert labelled == plain
+
+
+OTHER = dataclasses.replace(FIELD, marginal=st.Gamma(mean=9e5, cv=0.2))
+MEASURED = xr.DataArray([0.9e6, 1.1e6], {"x": [0.01, 0.06]}, "x")
+LONG, SHORT = (st.PowerLawSpectrum(length) for length in (0.4, 2e-4))
+UNFIT: dict[str, Any] = {  # members of a list that a call refuses, or doubts
+    "given beyond its end": FIELD.given(MEASURED, noise=1e4),
+    "with anisotropy": dataclasses.replace(FIELD, anisotropy=2.0),
+    "in another unit": dataclasses.replace(FIELD, marginal=st.Gamma(mean=1.0, cv=0.2)),
+    "with a factor of what is not": st.RandomInterface(
+        strength=FIELD, between={"residual_strength": st.Lognormal(mean=1.0, cv=0.1)}
+    ),
+    "short": dataclasses.replace(FIELD, spectrum=SHORT),
+    "long": dataclasses.replace(FIELD, spectrum=LONG),
+    "given": FIELD.given(MEASURED.assign_coords(x=[0.01, 0.03]), noise=1e4),
+}
+PLACES = [
+    *((name, call) for name in ("short", "long") for call in QUICK),
+    *((name, call) for name in [*UNFIT][:4] for call in OF_SOURCES),
+    *((name, "infer") for name in ("with anisotropy", "given")),
+]
+
+
+@pytest.mark.parametrize(("name", "call"), PLACES)
+def test_a_member_is_refused_and_doubted_at_any_place_of_a_list(name, call):
+    """In the words for the member alone."""
+    told = []
+    for random in ([UNFIT[name]], [FIELD, OTHER, UNFIT[name]], [UNFIT[name], FIELD]):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            _, refusal = attempt(lambda given=random: CALLS[call](PROBLEM, given, LOCAL))
+        told.append(refusal or {str(one.message) for one in caught})
+    assert told[0] == told[1] == told[2]
+    assert isinstance(told[0], str) or len(told[0]) == 2  # and the few nodes of the grid
