@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, WITH_ENDS, attempt, field_of, profiles_of
+from contracts.bodies import BODIES, PUSHER, WITH_ENDS, attempt, field_of, profiles_of
 
 import stiction as st
 from stiction import extensions
@@ -292,6 +292,21 @@ def test_strength_bounds_its_onsets_as_it_says(kind, name):
         stress = found[event].values
         assert not below or not (stress < low * (1.0 - 1e-9)).any(), event
         assert not above or not (stress > high * (1.0 + 1e-9)).any(), event
+
+
+@pytest.mark.parametrize("kind", ["equilibrium", "rupture"])
+def test_blocks_with_more_events_are_said_to_take_longer(kind):
+    """Driven by a dead load, which hardly causes events, and by a pusher."""
+    counts, seconds = [], []
+    for drive in (st.Platen(), PUSHER):
+        problem = dataclasses.replace(BODIES["blocks"], load=st.Load(normal_pressure=2.1e6))
+        specimen = dataclasses.replace(problem.specimen, drive=drive)
+        problem = dataclasses.replace(problem, specimen=specimen)
+        found = onset("blocks", example(kind, problem, events=9), problem=problem)
+        counts.append(found.event_load.notnull().sum().item())
+        seconds.append(example(kind, problem).seconds_per_sample(problem))
+    assert 10 * counts[0] < counts[1]
+    assert seconds[0] < seconds[1]
 
 
 def partly_firm(kind: str, name: str, kept: float) -> Any:
