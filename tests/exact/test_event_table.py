@@ -78,28 +78,6 @@ def run():
     return st.simulate_rupture(problem, strength, method=method, save=save)
 
 
-def test_energies_of_an_event_add_up():
-    """Stress and rising load do work on the slip. Every step of it is kept."""
-    problem, strength, method = fault()
-    run = st.simulate_rupture(problem, strength, method=method, save=st.Save(["slip"], every=1))
-    event, cell, load = run.isel(event=0), problem.interface.cell, run["load"].values
-    since = int(np.argmin(np.abs(run.time.values - float(event.event_time))))
-    # The event ends before the run, at the frame with its moment.
-    moment = run.seismic_moment.values
-    end = int(np.argmin(np.abs(moment - moment[since] - float(event.event_moment)))) + 1
-    slip = run.slip.values[since:end]
-    added, rise = slip[-1] - slip[0], load[since:end] - load[since]
-    stress = load[since] - 2e5 - problem.released_stress(slip[0] + 0.5 * added)
-    work = (stress * added).sum() + np.trapezoid(rise, slip.sum(axis=1))
-    shared = float(event.event_fracture_energy + event.event_radiated_energy)
-    assert cell * work == pytest.approx(shared, rel=1e-9)
-    assert event.event_energy_stress_drop == pytest.approx(2.0 * work / added.sum(), rel=1e-9)
-    # The load rises by an eighth of the stress drop in the event.
-    assert work > 1.1 * (stress * added).sum()
-    # The rest of the run is creep that the load drives.
-    assert moment[-1] > 1.1 * float(event.event_moment)
-
-
 def test_a_spectrum_is_that_of_the_lines_between_the_times():
     """A triangle of any knots has the spectrum M sinc²(f T)."""
     inner = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 300))

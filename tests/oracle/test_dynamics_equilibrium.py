@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from oracles import largest_load
-from ruptures import CROOKED, CROOKED_STRENGTH, radiated_energy, run_of
+from ruptures import CROOKED, CROOKED_STRENGTH, dip, radiated_energy, run_of
 from setups import LENGTH, beta_strength, exact_onset, make_problem, within
 
 import stiction as st
@@ -252,6 +252,15 @@ def test_the_estimate_bounds_the_error_and_grows_towards_the_onset(monkeypatch):
             error = abs(state.now["results"]["onset_stress"] - exact)
             assert error < max(estimates[-1], 3e-5 * state.now["run"]["scale"])
         assert np.all(np.diff(estimates) > 0.0)
+
+
+def test_the_error_of_the_start_is_small_beside_the_stress_that_falls():
+    """A fiftieth of a line weakens, so that a share of the load would be twenty times as much."""
+    patch = dip(st.Interface(0.2, 512), 0.02, 0.004)
+    strength, residual = 1.2e6 - 4e5 * patch, np.where(patch > 0.1, 2e5, 1.199e6)
+    problem = make_problem(512, 0.2, weakening_rate=0.4e12, residual_strength=residual)
+    found = rupture(problem, strength, 1e7, stop="onset")
+    assert 0.0 < found["start_error"][0] < 2e-5 * np.mean(strength - residual)
 
 
 def test_loading_too_fast_begins_at_rest():

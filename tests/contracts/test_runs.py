@@ -1,0 +1,185 @@
+"""Laws of every step of a rupture between half-spaces: all that a result says of its own slip."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from contracts.bodies import BODIES, FIELD
+
+import stiction as st
+
+pytestmark = pytest.mark.filterwarnings("ignore")
+TIMES, LOADS = np.array([[0.0, 6e-4, 8e-4, 9e-4, 1e-3], [0.0, 6.3e5, 6.3e5, 2e5, 6e5]])
+"""A load that rises, waits while waves go off, falls, and rises again beyond its last time."""
+END = 1.05e-3
+USUAL = {"load_history": (TIMES, LOADS), "stop": "time", "end_time": END}
+RUNS = {"implicit": {"arrival": 0.2}, "explicit": {"implicit": False, "courant": 0.7}}
+CASES = [(name, "implicit") for name in ("line", "plane", "line with ends", "plane with ends")]
+CASES += [(name, "explicit") for name in ("line with ends", "plane with ends")]
+every = pytest.mark.parametrize(("name", "kind"), CASES)
+
+
+@cache
+def run_of(name: str, kind: str, **options: Any) -> Any:
+    """A run with a frame after each step."""
+    strength = FIELD.sample(BODIES[name].interface, seed=5)
+    method = st.Rupture(**USUAL | RUNS[kind] | options)
+    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=1)
+    return st.simulate_rupture(BODIES[name], strength, method=method, save=save, progress=False)
+
+
+def load_at(time: Any) -> Any:
+    """The load, whose last slope continues."""
+    slope = (LOADS[-1] - LOADS[-2]) / (TIMES[-1] - TIMES[-2])
+    return np.interp(time, TIMES, LOADS) + slope * np.maximum(time - TIMES[-1], 0.0)
+
+
+def assert_close(found: Any, expected: Any, name: str = "") -> None:
+    """Equal to round-off of sums whose terms are as large as the largest value."""
+    atol = 1e-9 * np.nanmax(np.abs(expected), initial=1e-300)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=atol, err_msg=name)
+
+
+@every
+def test_each_step_is_at_its_load_and_as_long_as_its_method_allows(name, kind):
+    run, method = run_of(name, kind), st.Rupture(loading_rate=1.0, **RUNS[kind])
+    time, size = run.step_time.values, run.step_size.values
+    assert_close(run.step_load, load_at(time), "step_load")
+    assert_close(run["load"], load_at(run.time), "load")
+    assert_close(run.applied_load, load_at(run.onset_time), "applied_load")
+    np.testing.assert_allclose(np.diff(run.time), size, rtol=1e-6)
+    assert time.size == run.implicit_steps + run.explicit_steps
+    assert time[-2] < END <= time[-1] < END + size[-1]
+    explicit = np.isclose(size, method.medium(BODIES[name]).largest_step * method.courant)
+    assert explicit.sum() == run.explicit_steps > 0
+    assert (run.implicit_steps > 0) == method.implicit
+
+
+@every
+def test_each_frame_follows_from_its_slip_and_load(name, kind):
+    """By sums over the nodes, for linear weakening."""
+    run, problem = run_of(name, kind), BODIES[name]
+    free, cell = problem.interface.breakable, problem.interface.cell
+    rows = problem.sample(FIELD.sample(problem.interface, seed=5))
+    slip, rate, stress = (run[key].values for key in ("slip", "slip_rate", "shear_stress"))
+    time, of_nodes = run.time.values, tuple(range(1, slip.ndim))
+    weakening, residual = rows.weakening_rate[0], rows.residual_strength[0]
+    drop = np.where(free, rows.strength[0] - residual, 0.0)
+    critical, load = drop / weakening, np.expand_dims(run["load"].values, of_nodes)
+    strength, lost = (
+        residual + np.maximum(drop - weakening * slip, 0.0),
+        np.minimum(slip, critical),
+    )
+    pushed = 0.5 * (load[1:] + load[:-1]) * rows.load_profile + rows.initial_stress[0]
+
+    def total(field: Any) -> Any:
+        return cell * np.where(free, field, 0.0).sum(axis=of_nodes)
+
+    work = np.append(0.0, np.cumsum(total(pushed * np.diff(slip, axis=0))))
+    strain = [0.5 * cell * (d * problem.released_stress(d)).sum() for d in slip]
+    fracture, modulus = (
+        total((drop - 0.5 * weakening * lost) * lost),
+        problem.solid.shear_modulus,
+    )
+    of_frames = {
+        "mean_slip": slip[:, free].mean(axis=1), "mean_stress": stress[:, free].mean(axis=1),
+        "top_slip_rate": rate.max(axis=of_nodes), "seismic_moment": modulus * total(slip),
+        "weakened_fraction": (slip >= critical)[:, free].mean(axis=1),
+        "work": work, "strain_energy": strain, "fracture_energy": fracture,
+        "radiated_energy": work - strain - fracture - total(residual * slip),
+    }  # fmt: skip
+    for key, values in of_frames.items():
+        assert_close(run[key], values, key)
+        if f"step_{key}" in run:
+            assert_close(run[f"step_{key}"], values[1:], key)
+    assert_close(run.step_mean_slip_rate, rate[1:, free].mean(axis=1), "step_mean_slip_rate")
+    assert_close(run.moment_rate, modulus * total(rate)[1:], "moment_rate")
+    assert_close(run.strength.values[:, free], strength[:, free], "strength")
+    # A node slips at its strength, or rests below it, to within the solver's 1e-8 of the drop.
+    below = np.where(free, strength - stress, 0.0)
+    assert below.min() > -1e-8 * drop.max()
+    assert below[rate > 0.0].max() < 1e-8 * drop.max()
+    # The front arrives in the step after which a node has lost its share of the drop.
+    reached = (slip >= RUNS[kind].get("arrival", 0.5) * critical) & free
+    came, first, arrival = reached.any(axis=0), reached.argmax(axis=0), run.arrival_time.values
+    np.testing.assert_array_equal(np.isfinite(arrival), came)
+    assert (arrival[came] <= time[first[came]] * (1.0 + 1e-12)).all()
+    assert (arrival[came] >= time[first[came] - 1] * (1.0 - 1e-12)).all()
+    gone = of_frames["weakened_fraction"] == 1.0
+    kinetic = of_frames["mean_stress"][gone.argmax()] if gone.any() else np.nan
+    assert_close(run.kinetic_stress, kinetic, "kinetic_stress")
+    assert_close(run.stress_drop, run.critical_stress - kinetic, "stress_drop")
+
+
+@pytest.mark.parametrize(("name", "kind"), [case for case in CASES if case[0] != "plane"])
+def test_each_event_is_the_difference_of_two_frames(name, kind):
+    """Also the events after the first: what the run released between the ends of each."""
+    run, problem = run_of(name, kind), BODIES[name]
+    rows, free = (
+        problem.sample(FIELD.sample(problem.interface, seed=5)),
+        problem.interface.breakable,
+    )
+    typical = np.median((rows.strength - rows.residual_strength)[0, free])
+    impedance = problem.solid.shear_modulus / (2.0 * problem.solid.shear_wave_speed)
+    fast = run.step_top_slip_rate.values > 0.075 * typical / impedance
+    assert run.event_time.size > 1 or name == "line"
+    for number in range(run.event_time.size):
+        event = run.isel(event=number)
+        (since,) = np.flatnonzero(run.time.values == event.event_time.item())
+        released = run.seismic_moment.values - run.seismic_moment.values[since]
+        end = np.abs(released - event.event_moment.item()).argmin()
+        added = run.isel(time=end) - run.isel(time=since)
+        assert_close(event.event_load, run["load"].values[since], "event_load")
+        assert_close(event.event_largest_slip, added.slip.max(), "event_largest_slip")
+        for key in ("fracture_energy", "radiated_energy"):
+            assert_close(event[f"event_{key}"], added[key], key)
+        assert_close(event.event_moment, added.seismic_moment, "event_moment")
+        # Twice the energy over the slip, both per area.
+        energy = added.fracture_energy + added.radiated_energy
+        slipped = added.seismic_moment / problem.solid.shear_modulus
+        assert_close(event.event_energy_stress_drop, 2.0 * energy / slipped, "stress drop")
+        assert event.event_settled == (end + 1 < run.time.size)
+        # An event is noticed, and its fast slip counts, from a few steps on.
+        during = slice(since, end)
+        mean_rate = np.where(fast, run.step_mean_slip_rate, 0.0)[during]
+        time = run.step_time.values[during][mean_rate > 0.1 * mean_rate.max()]
+        assert event.event_duration == pytest.approx(np.ptp(time), rel=0.06)
+
+
+ENDS = [("plane", "stop", "sliding"), ("line with ends", "stop", "onset")]
+ENDS += [("plane", "max_steps", 300), ("line with ends", "stop", "rest")]
+
+
+@pytest.mark.parametrize(("name", "option", "value"), ENDS)
+def test_a_run_that_ends_earlier_is_the_beginning_of_a_longer_run(name, option, value):
+    """To the bit, up to the first step after which there is what the option waits for."""
+    whole, part = run_of(name, "implicit"), run_of(name, "implicit", **{option: value})
+    for key, values in part.items():
+        if {"step", "time"} & {*values.dims}:
+            np.testing.assert_array_equal(values, whole[key][: len(values)], err_msg=key)
+    assert part.stopped == (value if option == "stop" else option)
+    assert {
+        "sliding": (part.weakened_fraction[-2:] == 1.0).values.tolist() == [False, True],
+        "onset": part.first_instability == whole.first_instability,
+        "rest": part.top_slip_rate[-1] == 0.0 < part.first_instability,
+        "max_steps": part.step_time.size == value,
+    }[part.stopped]
+
+
+@pytest.mark.parametrize("name", sorted({name for name, _ in CASES}))
+def test_a_run_takes_as_many_steps_as_it_may(name):
+    """More than a thousand; one step less is refused."""
+    strength, run = FIELD.sample(BODIES[name].interface, seed=5), run_of(name, "implicit")
+
+    def onset(steps: int) -> Any:
+        method = st.Rupture(**USUAL | RUNS["implicit"], max_steps=steps)
+        return st.onset(BODIES[name], strength, method=method, progress=False)
+
+    needed = run.step_time.size
+    assert needed > 1100
+    assert_close(onset(needed).radiated_energy, run.radiated_energy[-1:])
+    with pytest.raises(st.InputError, match=f"max_steps: {needed - 1} steps"):
+        onset(needed - 1)
