@@ -15,6 +15,7 @@ from refusals import refuses, warning_texts
 from setups import LOCAL, make_problem
 
 import stiction as st
+from stiction.base.variables import QUANTITIES
 from stiction.inference.peaks import make_peaks
 from stiction.inference.records import records_of
 from stiction.problem.profiles import at_nodes
@@ -111,6 +112,37 @@ def test_a_place_beyond_the_interface_is_doubted(argument):
         given = xr.DataArray(STRENGTH, {"x": X + shift}, ("x",), attrs={"units": "Pa"})
         texts = warning_texts(lambda given=given: ARGUMENTS[argument](given))
         assert any("modulo the length" in text for text in texts) == doubted, shift
+
+
+OTHERS = {"fit_field", "read_profile", "read_profile on nodes", "plot.field"}
+OTHERS |= {"a profile at nodes", "residual_strength"}
+
+
+@pytest.mark.parametrize("argument", sorted({*ARGUMENTS} - OTHERS))
+def test_labelled_coefficients_are_a_strength_under_the_pressure(argument, monkeypatch):
+    pressed = make_problem(NODES, 0.1, load=st.Load(normal_pressure=2.0**21))
+    monkeypatch.setitem(globals(), "PROBLEM", pressed)
+    given = xr.DataArray(STRENGTH * 2.0**-21, {"x": X}, ("x",), attrs={"units": "1"})
+    np.testing.assert_array_equal(ARGUMENTS[argument](given), ARGUMENTS[argument](STRENGTH))
+
+
+UNITS = {
+    "strength": "kPa", "residual_strength": "MPa", "initial_stress": "GPa", "height": "um",
+    "normal_pressure": "N/mm^2", "weakening_rate": "MPa/mm", "critical_slip": "nm", "slip": "mm",
+    "fracture_energy": "kJ/m^2", "friction_coefficient": "%", "residual_ratio": "1",
+    "load_profile": "1",
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::stiction.UnitWarning", "ignore::stiction.AccuracyWarning")
+@pytest.mark.parametrize("quantity", QUANTITIES)
+def test_each_quantity_is_read_in_si(quantity):
+    values = Q.Quantity(np.linspace(0.5, 0.75, 9), UNITS[quantity])
+    table = {"x (mm)": np.arange(9.0), f"measured ({UNITS[quantity]})": values.magnitude}
+    given = st.read_profile(pd.DataFrame(table), quantity=quantity)
+    np.testing.assert_allclose(given, values.to_base_units().magnitude, rtol=1e-12)
+    unit = re.sub(r"([a-z])(-?\d)", r"\1**\2", given.units).replace(" ", "*")
+    assert values.check(Q(unit).dimensionality)
 
 
 PEAKS = np.array([700.0, 720.0, 750.0, 690.0])  # kPa
