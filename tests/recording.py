@@ -79,6 +79,11 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
     return json.loads(path.read_text()) if path.exists() else {}
 
 
+def stored(name: str) -> Any:
+    """A table of tests/records."""
+    return json.loads((Path(__file__).parent / "records" / f"{name}.json").read_text())
+
+
 def write(path: Path, records: Mapping[str, Mapping[str, Any]]) -> None:
     """Write records, an output a line."""
     blocks = []
@@ -133,7 +138,7 @@ def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
 
 def refusals(name: str, scope: dict[str, Any]) -> Callable[..., None]:
     """A test of each call that a record of this name holds as text, with words of its refusal."""
-    words: Mapping[str, Any] = read(Path(__file__).parent / "records" / f"{name}.json")
+    words = stored(name)
 
     @pytest.mark.parametrize("call", words)
     def test(call: str) -> None:

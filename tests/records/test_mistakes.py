@@ -75,6 +75,11 @@ def failure(problem=PROBLEM, random=FIELD, **options):
     return st.failure_probability(problem, random, **given | options)
 
 
+def designed(**options):
+    given = joint.GIVEN | {"probability": 0.1, "sensitivities": False} | options
+    return st.design_stress(joint.PROBLEM, joint.RANDOM, **given)
+
+
 def onset(strength=ONE, problem=PROBLEM, method=LOCAL, **profiles):
     given = {"strength": strength} | profiles if profiles else strength
     return st.onset(problem, given, method=method, progress=False)

@@ -54,10 +54,16 @@ def binary(content, name="p.npy"):
         raise st.InputError(str(error).split(" numbers:")[0]) from error
 
 
-def peaks(text):
+def peaks(text, **options):
     with inside():
         Path("peaks.csv").write_text(text)
-        return st.read_peaks("peaks.csv")
+        return st.read_peaks("peaks.csv", **options)
+
+
+def slips(heading, *, count=6, normal="clamping force (kN)", **options):
+    """Two slip loads of each specimen, over the clamping forces beside them."""
+    rows = [f"{1 + k // 2};{160.0 + 7.0 * (k % 3)};{390.0 + k}" for k in range(count)]
+    return peaks("\n".join([heading, *rows]), normal=normal, **options)
 
 
 def npy(shape, payload=b"", dtype="<f8", version=b"\x01\x00", extra=""):

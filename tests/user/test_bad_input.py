@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from refusals import refuses
+from recording import stored
 from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
@@ -23,18 +23,6 @@ def test_a_refusal_is_short_pickles_and_is_a_value_error():
     assert len(str(caught.value)) < 200
     error = st.InputError(["a", "b"])
     assert pickle.loads(pickle.dumps(error)).problems == ("a", "b")
-
-
-def test_an_interface_in_a_specimen_cannot_be_periodic():
-    blocks, solid = st.Blocks(height=0.05), PROBLEM.solid
-    for ends in ("free", None):
-        interface = st.Interface(0.1, 256, ends=ends)
-        problem = st.Problem(solid, interface, PROBLEM.friction, specimen=blocks)
-        assert problem.interface.is_free
-    interface = st.Interface(0.1, 256, ends="periodic")
-    assert not st.Problem(solid, interface, PROBLEM.friction).interface.is_free
-    words = "interface.ends: the ends of a specimen are free"
-    refuses(words, lambda: st.Problem(solid, interface, PROBLEM.friction, specimen=blocks))
 
 
 def test_errors_of_equilibrium_are_warned_of():
@@ -75,35 +63,36 @@ DOUBTFUL = {
     "density in g/cm3": lambda: st.Solid(1e9, 0.33, 1.17),
     "initial stress in MPa": lambda: doubt_sample(IN_MPA, IN_MPA.sample(ONE)),
     "a station in km": lambda: st.Save(stations={"a": 1.5e-4}).nodes(st.Interface(0.1, 256)),
-}
+    "a prior that ends too soon": lambda: st.infer(
+        PROBLEM, FIELD, 7e5 + 1e4 * np.arange(7.0), unit="Pa", samples=100,
+        prior={"marginal.low": (0.4e6, 0.64e6)}, method=LOCAL, progress=False),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("doubt", DOUBTFUL)
 def test_a_warning_stands_where_the_caller_is_and_once(doubt):
-    with pytest.warns(st.UnitWarning) as caught:
+    with pytest.warns((st.UnitWarning, st.AccuracyWarning)) as caught:
         DOUBTFUL[doubt]()
-    assert [warning.filename for warning in caught] == [__file__]
+    assert {warning.filename for warning in caught} == {__file__}
+    assert len(caught) == len({str(warning.message) for warning in caught})
 
 
-def test_what_people_study_raises_no_doubt():
-    for solid, friction, length, strength in (
-        ((1e9, 0.33, 1170.0), 0.5e12, 0.1, 1e6),  # the paper's polymer
-        ((3e10, 0.25, 2700.0), 1e6 / 1e-4, 100.0, 5e6),  # a laboratory fault in granite
-        ((3e10, 0.25, 2700.0), 5e6 / 0.5, 5e4, 5e7),  # a natural fault, d_c of half a metre
-        ((8e10, 0.3, 7850.0), 3e5 / 1e-6, 1.0, 3e5),  # steel, lightly clamped
-        ((2e3, 0.49, 1000.0), 5e2 / 1e-3, 0.1, 5e2),  # a gel
-        ((5e5, 0.49, 1900.0), 1e5 / 1e-3, 0.1, 1e5),  # a filled rubber
-        ((4.8e11, 0.1, 3500.0), 1e7 / 1e-8, 1e-3, 1e7),  # diamond
-    ):
-        h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
-        interface = st.Interface(length, max(64, 2 * int(4 * length / h_n)))
-        with warnings.catch_warnings(action="error", category=st.UnitWarning):
-            law, load = st.LinearWeakening(friction), st.Load(initial_stress=1e-4 * strength)
-            system = st.Problem(st.Solid(*solid), interface, law, load)
-            doubt_strengths(system, strength)
-        if strength > 1e-4 * solid[0] > 1e4:  # kPa that were given as MPa, on no rubber
-            with pytest.warns(st.UnitWarning, match="times the shear modulus"):
-                doubt_strengths(system, 1e3 * strength)
+STUDIED = stored("studied")
+"""Solid, weakening rate, length and strength of what people study."""
+
+
+@pytest.mark.parametrize("what", STUDIED)
+def test_what_people_study_raises_no_doubt(what):
+    solid, friction, length, strength = STUDIED[what]
+    h_n = 2 * 0.5789 * solid[0] / (1 - solid[1]) / friction
+    interface = st.Interface(length, max(64, 2 * int(4 * length / h_n)))
+    with warnings.catch_warnings(action="error", category=st.UnitWarning):
+        law, load = st.LinearWeakening(friction), st.Load(initial_stress=1e-4 * strength)
+        system = st.Problem(st.Solid(*solid), interface, law, load)
+        doubt_strengths(system, strength)
+    if strength > 1e-4 * solid[0] > 1e4:  # kPa that were given as MPa, on no rubber
+        with pytest.warns(st.UnitWarning, match="times the shear modulus"):
+            doubt_strengths(system, 1e3 * strength)
 
 
 def test_a_model_of_others_may_hold_plain_dataclasses():

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording import read
+from recording import stored
 
 import stiction as st
 
@@ -41,7 +41,6 @@ def of_profile(found):
     assert 0.0 < found["answer"].probability < 0.5
     assert 0.2e6 < found["design"].stress < 1e6
     assert 0.2e6 < found["decision"].stress < 1e6
-    assert found["decision"].members.size == 4
     joint = tomllib.loads((DATA / "joint.toml").read_text())["problem"]
     assert st.Problem(**joint) == found["joint"]
 
@@ -60,12 +59,10 @@ def of_friction_test(found):
 def of_decisions(found):
     assert found["fit"].parameters["marginal.mean"] == pytest.approx(0.2, rel=0.1)
     assert 30e3 < found["design"].force < 50e3
-    assert found["demand"].force == pytest.approx(40e3)
     assert 0.0 < found["demand"].probability < 0.3
-    assert str(found["design"]).split()[2] == "value"
 
 
-SHOWN = read(ROOT / "tests" / "records" / "pages.json")
+SHOWN = stored("pages")
 """Pages whose python runs, with the words that make it shorter."""
 CHECKS = {
     "docs/tutorials/profile.md": of_profile,

@@ -34,12 +34,6 @@ def fitted(record, **options):
     return st.fit_field(record, **given | {"bootstrap": 20, "progress": False} | options)
 
 
-@pytest.mark.parametrize("scale", [1e6, 1e-5])
-def test_lengths_in_another_unit_are_doubted(scale):
-    with pytest.warns(st.UnitWarning, match="long. Check the unit of x"):
-        records_of(labelled(VALUES, X * scale), None, "strength")
-
-
 def test_intervals_are_those_of_three_sets_of_repetitions():
     """By hand: errors in units of root length; the ends from fields of either length."""
     plain = fitted(RECORD)
@@ -120,15 +114,6 @@ def test_a_picture_of_a_fit_is_of_all_records():
     mean = np.mean(covariances, axis=0)  # as many values in each
     measured = panels[0].lines[1].get_ydata()
     np.testing.assert_allclose(measured, (mean / mean[0])[: measured.size], rtol=1e-9)
-
-
-def test_white_noise_is_refused_by_what_it_is():
-    rng = np.random.default_rng(0)
-    white = 1e6 + 1e5 * rng.standard_normal(COUNT)
-    for given, place in ((labelled(white), None), (white, st.Interface(0.08, COUNT))):
-        words = "are not correlated ... smaller spacing"
-        refuses(words, lambda g=given, p=place: fitted(g, interface=p))
-    assert fitted(labelled(VALUES + 5e4 * rng.standard_normal(COUNT))).field is not None
 
 
 def test_positions_of_few_digits_and_dropouts():

@@ -5,11 +5,11 @@ import json
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from pathlib import Path
 
+import joint
 import numpy as np
 import pytest
-from recording import read
+from recording import stored
 
 import stiction as st
 
@@ -30,12 +30,6 @@ def objects():
     strength = st.paper.strength(problem, correlation_ratio=1.0)
     rows = strength.sample(problem.interface, samples=3, seed=1)
     how = {"method": st.LocalCriterion(), "progress": False}
-    coefficient = st.RandomField(
-        st.Lognormal(mean=0.2, cv=0.12), st.PowerLawSpectrum(5e-3),
-        quantity="friction_coefficient",
-    )  # fmt: skip
-    interface, load = st.Interface(0.1, 256, width=0.01), st.Load(normal_pressure=5e6)
-    pressed = st.Problem(problem.solid, interface, problem.friction, load)
     prior = {"marginal.low": (0.5e6, 0.8e6)}
     posterior = st.infer(problem, strength, PEAKS, unit="Pa", prior=prior, samples=200, **how)
     curves = st.read_curve((TRAVEL, FORCE), unit="N", travel_unit="m")
@@ -48,16 +42,16 @@ def objects():
         "curves": curves,
         "peaks": posterior.peaks,
         "probability": st.failure_probability(problem, strength, stress=0.7e6, **how),
-        "design": st.design_stress(pressed, coefficient, probability=0.1, target_cv=0.3, **how),
+        "design": st.design_stress(joint.PROBLEM, joint.FIELD, probability=0.1, **joint.GIVEN),
         "posterior": posterior,
         "agreement": st.statistics.agreement(posterior, np.add(PEAKS, 4e3), unit="Pa"),
-        "problem": pressed,
+        "problem": joint.PROBLEM,
         "field": strength,
         "method": st.Rupture(loading_rate=2e7),
     }
 
 
-SHOWN = read(Path(__file__).parents[1] / "records" / "shown.json")
+SHOWN = stored("shown")
 
 
 @pytest.mark.parametrize("name", SHOWN)

@@ -2,14 +2,12 @@
 
 import dataclasses
 import warnings
-from pathlib import Path
 
 import astropy.units as u
 import numpy as np
 import pytest
 import xarray as xr
-from recording import read
-from refusals import refuses
+from recording import stored
 from setups import LOCAL, make_problem
 from small_study import small_study
 
@@ -103,14 +101,11 @@ def test_everything_beside_the_strength_is_read_alike():
     assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
 
 
-HEADINGS = Path(__file__).parents[1] / "records" / "headings.json"
-"""Of a table, with the scales of x and of the strength in SI."""
-
-
 @pytest.mark.parametrize("comma", [False, True])
 def test_headings_of_laboratories(tmp_path, comma):
+    """Of a table, with the scales of x and of the strength in SI."""
     path = tmp_path / "p.csv"
-    for head, (x_scale, scale) in read(HEADINGS).items():
+    for head, (x_scale, scale) in stored("headings").items():
         last = (head or ";").splitlines()[-1]
         separator = next((mark for mark in (";", "\t", ",") if mark in last), "  ")
         rows = zip(X * x_scale, STRENGTH * scale, strict=True)
@@ -146,24 +141,19 @@ def test_profiles_in_a_study_file(tmp_path):
     assert st.Study.from_dict(loaded.to_dict()) == loaded
 
 
-@pytest.mark.parametrize("kind", np.typecodes["AllInteger"] + "fd")
+@pytest.mark.parametrize("kind", "bBhHiIlLfd")
 def test_a_netcdf_file_holds_numbers_of_any_type(kind, tmp_path):
     values = (1 + np.arange(NODES) % 100).astype(kind)
     labelled(values, x_unit="m", units="kPa").rename("strength").to_netcdf(tmp_path / "a.nc")
     np.testing.assert_array_equal(st.read_profile(tmp_path / "a.nc"), 1e3 * values)
 
 
-FREE = st.Problem(
-    solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.35, density=1180.0),
-    interface=st.Interface(length=0.15, nodes=64),
-    friction=st.LinearWeakening(weakening_rate=0.1e12),
-    specimen=st.Blocks(height=0.05, drive=st.Platen()),
-)
-
-
 def test_a_pressure_without_places_is_the_mean_between_glued_plates():
     """Also where there are as many samples as nodes."""
-    glued = dataclasses.replace(FREE, specimen=st.Blocks(height=0.05, pressing="glued"))
+    glued = dataclasses.replace(
+        make_problem(64, 0.15, weakening_rate=0.1e12),
+        specimen=st.Blocks(height=0.05, pressing="glued"),
+    )
     strength = np.linspace(1.0e6, 1.1e6, 64 * 64).reshape(64, 64)
     of_mean = 2e6 * glued.blocks.pressure
     for pressure, expected in (
@@ -171,28 +161,5 @@ def test_a_pressure_without_places_is_the_mean_between_glued_plates():
         (np.full((64, 1), 2e6), of_mean),
         (2e6, of_mean),
     ):
-        given = {"strength": strength, "normal_pressure": pressure}
-        rows = glued.sample(given)
+        rows = glued.sample({"strength": strength, "normal_pressure": pressure})
         np.testing.assert_allclose(rows.normal_pressure, np.tile(expected, (64, 1)))
-    given["initial_stress"] = np.zeros((3, 64))
-    words = "initial_stress: must have 1 or 64 samples, like the strength, got 3"
-    refuses(words, lambda: glued.sample(given))
-
-
-def test_a_scan_beyond_a_specimen_or_with_gaps_is_refused():
-    """From 12.3 mm on, on a specimen of 150 mm: the coordinates are moved by the user."""
-    x = FREE.interface.x
-    values = 1e6 + 1e6 * x
-    scan = labelled(values, x + 12.3e-3)
-    refuses("assign_coords", lambda: st.read_profile(scan, interface=FREE.interface))
-    given = st.read_profile(scan.assign_coords(x=scan.x - 12.3e-3), interface=FREE.interface)
-    np.testing.assert_allclose(given, values, rtol=1e-14)
-    holes = values.copy()
-    holes[20:25] = np.nan
-    for call in (
-        lambda: st.onset(FREE, holes, method=LOCAL),
-        lambda: st.onset(FREE, labelled(holes, x), method=LOCAL),
-        lambda: st.read_profile(labelled(holes, x), interface=FREE.interface),
-        lambda: st.simulate_rupture(FREE, holes, method=st.Rupture()),
-    ):
-        refuses("missing (NaN) at 5 of 64 nodes ... given(profile)", call)

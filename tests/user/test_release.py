@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from checks import python
 from public import public
+from recording import stored
 
 import stiction as st
 from stiction.base.kinds import _registered
@@ -84,7 +85,7 @@ def test_a_type_checker_finds_every_mistake_and_accepts_what_is_right(tmp_path):
     """Lines of tests/records/typed.json, what belongs in them, and a mistake in its place."""
     pytest.importorskip("basedpyright")
     head = "import numpy as np\nimport stiction as st\n"
-    calls = json.loads((ROOT / "tests" / "records" / "typed.json").read_text())
+    calls = stored("typed")
     for name, which in (("right.py", 1), ("wrong.py", 2)):
         lines = [call[0].format(call[which]) for call in calls]
         (tmp_path / name).write_text(head + "\n".join(lines))
