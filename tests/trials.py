@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import operator
 import random
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+
+from recording import stored
 
 import stiction as st
 
@@ -32,6 +37,41 @@ def mutated(given: bytes, chance: random.Random) -> bytes:
             junk = chance.choice(JUNK)
             data[at : at + len(junk) * (kind == 3)] = junk
     return bytes(data)
+
+
+VALUES = stored("values")
+"""Values of any kind, few of which fit the key that gets them."""
+
+
+def _leaves(tree: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Paths to everything inside, tables too."""
+    found = [path] if path else []
+    items = enumerate(tree) if isinstance(tree, list) else ()
+    for key, value in tree.items() if isinstance(tree, dict) else items:
+        found += _leaves(value, (*path, key))
+    return found
+
+
+def mutated_tree(tree: Any, chance: random.Random, values: Sequence[Any] = VALUES) -> str:
+    """What is changed anywhere inside plain content."""
+    path = chance.choice(_leaves(tree))
+    *above, key = path
+    owner = functools.reduce(operator.getitem, above, tree)
+    kind = chance.choice(("value",) * 6 + ("scale", "remove", "rename", "move", "sweep"))
+    if kind == "scale" and isinstance(owner[key], int | float):
+        owner[key] = owner[key] * 10 ** chance.choice((-12, -6, -3, 3, 6, 12))
+    elif kind == "remove":
+        del owner[key]
+    elif kind == "rename" and isinstance(owner, dict):
+        owner[f"{key}{chance.choice('sx_ ')}"] = owner.pop(key)
+    elif kind == "move" and isinstance(owner, dict) and isinstance(tree, dict):
+        tree[str(key)] = owner.pop(key)
+    elif kind == "sweep" and isinstance(tree, dict) and isinstance(tree.get("sweep"), list):
+        dotted = ".".join(map(str, path))
+        tree["sweep"].append({dotted: [chance.choice(values), chance.choice(values)]})
+    else:
+        owner[key] = copy.deepcopy(chance.choice(values))
+    return f"{kind} {'.'.join(map(str, path))}"
 
 
 def fault(use: Callable[[], Any], seconds: float) -> str:

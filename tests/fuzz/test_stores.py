@@ -23,15 +23,8 @@ pytestmark = [
     pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked"),
 ]
 METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
-STUDY = st.Study.from_dict(
-    small_study(
-        nodes=64,
-        samples=40,
-        seed=3,
-        keep=["strength"],
-        sweep=[lengths(8e-3, 12e-3)[0] | {"method": METHODS}],
-    )
-)
+SWEEP = [lengths(8e-3, 12e-3)[0] | {"method": METHODS}]
+STUDY = st.Study.from_dict(small_study(64, samples=40, keep=["strength"], sweep=SWEEP))
 
 
 @pytest.fixture
@@ -131,7 +124,7 @@ def test_damage_anywhere(tmp_path, fuzz, reference):
         chunk = chance.choice(sorted((folder / "chunks").iterdir()))
         victim = folder / "study.json" if chance.random() < 0.3 else chunk
         data = bytearray(victim.read_bytes())
-        kind = chance.choice(("bit", "bit", "bit", "cut", "longer", "zeros", "gone"))
+        kind = chance.choice(("bit", "bit", "bit", "cut", "longer", "gone"))
         at = chance.randrange(len(data))
         if kind == "bit":
             data[at] ^= 1 << chance.randrange(8)
@@ -139,8 +132,6 @@ def test_damage_anywhere(tmp_path, fuzz, reference):
             del data[at:]
         elif kind == "longer":
             data += os.urandom(chance.randint(1, 100))
-        elif kind == "zeros":
-            data[at : at + 512] = bytes(len(data[at : at + 512]))
         same = bytes(data) == victim.read_bytes()
         victim.write_bytes(data)
         if kind == "gone":

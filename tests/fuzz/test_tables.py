@@ -2,29 +2,22 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as strategies
+from hypothesis import given, settings, strategies
+from recording import stored
 
 import stiction as st
 from stiction.problem.reading import files
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "microns": 1e-6, "Millimeter": 1e-3}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm²": 1e6, "Megapascal": 1e6, "bar": 1e5}
-HEADINGS = {  # of a name and a unit, if there is one
-    "brackets": lambda name, unit: f"{name} [{unit}]",
-    "round": lambda name, unit: f"{name} ({unit})",
-    "slash": lambda name, unit: f"{name} / {unit}",
-    "in": lambda name, unit: f"{name} in {unit}",
-    "below": lambda name, unit: name,
-}
-GAPS = ("", "-", "NaN", "n/a", "***", "#N/A")
-BEFORE = ([], ["Scan 7"], ["Operator: A. Muster", ""], ["# made by a machine"], [""])
-NAMES = (("x", "strength"), ("Position", "tau_p"), ("pos", "peak_strength"))
+DIALECTS = stored("dialects")
+"""What may differ between two laboratories, the plainest dialect, and usual variants of it."""
+HEADINGS = DIALECTS["headings"]
 
 
 @strategies.composite
 def dialects(draw):
-    """How a table is written, all that may differ between two laboratories.
+    """How a table is written.
 
     Where points mark thousands, commas mark decimals, so that no comma separates columns.
     """
@@ -32,24 +25,8 @@ def dialects(draw):
     mark = choose(".", ",")
     thousands = choose("", "", "", *{".", ","} - {mark}, "'", " ", "\N{NARROW NO-BREAK SPACE}")
     separators = (";", "\t") if thousands == "." else (";", "\t", ",", " ", "   ")
-    return {
-        "separator": choose(*separators),
-        "mark": mark,
-        "thousands": thousands,
-        "digits": choose(0, 1, 3, 6),
-        "encoding": choose("utf-8", "utf-8-sig", "cp1252", "utf-16"),
-        "heading": choose(*HEADINGS),
-        "names": choose(*NAMES),
-        "units": (choose(*LENGTHS), choose(*STRESSES)),
-        "order": choose("rising", "falling", "shuffled"),
-        "gap": choose(None, *GAPS),
-        "before": choose(*BEFORE),
-        "index": choose(False, False, True),
-        "end": choose("\n", "\r\n"),
-        "trailing": choose(0, 0, 2),
-        "blank": choose(False, True),
-        "exponent": choose(False, False, True),
-    }
+    chosen = {"mark": mark, "thousands": thousands, "separator": choose(*separators)}
+    return chosen | {name: choose(*some) for name, some in DIALECTS["options"].items()}
 
 
 def number_in(value, dialect):
@@ -64,14 +41,14 @@ def number_in(value, dialect):
 
 def written(dialect, x, values):
     """Return the text of a table, and what is in it in SI: x, values."""
-    separator, (x_unit, unit) = dialect["separator"], dialect["units"]
-    scales = LENGTHS[x_unit], STRESSES[unit]
+    separator, units = dialect["separator"], (dialect["length"], dialect["stress"])
+    scales = LENGTHS[units[0]], STRESSES[units[1]]
     shuffled = np.random.default_rng(0).permutation(x.size)
     rising = np.arange(x.size)
     order = {"rising": rising, "falling": rising[::-1], "shuffled": shuffled}[dialect["order"]]
     head = [
-        HEADINGS[dialect["heading"]](name, text)
-        for name, text in zip(dialect["names"], dialect["units"], strict=True)
+        HEADINGS[dialect["heading"]].format(name, text)
+        for name, text in zip(dialect["names"], units, strict=True)
     ]
     rows, known = [], []
     for place, i in enumerate(order):
@@ -87,7 +64,7 @@ def written(dialect, x, values):
     index = [""] * dialect["index"]
     lines = [index + head]
     if dialect["heading"] == "below":
-        lines.append(index + list(dialect["units"]))
+        lines.append(index + list(units))
     if dialect["blank"]:
         lines.append([""] * len(rows[0]))
     text = [separator.join(cells) + separator * dialect["trailing"] for cells in lines + rows]
@@ -136,21 +113,11 @@ def test_a_table_in_any_dialect(tmp_path_factory, dialect):
 )
 def test_usual_dialects_are_read(tmp_path, heading, separator, mark, monkeypatch):
     """None of these may be refused; the same by the reader of large files."""
-    plain = {
-        "separator": separator, "mark": mark, "thousands": "", "digits": 6, "encoding": "utf-8",
-        "heading": heading, "names": NAMES[0], "units": ("mm", "MPa"), "order": "rising",
-        "gap": None, "before": [], "index": False, "end": "\n", "trailing": 0, "blank": False,
-        "exponent": False,
-    }  # fmt: skip
-    variants = [
-        {}, {"order": "shuffled"}, {"before": ["Scan 7"]}, {"encoding": "utf-16"}, {"end": "\r\n"},
-        {"encoding": "cp1252", "units": ("µm", "N/mm²")}, {"gap": "n/a"}, {"exponent": True},
-    ]  # fmt: skip
-    if separator != " ":
-        variants += [{"gap": ""}, {"index": True}, {"trailing": 2}, {"blank": True}]
-    for variant in variants:
-        assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant
-    monkeypatch.setattr(files, "LARGE", 0)
-    monkeypatch.setattr(files, "HEAD", 120)
-    for variant in variants:
-        assert is_same_or_refused(tmp_path / "t.csv", plain | variant, X, VALUES), variant
+    chosen = {"separator": separator, "mark": mark, "heading": heading}
+    variants = DIALECTS["usual"] + (DIALECTS["of columns"] if separator != " " else [])
+    for large, head in ((files.LARGE, files.HEAD), (0, 120)):
+        monkeypatch.setattr(files, "LARGE", large)
+        monkeypatch.setattr(files, "HEAD", head)
+        for variant in variants:
+            dialect = DIALECTS["plain"] | chosen | variant
+            assert is_same_or_refused(tmp_path / "t.csv", dialect, X, VALUES), variant
