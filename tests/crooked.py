@@ -56,6 +56,3 @@ LINE, LINE_STRENGTH = crooked(96, 0.037)
 """Of 6 nucleation lengths of 16 nodes."""
 PLANE, PLANE_STRENGTH = crooked((24, 20), (0.023, 0.0164))
 """Of cells of .96 by .82 mm."""
-TWO = np.stack(
-    [LINE_STRENGTH, 1.04 * np.roll(LINE_STRENGTH, 31) - 2e4 * uneven(LINE.interface, seed=8)]
-)

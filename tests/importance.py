@@ -84,13 +84,9 @@ class Answer(NamedTuple):
 
 
 def by_importance(
-    problem: st.Problem,
-    field: RandomField,
-    stress: float,
-    method: Any,
-    cv: float,
+    problem: st.Problem, field: RandomField, stress: float, method: Any, cv: float,
     seed: int = 0,
-) -> Answer:
+) -> Answer:  # fmt: skip
     """P(onset < stress) by sampling around the most likely weak spot, until `cv` is reached."""
     shifts = dips(problem, field, stress)
     state = st.external.limit_state(problem, field, method)

@@ -17,10 +17,8 @@ class LoadSteps:
         self.W = np.asarray(weakening, float)
         self.forces, self.x0 = forces.copy(), np.concatenate([slip, opening])
         self.x, self.load = self.x0.copy(), 0.0
-        self.Q = np.zeros((n, n + 1))
-        for a in range(n):
-            self.Q[a, a] = 1.0 if a == 0 else 0.5
-            self.Q[a, a + 1] = 1.0 if a == n - 1 else 0.5
+        self.Q = 0.5 * (np.eye(n, n + 1) + np.eye(n, n + 1, 1))
+        self.Q[0, 0] = self.Q[-1, -1] = 1.0
         self.passed = np.zeros(n, bool)
         self._note_corners(self._forces(self.x, 0.0))
 

@@ -16,7 +16,7 @@ class StandIn:
     onset: Callable[[Any, Any], Any]
     type: str = "stand_in"
     first_stage: str | None = None
-    seconds: float = 1e-4
+    seconds: Any = 1e-4
     label = "stand-in"
     variables = staticmethod(LOCAL.variables)
     supports = staticmethod(lambda problem: [])

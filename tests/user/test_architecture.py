@@ -1,7 +1,6 @@
 """Imports run downwards (docs/developers/architecture.md); kernels depend on kernels only."""
 
 import configparser
-import dataclasses
 import os
 import re
 import tomllib
@@ -81,7 +80,7 @@ def test_a_package_adds_one_of_each_kind_as_the_page_shows(tmp_path):
     assert words in said.splitlines()[-1]
 
 
-def test_a_class_is_named_by_files_once_it_is_registered():
+def test_a_class_is_registered_by_a_type_of_its_own():
     @model
     class Unregistered(Marginal):
         type: str = "unregistered"
@@ -90,19 +89,10 @@ def test_a_class_is_named_by_files_once_it_is_registered():
         def distribution(self):
             return scipy.stats.uniform(1e6, 2e5)
 
-    problem = st.paper.problem(nodes=256)
-    field = st.paper.strength(problem, correlation_ratio=2.0)
-    study = st.Study(
-        problem=problem, random=dataclasses.replace(field, marginal=Unregistered()),
-        method=st.LocalCriterion(), samples=2,
-    )  # fmt: skip
-    words = "Unregistered is a class of your own that study files cannot name"
-    assert words in study.run(progress=False).attrs["study_incomplete"]
     register(Unregistered)
-    assert st.Study.from_dict(study.to_dict()) == study
-    given = {"type": "unregistered", "width": 0.0}
+    given, spectrum = {"type": "unregistered", "width": 0.0}, st.PowerLawSpectrum(4e-3)
     words = "marginal: unknown 'width' (valid: type)"
-    refuses(words, lambda: st.RandomField(marginal=given, spectrum=field.spectrum))
+    refuses(words, lambda: st.RandomField(marginal=given, spectrum=spectrum))
 
     @model
     class Another(Unregistered):

@@ -6,9 +6,10 @@ import pandas as pd
 import pytest
 from refusals import refuses
 from setups import beta_strength
+from specimens import crooked
 
 import stiction as st
-from stiction.inference.agreement import _p_values, _permuted, summary_of
+from stiction.inference.agreement import summary_of
 from stiction.inference.curves import Curves, noise_of, turning_points
 from stiction.inference.peaks import make_peaks
 
@@ -94,14 +95,10 @@ def test_files_of_testing_machines(tmp_path):
     assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
 
 
-BLOCKS = st.Problem(
-    solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
-    interface=st.Interface(length=0.1, nodes=128),
-    friction=st.LinearWeakening(weakening_rate=0.2e12, residual_strength=0.2e6),
-    specimen=st.Blocks(
-        height=0.05, thickness=0.006, drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7)
-    ),
-)
+BLOCKS = crooked(
+    nodes=128, height=0.05, weakening_rate=0.2e12, residual=0.2e6, load=st.Load(),
+    drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7),
+)  # fmt: skip
 FIELD = beta_strength(4e-3)
 
 
@@ -158,17 +155,6 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     assert axes.lines[-1].get_label() == "6 tests"
     stress = np.array([1.0, 2.0, 3.0]) * u.Pa
     refuses("are in Pa", lambda: st.plot.monte_carlo(own, measured=stress))
-
-
-def test_p_values_hold_for_four_tests():
-    """Numbers of precursors, many of them equal, of campaigns that are as predicted."""
-    rng = np.random.default_rng(0)
-    pools = rng.poisson(3.0, (400, 64)).astype(float)
-    p = np.array([_p_values(_permuted(pool[:4], pool[4:], 199, rng))[0] for pool in pools])
-    for level in (0.05, 0.2, 0.5):
-        error = (level * (1.0 - level) / p.size) ** 0.5
-        assert np.mean(p <= level) < level + 3.0 * error
-        assert np.mean(p <= level) > 0.6 * level
 
 
 def test_readings_that_are_no_friction():

@@ -29,19 +29,18 @@ QUICK = {"marginal": "gamma", "noise": False, "bootstrap": 20, "progress": False
 
 
 def by_hand(peaks, error):
-    """Mean and deviation of mean and scatter of log-normal factors, by sums over a fine grid."""
+    """Mean and deviation of mean and scatter of log-normal factors, by sums over a fine grid.
+
+    Peaks are known to within an error, Pa.
+    """
     cvs = PRIOR_SCALE * np.tan((np.arange(100) + 0.5) / 100 * np.arctan(0.9 / PRIOR_SCALE))
     sigma, m = np.sqrt(np.log1p(cvs**2))[:, None], 1e6 * np.exp(np.linspace(-0.8, 0.8, 161))
     total = np.zeros((cvs.size, m.size))
     z = np.linspace(-6.0, 6.0, 121)
     for peak in peaks:
-        if error:
-            onset = m[:, None] * np.exp(sigma[..., None] * z - 0.5 * sigma[..., None] ** 2)
-            density = scipy.stats.norm(onset, error).pdf(peak) * scipy.stats.norm.pdf(z)
-            total += np.log(np.maximum(np.trapezoid(density, z), 1e-300))
-        else:
-            away = np.log(peak / m) + 0.5 * sigma**2
-            total += -0.5 * (away / sigma) ** 2 - np.log(sigma)
+        onset = m[:, None] * np.exp(sigma[..., None] * z - 0.5 * sigma[..., None] ** 2)
+        density = scipy.stats.norm(onset, error).pdf(peak) * scipy.stats.norm.pdf(z)
+        total += np.log(np.maximum(np.trapezoid(density, z), 1e-300))
     mass = np.exp(total - total.max())
     mass /= mass.sum()
     found = []
@@ -51,10 +50,9 @@ def by_hand(peaks, error):
     return found
 
 
-@pytest.mark.parametrize(("lengths", "error"), [((0.05,), 0.0), ((0.05, 0.075), 3e4)])
-def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
+def test_tests_alone_give_what_a_sum_by_hand_gives():
     """Within four errors of 4,000 draws; in newtons they are the same as in pascals."""
-    groups = dict(zip(lengths, np.split(PEAKS, [4] if len(lengths) > 1 else []), strict=True))
+    error, groups = 3e4, {0.05: PEAKS[:4], 0.075: PEAKS[4:]}
     given = LOCAL | {"between": "lognormal", "load_cell_error": error}
     found = st.infer(PROBLEM, EVEN, groups, unit="Pa", **given)
     mean, spread, scatter, of_scatter = by_hand(PEAKS, error)
@@ -66,12 +64,18 @@ def test_tests_alone_give_what_a_sum_by_hand_gives(lengths, error):
     assert found.families == {"lognormal": pytest.approx(1.0)}
     assert found.agreement is None
     assert "mean" not in found.information  # its prior is flat
-    if len(lengths) > 1:
-        forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
-        given["load_cell_error"] = 0.0
-        in_newtons = st.infer(PROBLEM, EVEN, forces, unit="kN", **given)
-        in_pascals = st.infer(PROBLEM, EVEN, groups, unit="Pa", **given)
-        np.testing.assert_allclose(in_newtons.u, in_pascals.u, rtol=1e-6)
+
+
+@pytest.mark.parametrize("prior", [None, {"marginal.mean": (0.9e6, 1.2e6)}])
+def test_forces_say_what_stresses_say(prior):
+    """Of specimens of two lengths, alone or with a prior of their field."""
+    groups = {0.05: PEAKS[:4], 0.075: PEAKS[4:]}
+    forces = {one: 1e-3 * own * one * 0.013 for one, own in groups.items()}
+    in_newtons, in_pascals = (
+        st.infer(PROBLEM, ROUGH, given, unit=unit, prior=prior, **LOCAL)
+        for given, unit in ((forces, "kN"), (groups, "Pa"))
+    )
+    np.testing.assert_allclose(in_newtons.u, in_pascals.u, rtol=1e-6)
 
 
 def test_five_strengths_give_what_proportion_gives(monkeypatch):

@@ -5,6 +5,7 @@ import pytest
 import scipy.stats
 from refusals import refuses
 from setups import beta_strength, make_problem
+from stand_ins import StandIn
 
 import stiction as st
 from stiction import extensions
@@ -19,14 +20,14 @@ class Broken:
 
     type, label = "broken", "broken"
 
-    def __init__(self, change, promise=(), seconds=1e-6):
-        self.change, self.promise, self.seconds = change, promise, seconds
+    def __init__(self, change, promise=()):
+        self.change, self.promise = change, promise
 
     def variables(self, problem):
         return onset_variables(problem.interface) | dict(self.promise)
 
     def seconds_per_sample(self, problem):
-        return self.seconds
+        return 1e-6
 
     def supports(self, problem):
         return []
@@ -53,9 +54,9 @@ def test_a_solver_that_breaks_its_promise_is_refused(words):
 
 @pytest.mark.parametrize("seconds", [np.nan, -1.0, "fast"])
 def test_a_time_that_is_none_is_refused(seconds):
-    problem, method = st.paper.problem(nodes=256), Broken({}, seconds=seconds)
+    problem, method = st.paper.problem(nodes=256), StandIn(None, seconds=seconds)
     strength = st.paper.strength(problem, correlation_ratio=2.0)
-    words = "method: seconds_per_sample of broken must return a number of seconds"
+    words = "method: seconds_per_sample of stand-in must return a number of seconds"
     refuses(words, lambda: st.onset(problem, np.full((3, 256), 1e6), method=method))
     refuses(words, lambda: st.failure_probability(problem, strength, 0.7e6, method=method))
 
@@ -88,37 +89,14 @@ def test_an_onset_at_minus_infinity_is_refused():
     given = {"probability": 0.1, "progress": False, "max_evaluations": 100}
 
     def design(value):
-        names = ("critical_stress", "first_instability")
-        method = Broken({})
-        method.prepare = lambda problem: (
-            lambda sample: (
-                Broken({}).prepare(problem)(sample)
-                | dict.fromkeys(names, np.full(sample.samples, value))
-            )
-        )
+        method = StandIn(lambda rows, _: np.full(rows.samples, value))
         return st.design_stress(problem, strength, method=method, **given)
 
-    refuses("broken returned an onset at minus infinity", lambda: design(-np.inf))
+    refuses("stand-in returned an onset at minus infinity", lambda: design(-np.inf))
     never = design(np.nan)
     assert never.interval["stress"][1] == never.stress == np.inf
     assert "No stress has this probability" in str(never)
     assert never.warnings
-
-
-class Unlisted(Broken):
-    def supports(self, problem):
-        return "it does not take lines"
-
-
-class FromScipy(extensions.Marginal):
-    type = "from_scipy"
-
-    def __init__(self, distribution):
-        self.given = distribution
-
-    @property
-    def distribution(self):
-        return self.given
 
 
 class Negative(st.PowerLawSpectrum):
@@ -127,16 +105,18 @@ class Negative(st.PowerLawSpectrum):
 
 
 def field_of(distribution):
-    return st.RandomField(FromScipy(distribution), st.PowerLawSpectrum(correlation_length=2e-3))
+    members = {"type": "from_scipy", "distribution": property(lambda _: distribution)}
+    marginal = type("FromScipy", (extensions.Marginal,), members)()
+    return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length=2e-3))
 
 
 def test_a_class_whose_members_return_the_wrong_thing_is_refused():
     problem = st.paper.problem(nodes=256)
     uniform, spectrum = scipy.stats.uniform(1e6, 1e6), Negative(correlation_length=2e-3)
-    refuses(
-        "supports must return a list of reasons, got 'it does",
-        lambda: st.onset(problem, np.full(256, 1e6), method=Unlisted({})),
-    )
+    unlisted = Broken({})
+    unlisted.supports = lambda problem: "it does not take lines"
+    words = "supports must return a list of reasons, got 'it does"
+    refuses(words, lambda: st.onset(problem, np.full(256, 1e6), method=unlisted))
     refuses("from_scipy: its distribution must be frozen", lambda: field_of(scipy.stats.norm))
     outside = scipy.stats.triang(2.0, 1e6, 1e6)
     refuses("must have a finite mean ... got nan", lambda: field_of(outside))
