@@ -35,6 +35,8 @@ STRENGTHS = {
     "weibull": st.Weibull(**OF_MOMENTS, low=3e5),
     "gamma": st.Gamma(**OF_MOMENTS, low=1e5),
     "truncated_normal": st.TruncatedNormal(**OF_MOMENTS, low=7e5, high=1.9e6),
+    "normal up to a bound": st.TruncatedNormal(**OF_MOMENTS, high=1.4e6),
+    "normal from a bound": st.TruncatedNormal(**OF_MOMENTS, low=6e5),
 }
 DENSITIES = {
     "power_law": st.PowerLawSpectrum(3e-3, exponent=1.4, power_kept=0.97),
@@ -165,6 +167,8 @@ def test_a_marginal_agrees_with_itself(name):
     assert field.mean == pytest.approx(mean, rel=1e-4)
     assert field.standard_deviation == pytest.approx(np.sqrt(square - mean**2), rel=2e-3)
     low, high = getattr(marginal, "low", 0.0) or 0.0, getattr(marginal, "high", None) or np.inf
+    # scipy keeps bounds in units of the scale, here about 1e6: 1e-9 is its round-off.
+    assert distribution.support() == pytest.approx((low, high), rel=1e-12, abs=1e-9)
     rows = field.sample(st.Interface(0.05, 256), samples=50, seed=1)
     assert low <= rows.min() < rows.max() <= high
 

@@ -234,12 +234,17 @@ def test_far_from_ends_and_top_a_rupture_is_that_between_half_spaces(mode):
     assert np.abs(ours - theirs)[both].max() < 5e-3 * end
 
 
-def test_an_event_that_has_come_to_rest_moves_no_further():
-    """Nor does it rest after waves have crossed the block once, if slip goes on."""
-    problem = crooked(nodes=64, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
+def smooth(nodes):
+    """A specimen pushed low, its search with inertia, and a sample of a smooth strength."""
+    problem = crooked(nodes=nodes, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
     x = problem.interface.x
     strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
-    search, sample = RuptureSearch(problem, st.Rupture()), of(problem, strength)
+    return RuptureSearch(problem, st.Rupture()), of(problem, strength)
+
+
+def test_an_event_that_has_come_to_rest_moves_no_further():
+    """Nor does it rest after waves have crossed the block once, if slip goes on."""
+    search, sample = smooth(64)
     for before, _, _ in path_of(search, sample).events:
         event = search.event(sample, before)
         event.run(10**6)
@@ -255,11 +260,7 @@ def test_half_the_spacing_changes_an_event_by_two_per_cent():
     """Slip and length of the largest event of a smooth strength; without inertia it is 2.2 %."""
     found = []
     for nodes in (128, 256):
-        problem = crooked(nodes=nodes, drive=LOW, load=st.Load(), weakening_rate=0.09e12)
-        x = problem.interface.x
-        strength = 1e6 - 3.2e5 * np.cos(2.0 * np.pi * x / 0.083 * 2.5) ** 2 + 4e6 * x
-        search = RuptureSearch(problem, st.Rupture())
-        path = path_of(search, of(problem, strength))
+        path = path_of(*smooth(nodes))
         sizes = [np.ptp(one.after.slip - one.before.slip) for one in path.events]
         before, after, _ = path.events[int(np.argmax(sizes))]
         added = after.slip - before.slip

@@ -15,7 +15,6 @@ from stiction.methods.criterion.windows import (
     grid_weights,
     multiplier,
     weight,
-    windows_of,
 )
 from stiction.theory import griffith_length, nucleation_statistics
 
@@ -94,34 +93,6 @@ def test_moduli_and_wave_speeds_of_both_plane_states(plane, nu):
     assert function == pytest.approx(0.0, abs=1e-13)
 
 
-def test_load_that_varies_along_the_interface():
-    """Strength and load are single cosines, so both averages are known in closed form."""
-    x, k = 0.1 * np.arange(128) / 128, 2.0 * np.pi / 0.1
-    load = st.Load(
-        profile=1.0 + 0.6 * np.cos(2.0 * k * (x - 0.013)), normal_pressure=4e6 * (x + 1.0)
-    )
-    problem = make_problem(128, load=load)
-    tau_p = 1e6 - 2e5 * np.cos(3.0 * k * (x - 0.031))
-    one, two = windows_of(problem, problem.friction.uniform_weakening_rate)[0].spectrum[[3, 2]]
-
-    def tau_n(at):
-        strength = 1e6 - 2e5 * one * np.cos(3.0 * k * (at - 0.031))
-        return strength / (1.0 + 0.6 * two * np.cos(2.0 * k * (at - 0.013)))
-
-    found = st.theory.nucleation_stress(problem, tau_p)
-    np.testing.assert_allclose(found, tau_n(x), rtol=1e-12)
-    result = first_onset(problem, tau_p)
-    fine = np.linspace(0.0, 0.1, 2_000_001)
-    at = tau_n(fine).argmin()
-    # A minimum misses by at most half the fine spacing: relative 1e-12 of the curvature.
-    assert result["critical_load"] == pytest.approx(tau_n(fine[at]), rel=1e-10)
-    assert result["critical_position"] == pytest.approx(fine[at], abs=1e-7)
-    mean_load = result["critical_load"] * np.mean(load.profile)
-    assert result["critical_stress"] == pytest.approx(mean_load, rel=1e-13)
-    coefficient = mean_load / np.mean(4e6 * (x + 1.0))
-    assert result["friction_coefficient"] == pytest.approx(coefficient, rel=1e-13)
-
-
 def test_a_load_that_jumps_keeps_the_ratio_between_its_bounds():
     """Spectral averages of such a load were negative."""
     profile = np.where(np.arange(128) < 20, 1.0, 1e-3)
@@ -197,10 +168,6 @@ def test_uniform_load_and_initial_stress_scale(problem, make_strength):
 
 
 PROBLEM = st.paper.problem(nodes=1024)
-EDGE = {
-    "friction": st.LinearWeakening(weakening_rate=0.5e12, residual_strength=0.4e6),
-    "load": edge_load(PROBLEM.interface, 4.0, 0.01, 0.5),
-}
 LENGTH, MODULUS = PROBLEM.interface.length, PROBLEM.effective_modulus
 
 
@@ -211,17 +178,6 @@ def test_uniform_drop_is_koiters_row_of_cracks():
     exact = LENGTH * 0.7e6**2 * np.tan(0.5 * np.pi * whole / LENGTH) / (2.0 * MODULUS)
     # The drop is interpolated between nodes, to round-off where it is uniform.
     np.testing.assert_allclose(found, np.repeat(exact, 2, axis=1), rtol=1e-8)
-
-
-def test_lengths_of_start_and_arrest():
-    problem, options = dataclasses.replace(PROBLEM, **EDGE), {"centre": 0.5 * LENGTH}
-    start, stop = (
-        griffith_length(problem, [0.1e6, 0.35e6], 0.3, arrest=arrest, **options)
-        for arrest in (False, True)
-    )
-    assert start[0] == np.inf
-    assert start[1] < stop[1] < LENGTH
-    assert griffith_length(PROBLEM, 0.9e6, 0.3, arrest=True, **options) == np.inf
 
 
 def test_cracks_shorter_than_any_that_is_looked_at():

@@ -1,17 +1,13 @@
 """Equilibrium: closed forms, and the conditions of optimality checked with independent products."""
 
-from typing import NamedTuple
-
-import numba
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 from oracles import symbol_of, times
 from setups import exact_onset, make_problem, turns
+from specimens import crooked
 
 import stiction as st
 from stiction.elasticity.line import stiffness_column
-from stiction.elasticity.stiffness import entry
 from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
@@ -23,12 +19,20 @@ from stiction.methods.equilibrium.strength import LINEAR, make_sample, pieces_of
 COLUMN = stiffness_column(256, 0.1, 1e9)
 
 
-def test_uniform_strength_holds_until_every_node_is_at_it(problem):
-    onset = exact_onset(problem, np.full(256, 0.9e6), sensitivity=True)
+BODIES = {
+    "line": make_problem(), "plane": make_problem((64, 128), (0.02, 0.03)),
+    "blocks": crooked(mode="III", load=st.Load()),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_uniform_strength_holds_until_every_node_is_at_it(name):
+    onset = exact_onset(BODIES[name], np.full(BODIES[name].interface.shape, 0.9e6))
     assert onset.critical_load.item() == pytest.approx(0.9e6, rel=1e-14)
-    assert onset.slip_patches.item() == 0
     assert onset.arrested_events.item() == 0
     assert not onset.residual_reached.item()
+    patch = onset.critical_patch_area if name == "plane" else onset.slip_patches
+    assert patch.item() == pytest.approx(0.02 * 0.03 if name == "plane" else 0)
 
 
 def test_conditions_of_optimality(problem, make_strength):
@@ -48,14 +52,6 @@ def test_conditions_of_optimality(problem, make_strength):
         assert y.sum() == pytest.approx(1.0, rel=1e-13)
         assert y @ tau_p[sample] == pytest.approx(load, rel=1e-11)
         assert one.certificate_gap.item() < 1e-9 * load
-
-
-def test_stiffness_of_a_third_kind_is_refused():
-    class Entries(NamedTuple):
-        rows: np.ndarray
-
-    with pytest.raises(TypingError, match="give CircularEntries or DenseEntries"):
-        numba.njit(lambda entries: entry(entries, 0, 0))(Entries(np.ones(4)))
 
 
 def test_first_bound_is_a_bound(problem, make_strength):

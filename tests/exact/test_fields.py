@@ -330,29 +330,6 @@ def test_multiples_share_one_table(family):
     assert quantile_table.cache_info().misses == built
 
 
-SPECTRUM = st.PowerLawSpectrum(correlation_length=2e-3)
-
-
-@pytest.mark.parametrize("bounds", [{}, {"low": 0.6e6}, {"high": 1.2e6}], ids=str)
-def test_normal_fields_have_the_moments_and_bounds_that_were_given(bounds):
-    marginal = st.TruncatedNormal(mean=1e6, cv=0.12, **bounds)
-    frozen, high = marginal.distribution, marginal.high
-    # To what the equations for scipy's parameters are solved to.
-    assert frozen.mean() == pytest.approx(1e6, rel=1e-9)
-    assert frozen.std() == pytest.approx(0.12e6, rel=1e-7)
-    # scipy keeps bounds in units of the scale, here about 1e6: 1e-9 is its round-off.
-    support = marginal.low, np.inf if high is None else high
-    assert frozen.support() == pytest.approx(support, abs=1e-9)
-    ends = from_normal(marginal, np.array([-30.0, 30.0]))
-    assert support[0] - 1e-9 <= ends[0] < ends[1] <= support[1] + 1e-9
-    assert high is None or ends[1] == pytest.approx(high, rel=1e-9)
-    field = st.RandomField(marginal, SPECTRUM)
-    interface = st.Interface(length=0.2, nodes=512)
-    values = field.sample(interface, samples=2000, seed=3)[:, 0]
-    # 0.043 is exceeded once in a thousand times by 2,000 independent values.
-    assert scipy.stats.kstest(values, frozen.cdf).statistic < 0.043
-
-
 @pytest.mark.parametrize("nodes", [16, (10, 8)], ids=["line", "plane"])
 def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
     """A and B are correlated, B and C: the response to each draw, as a matrix, times itself."""

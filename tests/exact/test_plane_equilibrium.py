@@ -48,15 +48,6 @@ def test_strength_along_one_axis_equals_the_line(mode, across, load):
     assert reach.max() <= 4.0 * LENGTH / NODES
 
 
-def test_uniform_strength_slides_at_it():
-    plane = make_problem((64, 128), (0.02, 0.03))
-    found = exact_onset(plane, np.full((64, 128), 0.9e6))
-    assert found["critical_load"].item() == 0.9e6
-    assert found["certificate_gap"].item() == 0.0
-    assert found["critical_patch_area"].item() == pytest.approx(0.02 * 0.03)
-    assert found["critical_patch_extent"].values[0] == pytest.approx((0.02, 0.03))
-
-
 def test_patches_are_connected_by_edges_and_across_the_borders():
     mask = np.zeros((8, 10), dtype=bool)
     mask[0, 0] = mask[7, 0] = mask[7, 9] = True  # one patch around a corner of the map

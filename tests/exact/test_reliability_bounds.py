@@ -14,9 +14,8 @@ from stand_ins import StandIn
 import stiction as st
 from stiction.base.progress import SILENT
 from stiction.reliability.counting import Counted, binomial_interval, count_failures
-from stiction.reliability.curve import curve_of
 from stiction.reliability.solving import few_members
-from stiction.reliability.subset import Descent, Population, ancestral_variance, generator
+from stiction.reliability.subset import ancestral_variance, generator
 from stiction.reliability.tail import Tail, lognormal_interval
 
 PROBLEM = st.paper.problem(nodes=256)
@@ -109,25 +108,6 @@ def test_what_survives_counts_as_survived():
     curve = st.failure_curve(problem, likely, smallest=0.02, **options)
     assert curve.survived == pytest.approx(lost, abs=error)
     assert np.isfinite(curve.stress).all()
-
-
-def test_where_most_survive_a_curve_begins_later():
-    """Onsets above a third of all samples do not happen: there is no median stress."""
-    draws = np.arange(900.0)
-    values = np.where(draws < 300, draws, math.inf)
-    descent = Descent(
-        900, [Population(math.inf, 0.0, values, np.arange(900), np.zeros(900, int), draws)],
-        1.0, 900, True,
-    )  # fmt: skip
-    tail = Tail([descent])
-    assert tail.survived == pytest.approx(2.0 / 3.0)
-    assert tail.quantile(0.5) == math.inf
-    assert tail.quantile(0.3) == pytest.approx(269.0, abs=1.0)
-    state = st.external.limit_state(PROBLEM, STRENGTH, LOCAL)
-    curve = curve_of(tail, state, np.array([0.5, 0.2, 0.1]), {})
-    assert np.isfinite(curve.stress.values).tolist() == [False, True, True]
-    assert np.isnan(curve.to_array().values[:, 0]).all()
-    st.plot.failure_curve(curve)
 
 
 def test_a_curve_of_an_event_that_never_happens_is_unknown():

@@ -193,7 +193,7 @@ def test_few_unequal_families_have_their_whole_variance():
     assert np.mean(variance * last**2) == pytest.approx(last.var(), rel=0.1)
 
 
-def test_evaluations_are_the_samples_that_were_solved():
+def test_evaluations_over_two_levels_are_the_samples_that_were_solved():
     """Of both functions, within the budget."""
     solved = {"exact": 0, "guide": 0}
 
@@ -205,8 +205,6 @@ def test_evaluations_are_the_samples_that_were_solved():
         return function
 
     options = {"samples": 90, "threshold": -3.3, "max_evaluations": 333}
-    run = descend(counted("exact"), 7, rng=generator(1, 9), **options)
-    assert run.evaluations == solved["exact"] <= 333
     away = (0.7, 0.714)  # a guide that often leads to no failure
     for seed, direction in ((1, (1.0, 0.0)), *((seed, away) for seed in range(12))):
         solved.update(exact=0, guide=0)

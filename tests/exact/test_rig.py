@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from stiction.elasticity.blocks import Pushes, block_response
-from stiction.elasticity.columns import Body, block, eliminated
+from stiction.elasticity.columns import Body, block
 from stiction.elasticity.rig import Rig, contact_rig, loaded, on_cells
 
 LENGTH = 0.14
@@ -90,47 +89,6 @@ def test_a_stop_takes_the_push_of_a_base_on_rollers():
     compliances = [1.0 / rig_of(name, behind=a, ahead=b).C for a, b in ends]
     assert compliances[1] - compliances[0] == pytest.approx(0.2 / (E_plane * 0.05), rel=0.01)
     assert compliances[2] == pytest.approx(compliances[0], rel=0.02)
-
-
-def test_equal_blocks_on_rollers_and_between_platens():
-    """`blocks` has closed forms. q converges with the square of the spacing."""
-    length, height, push = 0.14, 0.075, (0.0325, 0.0425)
-    errors = []
-    for n in (128, 256):
-        matrix = block(Body(height, *ACRYLIC), length / n, n, push=push)
-        size = 2 * n + 1
-        # The interface carries no pressure. The far side moves along rollers.
-        used = np.append(np.arange(2 * size) < size + n, True)
-        kept = np.append(np.arange(size + n) < n, True)
-        on_slip = eliminated(matrix[np.ix_(used, used)], kept)
-        pushes = Pushes(("left",), np.mean(push), push[1] - push[0])
-        known = block_response(length, n, height, *ACRYLIC, pushes)
-        q = abs(-on_slip[-1, :n] * n - known.shear).max()
-        C = abs(-1.0 / on_slip[-1, -1] / known.drive_stiffness - 1.0)
-        # A slider under a platen, on its mirror image: F moves a rigid top along x.
-        plain = block(Body(height, *ACRYLIC), length / n, n)
-        top = np.zeros((2 * size, size + 1))
-        top[np.arange(size), np.arange(size)] = 1.0
-        top[size : size + n, size] = 1.0
-        slider = top.T @ plain @ top
-        S, g, S_gg = slider[:-1, :-1], -slider[:-1, -1], slider[-1, -1]
-        S = S - np.outer(g, g) / S_gg  # at a given force
-        g = g / S_gg
-        signs = np.repeat([1.0, -1.0], [n, n + 1])
-        below = block(Body(height, *ACRYLIC), length / n, n, far="fixed") * np.outer(
-            signs, signs
-        )
-        T = below @ np.linalg.solve(S + below, g)
-        known = block_response(length, n, height, *ACRYLIC, None)
-        q_platen = abs(T[:n] * n - known.shear)[2:-2].max()
-        travel = g @ np.linalg.solve(S + below, g) + 1.0 / S_gg
-        C_platen = abs(2.0 / travel / known.drive_stiffness - 1.0)
-        assert abs(T[n:]).max() < 1e-9
-        errors.append([q, C, q_platen, C_platen])
-    assert np.all(np.array(errors[1]) < [3e-4, 1e-3, 2e-3, 1e-3]), errors
-    order = np.log2(np.divide(*errors))
-    assert order[0] > 1.9, errors
-    assert order[1] > 1.5, errors  # the push ends between lines
 
 
 # -- closed forms of contact mechanics -----------------------------------------------------------

@@ -75,6 +75,15 @@ class Elements:
         self.interface, self.top = number[:, :, 0], number[:, :, -1]
         self.left, self.right = number[0, 0], number[0, -1]
 
+    def push(self, low, high):
+        """Forces of a unit push on the left side, spread evenly between two heights."""
+        force, (gauss, weights) = np.zeros(self.matrix.shape[0]), legendre.leggauss(8)
+        for a, b in itertools.pairwise(self.up.edges):
+            if low < 0.5 * (a + b) < high:
+                values = self.up.at(0.5 * (a + b) + 0.5 * (b - a) * gauss).T @ weights
+                force[self.left] += 0.5 * (b - a) / (high - low) * values
+        return force
+
     def solve(self, given, force=0.0):
         """Displacements with some of them given, and forces on the others."""
         u = np.zeros(self.matrix.shape[0])
@@ -121,13 +130,8 @@ def test_a_pusher(name):
     low, high = low * height, high * height
     kappa, nodes, middle = kolosov(nu, plane), 96, 0.5 * (low + high)
     elements = Elements(LENGTH, height, kappa, (low, high))
-    gauss, weights = legendre.leggauss(8)
-    force = np.zeros(elements.matrix.shape[0])
-    mirrored = force.copy()
-    for a, b in itertools.pairwise(elements.up.edges):
-        if low < 0.5 * (a + b) < high:
-            values = elements.up.at(0.5 * (a + b) + 0.5 * (b - a) * gauss).T @ weights
-            force[elements.left] += 0.5 * (b - a) / (high - low) * values
+    force = elements.push(low, high)
+    mirrored = np.zeros(force.size)
     mirrored[elements.right] = force[elements.left]
     u = elements.solve([(elements.interface[0], 0.0), (elements.top[1], 0.0)], force)
     shear = elements.stress(u, 0, middles(LENGTH, nodes))
@@ -211,12 +215,7 @@ def test_a_slider_on_a_longer_base():
     )
     matrix = join.T @ (stiffer * base.matrix) @ join
     matrix += sparse.block_diag([top.matrix, sparse.csr_matrix((place.size, place.size))])
-    gauss, weights = legendre.leggauss(8)
-    force = np.zeros(size + place.size)
-    for a, b in itertools.pairwise(top.up.edges):
-        if low < 0.5 * (a + b) < high:
-            values = top.up.at(0.5 * (a + b) + 0.5 * (b - a) * gauss).T @ weights
-            force[top.left] += 0.5 * (b - a) / (high - low) * values
+    force = np.append(top.push(low, high), np.zeros(place.size))
     used = np.setdiff1d(np.flatnonzero(matrix.diagonal()), place[held])
     factors = splu(
         matrix.tocsc()[used][:, used], "MMD_AT_PLUS_A", 0.001, options={"SymmetricMode": True}

@@ -40,19 +40,6 @@ def test_linear_programme_and_path_of_events(problem, make_strength, ratio):
         assert found.load == pytest.approx(load, rel=1e-11)
 
 
-def test_linear_programme_with_everything_varying(make_strength):
-    angle = turns(256)
-    load = st.Load(profile=1.0 + 0.3 * np.cos(angle), initial_stress=1e5 * np.sin(2 * angle))
-    weakening_rate = 0.4e12 * (1.0 + 0.6 * np.sin(3 * angle))
-    problem = make_problem(load=load, mode="III", weakening_rate=weakening_rate)
-    tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=8)
-    ours = assert_first(problem, tau_p)
-    assert np.all(ours.certificate_gap < 1e-9 * ours.critical_load)
-    # The mean stress differs from the load factor here.
-    mean = load.initial_stress.mean() + ours.critical_load * load.profile.mean()
-    np.testing.assert_allclose(ours.critical_stress, mean, rtol=1e-14)
-
-
 def test_uniform_critical_slip(make_strength):
     problem = make_problem(critical_slip=2e-6)
     tau_p = make_strength(0.5).sample(problem.interface, samples=3, seed=9)
@@ -124,31 +111,6 @@ def test_events_against_relaxation(problem, make_strength):
         assert relaxed(problem, profile, 1.001 * load) is None
 
 
-def test_arrested_samples_of_the_paper_rest_in_relaxation(problem, make_strength):
-    """Most samples slide at the first instability; the few that do not are not an artefact."""
-    tau_p = make_strength(0.5).sample(problem.interface, samples=1000, seed=14)
-    onset = exact_onset(problem, tau_p)
-    firsts, lasts = onset.first_instability.values, onset.critical_load.values
-    arrested = np.flatnonzero(onset.arrested_events.values)
-    assert arrested.size > 0
-    for row in arrested[:2]:
-        first, last = firsts[row], lasts[row]
-        assert last > first
-        beyond = first + 0.5 * min(last - first, 1e-3 * first)
-        assert relaxed(problem, tau_p[row], beyond) is not None
-    row = arrested[0]
-    path = st.equilibrium_path(
-        problem, tau_p[row], firsts[row] * np.array([1 - 1e-12, 1 + 1e-9])
-    )
-    moment = problem.solid.shear_modulus * float((path.slip[1] - path.slip[0]).sum())
-    # Slip is steep in the load just before the event: 1e-12 of the load counts.
-    found = path.event_moment[0].item()
-    assert found == pytest.approx(moment * problem.interface.spacing, rel=1e-2)
-    stresses = exact_onset(problem, tau_p, events=8).event_stress
-    np.testing.assert_array_equal(np.isfinite(stresses).sum("event"), onset.arrested_events)
-    np.testing.assert_allclose(stresses.values[arrested, 0], firsts[arrested], rtol=1e-14)
-
-
 def assert_onset(problem, profile, load):
     """Close enough to see that weak nodes matter, and far enough for relaxation to end."""
     assert relaxed(problem, profile, 0.9995 * load) is not None
@@ -169,19 +131,6 @@ def test_nodes_that_do_not_weaken(make_strength, law):
     assert np.all(onset.certificate_gap < 1e-9 * onset.critical_load)
     for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
         assert_onset(problem, profile, load)
-
-
-@pytest.mark.parametrize("above", [1e-13, 1e-9])
-def test_flat_stretches_just_above_the_residual(make_strength, above):
-    """Cut off at the residual strength, 1e-13 or 1e-9 of it above: an onset, and soon."""
-    floor = 0.99e6
-    problem = make_problem(residual_strength=floor)
-    strength = make_strength(0.5).sample(problem.interface, samples=3, seed=0)
-    tau_p = np.maximum(strength, floor * (1.0 + above))
-    onset = exact_onset(problem, tau_p)
-    for profile, load in zip(tau_p, onset.critical_load.values, strict=True):
-        assert_onset(problem, profile, load)
-    assert onset.arrested_events.max() < 30
 
 
 def test_sliding_is_proved(problem, make_strength):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from oracles import dense, symbol_of
-from setups import LENGTH, LOCAL, QUARTER, beta_strength, exact_onset, make_problem, within
+from setups import LOCAL, QUARTER, beta_strength, exact_onset, make_problem, within
 from specimens import crooked, rough
 
 import stiction as st
@@ -103,16 +103,6 @@ def test_the_event_that_breaks_a_fault_is_not_arrested_and_slip_that_restarts_is
         np.testing.assert_allclose(found.critical_load, exact.critical_load, rtol=close)
 
 
-def test_a_local_criterion_that_leaves_out_what_the_ends_take_over_is_doubted():
-    """Stresses on two nucleation lengths are 6 % too high on average."""
-    problem = within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH))
-    strength = beta_strength(LENGTH, mean_mode=True).sample(
-        problem.interface, samples=20, seed=1
-    )
-    with pytest.warns(st.AccuracyWarning, match=r"by \+[2-9].*st.Equilibrium"):
-        st.onset(problem, strength, method=LOCAL, progress=False)
-
-
 PLANE = make_problem((32, 28), (0.02, 0.0175), weakening_rate=4e11, residual_strength=2e5)
 
 
@@ -153,16 +143,3 @@ def test_a_small_extent_slides_stably(problem, extent):
         found = exact_onset(within(problem, extent), strength)
     for name in ("critical_load", "critical_stress", "first_instability", "critical_position"):
         assert np.isnan(found[name]).all(), name
-
-
-def test_results_depend_on_the_period_through_the_square_of_extent_over_period():
-    loads = []
-    for times in (2, 4, 8):
-        line = st.Interface(0.02 * times, 64 * times, extent=(0.0, 0.02))
-        problem = make_problem(weakening_rate=2.2e11, residual_strength=2e5)
-        problem = st.Problem(problem.solid, line, problem.friction)
-        strength = np.full(line.size, 1e6)
-        strength[:65] -= 3e5 * np.exp(-(((line.x[:65] - 0.009) / 0.005) ** 2))
-        loads.append(exact_onset(problem, strength).critical_load.item())
-    far, near = loads[1] - loads[2], loads[0] - loads[1]
-    assert near / far == pytest.approx(4.0, rel=0.15)

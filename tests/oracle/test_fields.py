@@ -5,7 +5,6 @@ import numpy as np
 import openturns
 import pytest
 import scipy.stats
-import xarray as xr
 
 import stiction as st
 
@@ -47,24 +46,6 @@ def test_correlation_of_a_long_interface_with_its_mean_mode_is_that_of_gstools()
     # Truncation at 10 lambda leaves out 4e-8 of the power.
     found = field.correlation(interface, of="z")[:100]
     np.testing.assert_allclose(found, expected, atol=1e-7)
-
-
-def test_mean_and_deviation_are_those_of_gstools_kriging():
-    """A line of 60 correlation lengths, so that GSTools, which knows no period, has the same."""
-    line = st.Interface(length=0.06, nodes=512)
-    spectrum = st.SquaredExponentialSpectrum(1e-3, power_kept=1.0 - 1e-9)
-    field = st.RandomField(scipy.stats.norm(1e6, 0.2e6), spectrum, mean_mode=True)
-    x = np.linspace(0.02, 0.03, 37)
-    values = np.interp(x, line.x, field.sample(line, seed=3)[0])
-    given = field.given(xr.DataArray(values, {"x": x}, "x"), noise=20e3)
-    # exp(-(pi/4) (x/len_scale)^2) there is exp(-(x/xi_0)^2) here.
-    model = gstools.Gaussian(dim=1, var=0.04e12, len_scale=0.5 * np.pi**0.5 * 1e-3)
-    kriging = gstools.krige.Simple(model, [x], values, mean=1e6, cond_err=20e3**2, exact=False)
-    mean, variance = kriging([line.x])
-    # The two variograms differ by the mean mode and the period: 1e-4 of the deviation.
-    np.testing.assert_allclose(given.quantile(line, 0.5), mean, atol=2e-3 * 0.2e6)
-    ends = [given.quantile(line, float(scipy.stats.norm.cdf(z))) for z in (-1.0, 1.0)]
-    np.testing.assert_allclose(0.5 * (ends[1] - ends[0]), variance**0.5, atol=2e-3 * 0.2e6)
 
 
 @pytest.mark.parametrize("exponent", [0.65, 0.75, 0.9, 1.0, 2.0, 4.0, 16.0])

@@ -53,24 +53,6 @@ def test_equilibria_along_polygons_against_relaxation(law):
     assert relaxed(problem, strength, critical * (1.0 + 5e-4), rest=1e-5) is None
 
 
-def test_first_instability_is_where_slip_jumps():
-    problem = short(LAWS["dual"])
-    several = np.stack([wide_strength(problem.interface, seed) for seed in range(8)])
-    found = exact_onset(problem, several)
-    sample = int(np.argmax(found.arrested_events.values > 0))
-    assert found.arrested_events.values[sample] > 0
-    first = found.first_instability.values[sample]  # the load, as the load profile is uniform
-    loads = first * (1.0 + 1e-6 * np.array([-2.0, -1.0, 1.0]))
-    before, below, above = (
-        relaxed(problem, several[sample], load, rest=1e-3) for load in loads
-    )
-    # Below, slip grows in proportion to the load; beyond, it leaps to another equilibrium.
-    assert (above - below).sum() > 100.0 * (below - before).sum()
-    path = st.equilibrium_path(problem, several[sample], loads)
-    np.testing.assert_array_equal(path.arrested_events, [0, 0, 1])
-    np.testing.assert_allclose(path.slip[2], above, atol=1e-5 * above.max())
-
-
 @pytest.mark.slow
 def test_exponential_rupture_is_the_limit_of_polygons(problem, make_strength):
     law = st.ExponentialWeakening(weakening_rate=0.5e12)

@@ -204,17 +204,6 @@ def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name):
     np.testing.assert_allclose(ours, theirs, rtol=2e-8)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_laws_of_several_pieces_against_relaxation(name):
-    """Below the onset node by node relaxation comes to rest, above it slides."""
-    problem = make_problem(NODES, SQUARE, friction=st.PiecewiseWeakening(**LAWS[name]))
-    tau_p = 0.5e6 + 2e6 * noise(3.0, 5)
-    load = exact_onset(problem, tau_p).critical_load.item()
-    for share, slides in ((0.998, False), (1.002, True)):
-        slip = relaxed(problem, tau_p, share * load, rest=1e-5)
-        assert (slip is None) == slides
-
-
 def test_a_step_of_the_stable_path_passes_no_steeper_weakening_that_is_unstable():
     """By eigenvalues of the dense matrix: a long step over the steep piece is refused, although
     each end of it is stable; one that only shorter steps show to be stable is taken."""

@@ -69,11 +69,12 @@ def onsets_of(stops):
     return [loads[LOAD] for status, loads in stops if status == Status.UNSTABLE]
 
 
-def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
+def compare(plain, friction, relief=0.0, steps=12, away=1e-5):
     """Check slip and opening at rising loads, also just before and just after each event.
 
     Return the stops of the path. Each onset is then inside the bracket of two load steps.
     """
+    K, T, start = plain.K, plain.T, press(plain.K, plain.T_p, friction, N)
     n, stops = len(friction.peak), to_the_end(begin_push(K, T, start, relief))
     onsets = onsets_of(stops)
     end = onsets[-1]  # there the slider slides
@@ -99,31 +100,23 @@ def compare(K, T, friction, start, relief=0.0, steps=12, away=1e-5):
     return stops
 
 
-@pytest.mark.parametrize("name", RIGS)
-def test_the_path_is_that_of_load_steps(name):
-    plain = rig(name)
-    for seed in (1, 2):
-        friction = random_friction(plain.K, seed)
-        start = press(plain.K, plain.T_p, friction, N)
-        compare(plain.K, plain.T, friction, start)
+MANY = pytest.param(range(60), {"steps": 40, "away": 1e-3}, marks=pytest.mark.slow)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize(("seeds", "options"), [((1, 2), {}), MANY], ids=["two", "many"])
 @pytest.mark.parametrize("name", RIGS)
-def test_every_onset_is_inside_the_bracket_of_load_steps(name):
+def test_the_path_is_that_of_load_steps(name, seeds, options):
+    """Every onset is inside the bracket of two steps."""
     plain = rig(name)
-    for seed in range(60):
+    for seed in seeds:
         friction = random_friction(plain.K, seed, residual=[0.1, 0.2, 0.35][seed % 3])
-        start = press(plain.K, plain.T_p, friction, N)
-        compare(plain.K, plain.T, friction, start, steps=40, away=1e-3)
+        compare(plain, friction, **options)
 
 
 def test_a_machine_unloads_as_in_load_steps():
     plain = rig("acrylic")
     for seed in (3, 4):
-        friction = random_friction(plain.K, seed)
-        start = press(plain.K, plain.T_p, friction, N)
-        stops = compare(plain.K, plain.T, friction, start, 0.3 * plain.C, steps=60)
+        stops = compare(plain, random_friction(plain.K, seed), 0.3 * plain.C, steps=60)
         load, force, peak = np.transpose([loads for _, loads in stops])
         assert peak[-1] >= force.max()
         assert peak[-1] < load[-1]
@@ -144,7 +137,7 @@ def test_an_edge_closes_where_the_rest_is_unstable(seed):
     # Otherwise a jump would come to rest in a state that jumps at the same load.
     assert np.diff(onsets_of(stops)).min() > 1e-9 * N
     assert contact.counts[N_BORDERED_AGAIN] > 0
-    compare(plain.K, plain.T, friction, start)
+    compare(plain, friction)
 
 
 def test_pressing_that_slips_is_that_of_load_steps():
@@ -165,7 +158,7 @@ def test_pressing_that_slips_is_that_of_load_steps():
         brute.raise_to(force)
     largest = np.abs(brute.x).max()
     np.testing.assert_allclose(start.moved * sign, brute.x, rtol=0.0, atol=1e-9 * largest)
-    compare(plain.K, plain.T, friction, start)
+    compare(plain, friction)
 
 
 @pytest.mark.parametrize("mean", [0.02, 0.03, 0.05, 0.1, 0.2, 0.4, 0.6])
@@ -178,6 +171,9 @@ def test_no_cell_carries_more_than_its_strength(name, mean):
         weakening = np.full(n, fall * plain.K[n // 2, n // 2])
         friction = Friction(peak, 0.4 * peak, weakening)
         pressed = press(plain.K, plain.T_p, friction, N)
+        # Slip is along the shear of the pressing alone, or, if slip nearby turned it, of its own.
+        slip, shear = pressed.moved[:n], pressed.forces[:n]
+        assert np.all((slip * plain.T_p[:n] >= 0.0) | (slip * shear > 0.0))
         contact, status = begin_push(plain.K, plain.T, pressed), Status.ARRESTED
         while status in (Status.ARRESTED, Status.UNSTABLE):
             forces = forces_of(contact, friction)

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-import xarray as xr
 from checks import assert_same
 from hypothesis import given, settings
 from hypothesis import strategies as some
@@ -256,9 +255,6 @@ def test_a_restart_records_the_rest_to_the_bit(case, tmp_path):
     assert len(list((tmp_path / "run").glob("frames-*.nc"))) > 1
     for name in (*RECORDED, "step_time"):
         assert np.array_equal(streamed[name], run[name])
-    streamed.to_netcdf(tmp_path / "whole.nc")
-    with xr.open_dataset(tmp_path / "whole.nc") as read:
-        assert read.station.values.tolist() == list(stations)
 
 
 GAMMA = {"fracture_energy": 2.5, "residual_strength": 0.2e6}
@@ -272,20 +268,20 @@ LAWS = {
 
 @pytest.fixture(scope="module")
 def runs():
-    """A weak spot breaks an interface of 512 nodes, with the same fracture energy for each law."""
+    """A weak spot breaks an interface, with the same fracture energy for each law."""
     method = Rupture(loading_rate=1e8, kernel_tolerance=1e-4, courant=0.25)
     save = st.Save(["slip", "slip_rate", "shear_stress", "strength"], every=1)
     found = {}
     for name, law in LAWS.items():
-        problem = make_problem(512, solid=QUARTER, friction=law, mode="III")
-        strength = 1e6 - 0.4e6 * dip(problem.interface, 0.05, 0.015)
+        problem = make_problem(256, 0.05, solid=QUARTER, friction=law, mode="III")
+        strength = 1e6 - 0.4e6 * dip(problem.interface, 0.025, 0.0075)
         found[name] = simulate_rupture(problem, strength, method=method, save=save)
     return found
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_energies_balance(runs, name):
-    run, law = runs[name], LAWS[name]
+    run = runs[name]
     spacing = run.x.values[1]
     slip, stress, load = run.slip.values, run.shear_stress.values, run["load"].values
     # What friction dissipates, summed from the stress that slides, step by step.
@@ -304,8 +300,7 @@ def test_energies_balance(runs, name):
     # All of it is spent, up to the last per cent of strength of a law that never ends.
     assert run.stopped == "sliding"
     left = 0.01 if name == "exponential" else 1e-12
-    assert run.fracture_energy.values[-1] == pytest.approx(0.25, rel=left)
-    assert law.reach > 0.0
+    assert run.fracture_energy.values[-1] == pytest.approx(0.05 * 2.5, rel=left)
 
 
 def test_the_front_reaches_a_node_that_does_not_weaken_when_it_first_slips():
