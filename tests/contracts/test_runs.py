@@ -99,6 +99,7 @@ def test_each_frame_follows_from_its_slip_and_load(name, kind):
     assert_close(run.moment_rate, modulus * total(rate)[1:], "moment_rate")
     assert_close(run.strength.values[:, free], strength[:, free], "strength")
     # A node slips at its strength, or rests below it, to within the solver's 1e-8 of the drop.
+    assert min(rate.min(), np.diff(slip, axis=0).min()) >= 0.0
     below = np.where(free, strength - stress, 0.0)
     assert below.min() > -1e-8 * drop.max()
     assert below[rate > 0.0].max() < 1e-8 * drop.max()
