@@ -104,6 +104,10 @@ def drawn(panels: Any) -> list[Any]:
             for column, label in enumerate(labels):
                 if transform != across[1 - column]:  # else a share of the height or width
                     parts.append(in_si(np.asarray(points, dtype=float)[:, column], label))
+        for scale in axes.child_axes:
+            label = scale.get_xlabel() or scale.get_ylabel()
+            limits = scale.get_xlim() if scale.get_xlabel() else scale.get_ylim()
+            parts.append(in_si(np.array(limits), label))
         for coloured in [*axes.images, *axes.collections]:
             if coloured.get_array() is not None and coloured.colorbar is not None:
                 bar = coloured.colorbar.ax
@@ -113,13 +117,22 @@ def drawn(panels: Any) -> list[Any]:
     return parts
 
 
+NOUNS = {
+    "force": "N", "stress|strength": "Pa", "coefficient|rangle": "1", "slip rate": "m/s",
+    "position|length|height|travel|slip(?! rate)": "m", "time": "s",
+}  # fmt: skip
+
+
 def in_si(values: Any, label: str) -> tuple[Any, str]:
-    """Numbers of an axis in SI, by the unit of its label."""
+    """Numbers of an axis in SI, by the unit of its label, which suits the noun in it."""
     unit = (re.findall(r"\(([^()]*)\)(?:,|$)", label) or ["1"])[0].replace(
         "\N{MICRO SIGN}", "u"
     )
     parts = re.fullmatch(r"([GMkmu])((?:Pa|N|m|s|Hz|J)\b.*)", unit)
     prefix, base = parts.groups() if parts else ("", unit)
+    assert all(base == of_noun for noun, of_noun in NOUNS.items() if re.search(noun, label)), (
+        label
+    )
     return values * {"G": 1e9, "M": 1e6, "k": 1e3, "m": 1e-3, "u": 1e-6, "": 1.0}[prefix], base
 
 
@@ -297,6 +310,57 @@ def test_the_band_of_a_field_holds_the_fraction_that_its_label_names():
         ends = edge[np.isclose(band.get_paths()[0].vertices[:, 0], x)]
         inside = (samples[:, node] >= ends.min()) & (samples[:, node] <= ends.max())
         assert inside.mean() == pytest.approx(0.9, abs=4.0 * (0.9 * 0.1 / 400) ** 0.5)
+
+
+@pytest.mark.parametrize("name", ["onset", "field", "failure_curve", "without an area"])
+def test_a_second_scale_is_a_force_of_the_area_or_a_coefficient(name):
+    make, body, draw = DRAWN.get(name, DRAWN["failure_curve"])
+    w = make(body)
+    axes = draw(w)
+    if name == "without an area":
+        axes = st.plot.failure_curve(of("failure_curve", w).drop_vars("force"))
+    axes.figure.canvas.draw()
+    (scale,), along = axes.child_axes, "y" if name in ("onset", "field") else "x"
+    (stress, _), (other, unit) = (
+        in_si(np.array(getattr(a, f"get_{along}lim")()), getattr(a, f"get_{along}label")())
+        for a in (axes, scale)
+    )
+    area, pressure = w.interface.width * w.interface.length, w.problem.load.normal_pressure
+    assert unit == ("N" if name == "failure_curve" else "1")
+    np.testing.assert_allclose(other, stress * (area if unit == "N" else 1.0 / pressure))
+
+
+@pytest.mark.parametrize("name", ["onset", "onset of a plane"])
+def test_the_legend_of_an_onset_states_its_numbers(name):
+    make, body, draw = DRAWN[name]
+    texts = draw(make(body), sample=1).figure.findobj(plt.Text)
+    (text,) = [text.get_text() for text in texts if "coefficient" in text.get_text()]
+    load, coefficient, *place = map(float, re.findall(r"\d+\.\d+", text))
+    result = of("onset", make(body)).isel(sample=1)
+    assert " MPa (" in text
+    assert load == pytest.approx(1e-6 * result.critical_load.item(), abs=5.1e-5)
+    assert coefficient == pytest.approx(result.friction_coefficient.item(), abs=5.1e-5)
+    assert place == pytest.approx(1e3 * np.ravel(result.critical_position), abs=5.1e-3)
+
+
+def test_curves_and_ticks_have_the_names_of_their_numbers():
+    """Of few samples, each is marked."""
+    swept = of("sweep", LOCAL("line")).isel(sample=slice(5))
+    axes = st.plot.monte_carlo(swept)
+    title = axes.get_legend().get_title().get_text()
+    for line, step in zip(axes.lines, swept.correlation_length, strict=True):
+        assert in_si(float(line.get_label()), title) == (pytest.approx(step.item()), "m")
+        shown, _ = in_si(line.get_xdata(), axes.get_xlabel())
+        np.testing.assert_allclose(shown, swept.critical_force.sel(correlation_length=step))
+    axes = st.plot.quantiles(swept)
+    names = [float(tick.get_text()) for tick in axes.get_xticklabels()]
+    np.testing.assert_allclose(axes.get_xticks(), names)
+    table = of("sensitive", LOCAL("line with ends")).sensitivities
+    axes = st.plot.sensitivities(of("sensitive", LOCAL("line with ends")))
+    named = dict(zip(axes.get_yticks(), axes.get_yticklabels(), strict=True))
+    for place, source in zip(axes.lines[-1].get_ydata(), table.source.values, strict=True):
+        low, high = table.sel(source=source).low.item(), table.sel(source=source).high.item()
+        assert named[place].get_text() == f"{source.removeprefix('problem.')}: {low} to {high}"
 
 
 def test_the_unit_of_an_axis_suits_all_that_it_shows():
