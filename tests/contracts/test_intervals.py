@@ -250,6 +250,8 @@ def test_a_design_from_tests_names_all_that_it_rests_on(tests_alone, tmp_path):
     # With five tests large scatters are likely, at which the normal is cut off at zero.
     assert min(families["weibull"], families["normal"]) < families["lognormal"]
     assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
+    stated = design.sensitivities.sel(source="variation along a specimen")
+    assert float(stated.stress_at_high) == pytest.approx(design.stress, rel=1e-9)
     spread = abs(design.sensitivities.stress_at_high - design.sensitivities.stress_at_low)
     assert (
         np.diff(spread) <= 1e-9 * design.stress

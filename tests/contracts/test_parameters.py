@@ -193,6 +193,12 @@ def test_no_call_takes_more_evaluations_than_it_may(call):
     assert ask(call, max_evaluations=150, target_cv=0.05).evaluations <= 150
 
 
+def test_a_design_that_is_cut_short_lies_between_its_bound_and_its_lowest_sample():
+    design = ask("design_stress", probability=1e-9, max_evaluations=150)
+    assert design.interval["stress"] == (design.lower_bound, design.stress)
+    assert design.lower_bound < design.stress < example("design_stress").stress
+
+
 SOLVED = [0]
 
 

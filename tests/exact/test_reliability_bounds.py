@@ -103,7 +103,8 @@ def test_what_survives_counts_as_survived():
     assert pressed.probability == pytest.approx(1.0 - lost, abs=error)
     never = st.design_stress(problem, likely, probability=0.97, **options)
     assert never.stress == math.inf
-    assert any("No stress has that probability" in text for text in never.warnings)
+    (told,) = (text for text in never.warnings if "No stress has that probability" in text)
+    assert f" {1.0 - never.survived:.3g} of all" in told
     assert "No stress has this probability" in str(never)
     curve = st.failure_curve(problem, likely, smallest=0.02, **options)
     assert curve.survived == pytest.approx(lost, abs=error)
