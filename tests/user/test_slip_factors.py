@@ -60,7 +60,8 @@ def mixture(factors, probabilities):
     return np.exp(np.interp(probabilities, below / weight, np.log(at)))
 
 
-def test_a_dozen_lines_of_numpy_reproduce_the_design(written):
+def test_a_dozen_lines_of_numpy_reproduce_the_design(written, monkeypatch):
+    monkeypatch.setattr("stiction.random.equally_likely.FIRST_MEMBERS", 200)
     peaks = written(lines_of(FACTORS))
     np.testing.assert_allclose(peaks.values[0], FACTORS.ravel(), rtol=1e-5)
     posterior = st.infer(JOINT, None, peaks, **QUIET)

@@ -7,6 +7,7 @@ import stat
 import warnings
 import zipfile
 import zlib
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -125,10 +126,12 @@ READERS = {
 }
 
 
-def zipped(content):
+@cache
+def zipped():
+    """An archive of 64 MB of zeros."""
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as packed:
-        packed.writestr("rows.npy", content)
+        packed.writestr("rows.npy", bytes(2**26))
     return archive.getvalue()
 
 
@@ -147,7 +150,7 @@ KINDS = {
     "blanks": lambda path: path.write_text("a (" + " " * 10**6 + "x,y\n1,2\n"),
     "columns": lambda path: path.write_text("1.0," * 10**6),
     "quotes": lambda path: path.write_text('x,"' + "y," * 10**6 + "\n1,2\n"),
-    "compressed": lambda path: path.write_bytes(zipped(bytes(2**26))),
+    "compressed": lambda path: path.write_bytes(zipped()),
 }
 
 
