@@ -306,3 +306,10 @@ def test_a_printed_row_is_the_number_that_it_names(name):
         if "distribution" in source:
             families = [result.by_family[end] for end in (at.low, at.high)]
             assert families == pytest.approx([at.stress_at_low, at.stress_at_high], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["posterior", "tests alone"])
+def test_the_error_of_a_posterior_is_the_root_of_peaks_over_samples(name):
+    """Also of peaks of two lengths: six in all, and 100 samples of each length."""
+    for kind in (name, f"{name.removesuffix(' alone')} of two lengths"):
+        assert source_of(kind).monte_carlo_error == pytest.approx(np.sqrt(6 / 100), rel=1e-9)

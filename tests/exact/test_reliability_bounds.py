@@ -31,6 +31,11 @@ def test_beyond_the_bounds_nothing_is_sampled(stress, expected):
     assert result.evaluations == 0
     assert result.algorithm == "exact"
     assert result.stress_above_bound == stress - 0.66e6
+    # Three interfaces of a list say as much about others as three samples.
+    listed = st.failure_probability(PROBLEM, [STRENGTH] * 3, stress, method=LOCAL)
+    interval = binomtest(int(3 * expected), 3).proportion_ci(0.9)
+    assert listed.interval["probability"] == pytest.approx([*interval], rel=1e-9)
+    assert listed.members.tolist() == [expected] * 3
 
 
 def test_bounds_follow_load_and_initial_stress():
