@@ -88,28 +88,6 @@ def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(d
             assert over.max() < 1e-9 * sample.excess.max()
 
 
-def test_one_event_in_space_and_time():
-    """It comes to rest; every tenth step is kept."""
-    specimen = crooked(nodes=64, drive=LOW)
-    save = st.Save(["slip", "slip_rate", "shear_stress", "strength"])
-    strength = rough(specimen, 3)
-    run = simulate_rupture(specimen, strength, method=Rupture(), event=0, save=save)
-    energies = (f"{name}_energy" for name in ("friction", "strain", "kinetic", "attenuated"))
-    assert sum(run[name] for name in energies).values == pytest.approx(run["work"].values)
-    assert run.attrs["stopped"] == "rest"
-    assert run["attenuated_energy"].values[-1] > 0.0
-    assert np.all(np.diff(run["slip"].values, axis=0) >= 0.0)
-    added = (run["slip"][-1] - run["slip"][0]).values.sum() * specimen.interface.cell
-    moment = specimen.solid.shear_modulus * added  # the frames begin just after the event
-    assert st.external.event_table(run)["event_moment (N)"][0] == pytest.approx(
-        moment, rel=0.02
-    )
-    over = run["shear_stress"] - run["strength"]
-    assert over.values[1:].max() < 0.02 * float(run["peak_strength"].mean())
-    assert run["machine_force"].values[0] == pytest.approx(run["force"].values[0], rel=1e-3)
-    assert run["block_velocity"].dims == ("snapshot", "height", "x")
-
-
 LINE = make_problem(64, 0.04, solid=QUARTER, weakening_rate=3e11, residual_strength=2e5)
 FAST = Rupture(loading_rate=1e8)
 RECORDED = {f"station_{name}": name for name in ("slip", "slip_rate", "shear_stress")}

@@ -97,12 +97,12 @@ def simulate_event(
         before = states[-1 if number is None else number]
         trial = search.event(sample, before)  # 2.
         trial.run(method.max_steps)
-        # A sliding event goes on until the last waves have crossed the block.
-        steps = trial.steps + (trial.mesh.window // 2 if trial.slides else 0)
+        if trial.slides:  # go on until the last waves have crossed the block
+            trial.take_steps(trial.mesh.window // 2, ends=False)
         event, last = search.event(sample, before), trial.waves.slip.mean()
         record = EventRecord(problem, rows, event, save, last)  # 3.
         record.add()
-        for _ in range(0, steps, save.every):
+        for _ in range(0, trial.steps, save.every):
             record.take_steps(save.every)
             record.add()
     return record.dataset(method, "sliding" if trial.slides else "rest", path)
