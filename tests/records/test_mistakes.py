@@ -184,6 +184,11 @@ def inferred(peaks=(7e5, 7.1e5, 7.3e5), problem=PROBLEM, random=FIELD, prior=Non
     return st.infer(problem, random, peaks, prior=prior, **given | options)
 
 
+def fitted(profiles, interface=None, **options):
+    given = {"marginal": "lognormal", "spectrum": "exponential", "noise": 0.0, "bootstrap": 20}
+    return st.fit_field(profiles, interface, progress=False, **given | options)
+
+
 def weighed(random, peaks=None, **options):
     """Peaks of interfaces that need no prior."""
     given = {"method": LOCAL, "unit": "Pa", "samples": 100, "progress": False} | options
@@ -204,6 +209,8 @@ FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (
 MEAN = "marginal.mean"
 PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})
 ONSET = st.onset(CROOKED, LINE_STRENGTH, method=LOCAL)
+FIELDS = FIELD.sample(LINE, samples=3, seed=1)
+ON_PLANE = KNOWN[:20].expand_dims(y=np.arange(20) * 4e-4).assign_attrs(units="Pa")
 TRAVEL = np.linspace(0.0, 1e-3, 50)
 CURVE = pd.DataFrame({"travel (mm)": TRAVEL * 1e3, "force (N)": 2e5 * TRAVEL})
 SCOPE = vars(setups) | {

@@ -374,7 +374,7 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
             columns.append(Column(name, unit or "", np.asarray(values, float), number, name))
         sizes = [column.values.size for column in columns]
         if sizes[0] != sizes[1]:
-            raise InputError(f"travel and force must be of equal length, got {sizes}")
+            raise InputError(f"source: travel and force must have equal lengths, got {sizes}")
         yield "test", Table(tuple(columns), "arrays", np.arange(sizes[0]))
     else:
         raise InputError(

@@ -27,6 +27,7 @@ Steps:
 
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -35,7 +36,7 @@ from pydantic import Field
 from scipy.stats import entropy
 
 from stiction.base.arrays import Array
-from stiction.base.errors import InputError, warn_accuracy
+from stiction.base.errors import InputError, prefixed, warn_accuracy
 from stiction.base.model import Count, NotNegative, Number, Progress, checked
 from stiction.base.progress import Meter
 from stiction.ensemble.pilot import compare, pilot_doubt
@@ -192,7 +193,8 @@ def infer(
     True
     """
     measured, error = peaks_and_error(peaks, unit, load_cell_error)
-    of_parameters = prior and {*prior} - {MEAN_KEY, SCATTER_KEY}
+    of_specimens = isinstance(prior, Mapping) and {*prior} <= {MEAN_KEY, SCATTER_KEY}
+    of_parameters = prior is not None and not of_specimens
     if method is None:
         if random is not None:
             raise InputError("method: is needed with a random interface. Give st.Equilibrium()")
@@ -369,7 +371,8 @@ def _of_specimens(
 def profiles_of(random: Any, prior: Any, families: Any, seed: int) -> Profiles:
     """Return the profiles of a fit, or the fields of any other source, which has no levels."""
     more: dict[str, Any] = {"prior": FactorPrior.of(prior)} if prior else {}
-    more |= {} if families is None else {"families": families_of(families)}
+    with prefixed("between"):
+        more |= {} if families is None else {"families": families_of(families)}
     if isinstance(random, Profiles):
         return random._replace(**more)
     if isinstance(random, FieldFit):
