@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from joint import FIELD, GIVEN, PROBLEM, RANDOM
 from refusals import refuses, warning_texts
-from scipy.stats import binom
+from scipy.stats import binom, entropy
 from setups import EXACT, LOCAL, make_problem
 
 import stiction as st
@@ -134,9 +134,12 @@ def test_intervals_of_a_posterior_hold_its_mean(more):
     posterior = st.infer(
         problem, field, peaks, unit="Pa", prior=prior | more, method=LOCAL, samples=300, **QUIET
     )
-    for name in posterior.names:
+    for u, name in zip(posterior.u.T, posterior.names, strict=True):
         low, high = posterior.interval[name]
         assert low <= posterior.mean[name] <= high, name
+        # Of 4000 draws in 40 steps of the prior.
+        information = math.log(40) - entropy(np.histogram(u, 40, (0.0, 1.0))[0])
+        assert posterior.information[name] == pytest.approx(information, abs=0.05), name
 
 
 @pytest.mark.parametrize(("share", "most"), [(0.05, 300), (0.5, 1000)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 import shutil
 import time
 from functools import partial
@@ -73,6 +75,34 @@ def test_a_doubt_about_a_problem_is_told_by_every_call(call):
     """Its stiffness has positive entries, so equilibria need not be the least."""
     texts = warning_texts(lambda: CALLS[call](np.linspace(1e6, 1.2e6, NODES)))
     assert sum("has positive entries off its diagonal" in text for text in texts) == 1
+
+
+COARSE = {
+    "line": (st.Interface(0.05, 64), st.PowerLawSpectrum(4e-4)),
+    "line that ends": (st.Interface(0.05, 64, ends="free"), st.ExponentialSpectrum(9e-4)),
+    "plane": (st.Interface((0.023, 0.0164), (24, 20)), st.PowerLawSpectrum(1e-3)),
+}
+
+
+@pytest.mark.parametrize("name", COARSE)
+@pytest.mark.parametrize("mean_mode", [True, False])
+def test_a_grid_that_a_doubt_asks_for_is_fine_enough(name, mean_mode):
+    """With the nodes that it names, or with the power; with fewer nodes it is not."""
+    interface, spectrum = COARSE[name]
+    field = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), spectrum, mean_mode)
+
+    def doubts(interface, field):
+        texts = warning_texts(lambda: field.sample(interface))
+        return [text for text in texts if "is coarser than the spectrum" in text]
+
+    (text,) = doubts(interface, field)
+    nodes, power = re.search(r"nodes >= (.*) or power_kept=(.*)", text).groups()
+    for less, fine in ((0, True), (2, False)):
+        counts = [int(count) - less for count in nodes.split(" x ")]
+        grid = dataclasses.replace(interface, nodes=counts if counts[1:] else counts[0])
+        assert (not doubts(grid, field)) == fine
+    smooth = dataclasses.replace(spectrum, power_kept=float(power))
+    assert not doubts(interface, dataclasses.replace(field, spectrum=smooth))
 
 
 @pytest.mark.parametrize("wrong", [1, 3])

@@ -182,14 +182,14 @@ class RandomField(Listed):
     def warn_if_inaccurate(self, interface: Interface) -> None:
         """Warn if the grid is too coarse for the spectrum or the interface too short."""
         modes = self.modes(interface)
-        lost = modes.unresolved
+        lost, short = modes.unresolved
         if lost > MAX_UNRESOLVED:
             nodes = " x ".join(map(str, interface.shape))
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes are"
                 f" exact, but {100.0 * lost:.2g} % of the variance is not resolved. Check lengths"
-                f" (m), and give interface.nodes >= {enough} or power_kept={1.0 - lost:.3g}"
+                f" (m), and give interface.nodes >= {enough} or power_kept={1.0 - short:.3g}"
             )
         if self.mean_mode:
             return

@@ -105,10 +105,14 @@ class Modes:
         return np.concatenate((FIRST_DRAW, pairs)) if self.has_mean else pairs
 
     @property
-    def unresolved(self) -> float:
-        """Fraction of the variance at wavelengths that the nodes do not resolve."""
+    def unresolved(self) -> tuple[float, float]:
+        """Fractions of the variance: at wavelengths that the nodes do not resolve, and in all modes
+        from the largest of these on. On a plane, nodes resolve shorter waves along the diagonal.
+        """
         limit = np.array(self.interface.embedding.shape)[:, None] // 2
-        return float(np.sum(self.sigma[(np.abs(self.numbers) > limit).any(axis=0)] ** 2))
+        sigma, lost = self.sigma[1:], (np.abs(self.numbers[:, 1:]) > limit).any(axis=0)
+        short = sigma <= sigma[lost].max(initial=0.0)
+        return float(np.sum(sigma[lost] ** 2)), float(np.sum(sigma[short] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
         """Return node counts, in equal proportions, that leave at most a fraction unresolved."""
