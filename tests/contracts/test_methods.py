@@ -377,3 +377,41 @@ def test_an_event_has_the_same_variables_and_numbers_by_every_call(kind, name):
                 have, want[: len(have)], rtol=1e-5, err_msg=f"{call} {key}"
             )
             assert np.isnan(want[len(have) :]).all(), (call, key)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_an_onset_and_its_events_are_what_a_path_says_at_their_loads(name):
+    """`event_q` is `q` just before each event. What it adds is the difference of two states."""
+    problem, given = BODIES[name], profiles_of(BODIES[name], SAMPLES[name][0])
+    found = onset(name, st.Equilibrium(slip=True, events=12), SAMPLES[name][:1]).isel(sample=0)
+    count = np.isfinite(found.event_load.values).sum()
+    loads = np.append(found.event_load[:count], found.critical_load)
+    near = np.outer([1.0 - 1e-9, 1.0 + 1e-9], loads)
+    path = st.equilibrium_path(problem, given, np.unique(near))
+    before, after = (path.sel(load=side, method="nearest").drop_vars("load") for side in near)
+    # Slip grows as the root of the distance from a load at which a path turns: of 1e-9, or on
+    # planes of the tolerance.
+    close, added = 1e-3 if problem.interface.is_plane else 1e-4, after - before.astype(float)
+    largest = before.slip[0].values.max()
+    np.testing.assert_allclose(found.slip, before.slip[0], rtol=0.0, atol=close * largest)
+    assert [*before.sliding, after.sliding[-1]] == [False] * (count + 1) + [True]
+    assert found.arrested_events == after.arrested_events[-1]
+    stress = before.mean_stress.values
+    assert found.first_instability.item() == pytest.approx(stress[0], rel=close)
+    assert found.critical_stress.item() == pytest.approx(stress.max(), rel=close)
+    nodes, cell = [*problem.interface.dims], problem.interface.cell
+    expected = {f"event_{key}": before[key] for key in before} | {
+        "event_stress": before.mean_stress, "event_stress_drop": -added.mean_stress,
+        "event_force_drop": -added.force, "event_largest_slip": added.slip.max(nodes),
+        "event_moment": problem.solid.shear_modulus * cell * added.slip.sum(nodes),
+    }  # fmt: skip
+    if "travel" in path:
+        expected["event_travel_step"] = added.travel
+    compared = expected.keys() & found.keys()
+    assert len(compared) >= (8 if "travel" in path else 3)
+    known = np.flatnonzero(
+        np.isfinite(after.mean_stress[:count])
+    )  # a slider slides after its last
+    for key in sorted(compared):
+        told, values = found[key][known], expected[key][known]
+        np.testing.assert_allclose(told, values, rtol=close, err_msg=key)
