@@ -10,9 +10,10 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pint
 import pytest
 import xarray as xr
-from contracts.bodies import World, world
+from contracts.bodies import COEFFICIENTS, World, world
 from contracts.test_results import CALLS, LOCAL, QUIET, SHAKEN, design, table
 from matplotlib.patches import Rectangle
 
@@ -21,6 +22,8 @@ import stiction as st
 pytestmark = pytest.mark.filterwarnings("ignore")
 PEAKS = np.array([5.9e5, 6.2e5, 6.6e5])
 LENGTH = "random.strength.spectrum.correlation_length"
+COEFFICIENT = "friction_coefficient"
+Q = pint.UnitRegistry()
 
 
 RESULTS: dict[tuple[str, World], Any] = {}
@@ -52,6 +55,27 @@ def drawn_by(name: str, call: str, *more: str) -> Any:
         return getattr(st.plot, name)(of(call, w), *given, **options)
 
     return draw
+
+
+def uniform(w: World) -> st.Problem:
+    """A problem of uniform parameters in the units of a world."""
+    line = st.Interface(0.05 * w.units["m"], 128)
+    law = st.LinearWeakening(weakening_rate=0.3e12 * w.factor("Pa m-1"))
+    load = st.Load(initial_stress=1e4 * w.Pa, normal_pressure=2e6 * w.Pa)
+    return st.Problem(w.problem.solid, line, law, load)
+
+
+def coefficients(w: World) -> st.RandomField:
+    return st.RandomField(
+        COEFFICIENTS.marginal, st.PowerLawSpectrum(9e-3 * w.units["m"]), quantity=COEFFICIENT
+    )
+
+
+def fit(w: World, unit: float = 1.0, quantity: str = COEFFICIENT) -> Any:
+    line, spectrum = uniform(w).interface, {"type": "power_law", "exponent": 4.0}
+    rows = coefficients(w).sample(line, samples=4, seed=1) * unit
+    given = {"marginal": "lognormal", "spectrum": spectrum, "bootstrap": 20, **QUIET}
+    return st.fit_field(rows, line, quantity=quantity, **given)
 
 
 DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body, what draws
@@ -361,6 +385,39 @@ def test_curves_and_ticks_have_the_names_of_their_numbers():
     for place, source in zip(axes.lines[-1].get_ydata(), table.source.values, strict=True):
         low, high = table.sel(source=source).low.item(), table.sel(source=source).high.item()
         assert named[place].get_text() == f"{source.removeprefix('problem.')}: {low} to {high}"
+
+
+def panels_in_si(result: Any) -> Any:
+    """The curves, bands and bars in each panel of a fit, with their units by pint."""
+    for axes in st.plot.fit(result):
+        labels = axes.get_xlabel(), axes.get_ylabel()
+        assert all(in_si(0.0, label) for label in labels)  # their nouns suit their units
+        units = [(re.findall(r"\(([^()]*)\)$", label) or ["1"])[0] for label in labels]
+        shapes = [line.get_xydata() for line in axes.lines]
+        shapes += [path.vertices for band in axes.collections for path in band.get_paths()]
+        shapes += [bar.get_bbox().get_points() for bar in axes.patches]
+        yield [shape * [Q(unit).to_base_units().m for unit in units] for shape in shapes]
+
+
+def test_a_fit_is_drawn_in_the_units_of_its_quantity():
+    """Strengths are as coefficients times a pressure, to its powers in each panel."""
+    pressure, pure = 2.0**21, fit(LOCAL("line"))
+    panels = [*panels_in_si(pure)]
+    strengths = panels_in_si(fit(LOCAL("line"), pressure, "strength"))
+    powers = (1, -1), (1, 1), (0, 0), (0, 2)
+    for power, shapes, others in zip(powers, panels, strengths, strict=True):
+        for shape, other in zip(shapes, others, strict=True):
+            size = np.abs(shape).max(axis=0) + 1e-300
+            alike = other / pressure ** np.array(power) / size
+            np.testing.assert_allclose(alike, shape / size, atol=1e-5)  # of two fits
+    values, marginal = np.ravel(pure._rows), pure.field.marginal.distribution
+    np.testing.assert_allclose(panels[0][0][:, 1], marginal.pdf(panels[0][0][:, 0]))
+    heights, _ = np.histogram(values, 40, density=True)
+    np.testing.assert_allclose([bar[1, 1] for bar in panels[0][-40:]], heights)
+    share = (np.arange(200) + 0.5) / 200
+    expected, measured = marginal.ppf(share), np.quantile(values, share)
+    np.testing.assert_allclose(panels[1][0], np.transpose([expected, expected]))
+    np.testing.assert_allclose(panels[1][1], np.transpose([expected, measured]))
 
 
 def test_the_unit_of_an_axis_suits_all_that_it_shows():

@@ -7,35 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from contracts.bodies import COEFFICIENTS, World
-from contracts.test_plots import in_si
+from contracts.bodies import World
+from contracts.test_plots import coefficients, fit, in_si, uniform
 from contracts.test_results import LOCAL, QUIET, chance, design
 
 import stiction as st
 
 pytestmark = pytest.mark.filterwarnings("ignore")
-COEFFICIENT, RATE = "friction_coefficient", "problem.friction.weakening_rate"
-
-
-def uniform(w: World) -> st.Problem:
-    """A problem of uniform parameters in the units of a world."""
-    line = st.Interface(0.05 * w.units["m"], 128)
-    law = st.LinearWeakening(weakening_rate=0.3e12 * w.factor("Pa m-1"))
-    load = st.Load(initial_stress=1e4 * w.Pa, normal_pressure=2e6 * w.Pa)
-    return st.Problem(w.problem.solid, line, law, load)
-
-
-def coefficients(w: World) -> st.RandomField:
-    return st.RandomField(
-        COEFFICIENTS.marginal, st.PowerLawSpectrum(9e-3 * w.units["m"]), quantity=COEFFICIENT
-    )
-
-
-def fit(w: World, unit: float = 1.0, quantity: str = COEFFICIENT) -> Any:
-    line, spectrum = uniform(w).interface, {"type": "power_law", "exponent": 4.0}
-    rows = coefficients(w).sample(line, samples=4, seed=1) * unit
-    given = {"marginal": "lognormal", "spectrum": spectrum, "bootstrap": 20, **QUIET}
-    return st.fit_field(rows, line, quantity=quantity, **given)
+RATE = "problem.friction.weakening_rate"
 
 
 def posterior(w: World) -> Any:
