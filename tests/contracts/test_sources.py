@@ -313,3 +313,17 @@ def test_the_error_of_a_posterior_is_the_root_of_peaks_over_samples(name):
     """Also of peaks of two lengths: six in all, and 100 samples of each length."""
     for kind in (name, f"{name.removesuffix(' alone')} of two lengths"):
         assert source_of(kind).monte_carlo_error == pytest.approx(np.sqrt(6 / 100), rel=1e-9)
+        assert getattr(source_of(kind), "specimens", 6) == 6
+
+
+def test_peaks_of_two_lengths_are_as_far_from_a_prediction_as_those_of_each():
+    """Squares are added, and the largest deviation counts."""
+    posterior, ask = source_of("posterior of two lengths"), st.statistics.agreement
+    further = {length: 1.01 * peaks for length, peaks in LENGTHS.items()}
+    both = ask(posterior, further, unit="Pa")
+    each = [ask(posterior, {length: further[length]}, unit="Pa") for length in further]
+    squares = sum(one.cramer_von_mises for one in each)
+    deviation = max(one.largest_deviation for one in each)
+    # With the same seed the draws of the posterior are the same.
+    found = both.cramer_von_mises, both.largest_deviation
+    assert found == pytest.approx((squares, deviation), rel=1e-9)

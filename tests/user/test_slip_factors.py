@@ -91,6 +91,11 @@ def test_the_unit_is_a_specimen(written):
     given = QUIET | {"between": "lognormal"}
     unit, tens = (st.infer(JOINT, None, peaks, **given) for peaks in (twice, single))
     assert (unit.specimens, tens.specimens) == (5, 10)
+    # Pairs with ten numbers and five means: half of the pooled variance is that of a mean.
+    squares = (FACTORS / FACTORS.mean(axis=1, keepdims=True) - 1.0) ** 2
+    assert any(
+        f"error of {np.sqrt(squares.sum() / 10):.1%}" in text for text in unit.assumptions
+    )
     widths = [np.ptp(posterior.interval["between"]) for posterior in (unit, tens)]
     assert widths[0] > widths[1]
 
