@@ -1,11 +1,13 @@
 """The local criterion against its definition, its bounds, theory and exact onsets."""
 
+import itertools
 import re
 import warnings
 
 import numpy as np
 import pytest
 from checks import assert_mean
+from contracts.bodies import BODIES, FIELD
 from hypothesis import given, settings
 from hypothesis import strategies as hs
 from oracles import symbol_of, times
@@ -22,6 +24,7 @@ from setups import (
     make_problem,
     turns,
     within,
+    without,
 )
 from specimens import crooked, rough
 
@@ -244,3 +247,33 @@ def test_coarse_directions_are_named():
     (text,) = warning_texts(lambda: onset_on(48, 26))
     assert "9.6 nodes along x and, in mode III, 4.4 along" in text
     assert warning_texts(lambda: onset_on(60, 72)) == []
+
+
+@pytest.mark.parametrize("name", ["blocks", "blocks with an extent"])
+def test_the_weakest_run_of_nodes_of_a_specimen_by_dense_eigenvectors(name):
+    """Of all shortest runs on which K - W is unstable; each sample has its own W."""
+    problem, rates = BODIES[name], np.array([0.2e12, 0.3e12, 0.2e12])
+    free, spacing = problem.interface.breakable, problem.interface.spacing
+    strength = FIELD.sample(problem.interface, samples=3, seed=5)
+    profiles = {"strength": strength, "weakening_rate": np.outer(rates, np.ones(free.size))}
+    problem = without(problem, "friction.weakening_rate")
+    found, excess = local_onset(problem, profiles), strength - problem.load.initial_stress
+    for number, rate in enumerate(rates):
+        runs: dict[tuple[int, int], float] = {}
+        for width, start in itertools.product(range(1, 12), range(free.size)):
+            end, run = start + width, slice(start, start + width)
+            within_run = any(start <= a and b <= end for a, b in runs)
+            if end > free.size or within_run or not free[run].all():
+                continue
+            values, modes = np.linalg.eigh(problem.blocks.stiffness[run, run])
+            if values[0] <= rate:
+                y = np.abs(modes[:, 0])
+                runs[start, end] = excess[number, run] @ y / (problem.load_profile[run] @ y)
+        start, end = min(runs, key=runs.__getitem__)
+        told = found.isel(sample=number)
+        assert told.critical_load.item() == pytest.approx(runs[start, end], rel=1e-9)
+        assert told.critical_position.item() == pytest.approx(0.5 * (start + end) * spacing)
+        assert told.critical_patch_length.item() == pytest.approx((end - start) * spacing)
+        # Slip on the run takes stress off the interface.
+        static = problem.sample(profiles).mean_stress(found.critical_load.values)
+        assert 0.98 * static[number] < told.critical_stress < static[number]
