@@ -161,6 +161,23 @@ def test_a_table_has_the_same_numbers_in_each_format(reader, tmp_path):
         assert len(results) == 1, (option, results)
 
 
+@pytest.mark.parametrize("reader", OPTIONS)
+@pytest.mark.parametrize("form", ["text", "workbook"])
+def test_the_last_of_several_tables_is_read_as_the_refusal_says(reader, form, tmp_path):
+    """It names the lines of their first numbers; a heading is part of a table."""
+    table = {"read_profile": PROFILE, "read_curve": CURVE, "read_peaks": PEAKS}[reader]
+    other = [table[0], *([row[0], *(1.5 * cell for cell in row[1:])] for row in table[1:])]
+    remark = ["and again", *[""] * (len(table[0]) - 1)]
+    both = [*table, remark, *table, remark, *other]
+    numbers, refusal = read(reader, form, both, tmp_path)
+    assert not numbers
+    size = len(table) + 1
+    assert "holds 3 tables" in refusal
+    assert f"lines 2, {2 + size}, {2 + 2 * size}." in refusal
+    last = read(reader, form, both, tmp_path, skip=2 * size)
+    assert last == read(reader, form, other, tmp_path)
+
+
 @pytest.mark.parametrize("form", ["text", "workbook"])
 @pytest.mark.parametrize("name", ["specimen", "Probe", "test", "No."])
 def test_specimens_have_whole_numbers_or_names(name, form, tmp_path):
