@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 import itertools
 import re
+from functools import cache
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -94,6 +95,8 @@ DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body
         st.statistics.agreement(of("monte_carlo", w), PEAKS * w.Pa, unit="Pa"), **options)),
     "rupture": (SHAKEN, "line", drawn_by("rupture", "simulate_rupture", "problem")),
     "precursors": (world, "blocks", drawn_by("precursors", "equilibrium_path", "problem")),
+    "precursors of two": (world, "blocks", lambda w, **options: st.plot.precursors(
+        two_paths(w), measured=pushed(w), **options)),
 }  # fmt: skip
 ELSEWHERE = {"film", "fit"}
 """A film is a file, see test_files, and a fit has no units of a world, see tests/user."""
@@ -196,6 +199,21 @@ def test_a_figure_draws_the_numbers_of_its_result_in_their_units(name):
     assert_drawn_alike(drawn(draw(other)), shown, 1e-3, other.factor)
 
 
+@cache
+def two_paths(w: World) -> list[Any]:
+    loads = np.linspace(0.0, 8e5, 9) * w.Pa
+    return [st.equilibrium_path(w.problem, w.profiles(i), loads) for i in (0, 1)]
+
+
+@cache
+def pushed(w: World) -> Any:
+    """Curves of two tests, each with a precursor."""
+    force = np.r_[np.linspace(0.0, 100.0, 200), np.linspace(80.0, 160.0, 200), [90.0] * 50]
+    force = force + 0.1 * np.random.default_rng(0).normal(size=force.size)
+    travel = np.linspace(0.0, 3e-4, force.size) * w.units["m"]
+    return st.read_curve((travel, force * w.factor("N")), unit="N", travel_unit="m")
+
+
 def points_of(name: str, w: World) -> Any:
     """Points in SI that a figure has to show, each group as vertices of a single shape."""
     result = RESULTS.get((CALL_OF.get(name, name), w))
@@ -229,6 +247,20 @@ def points_of(name: str, w: World) -> Any:
         yield PEAKS * w.Pa, np.array([1.0, 2.0, 3.0]) / 3.0
     elif name == "rupture":
         yield [result.critical_position], [0.0]
+    elif name == "precursors of two":
+        (test,), lines = pushed(w), []
+        yield test.travel, test.force
+        yield test.drops.travel, test.drops.force
+        yield test.drops.travel, np.full(1, w.interface.length)
+        for path in two_paths(w):
+            (travel, _), (force, _), *_ = drawn(st.plot.precursors(path))
+            lines.append((travel, force))
+            yield path.event_travel[-1:], path.event_start[-1:]
+        last = np.mean([travel[np.isfinite(travel)].max() for travel, _ in lines])
+        grid = np.linspace(0.0, last, 400)[:-1:19]
+        rows = [np.interp(grid, travel, force) for travel, force in lines]
+        for rank in (0.05, 0.5, 0.95):
+            yield grid, np.quantile(rows, rank, axis=0)
     elif name == "precursors":
         yield result.travel[:3], result.force[:3]
         yield result.event_travel, result.event_force
