@@ -188,7 +188,9 @@ def _separator(lines: Sequence[str], words: set[str]) -> str:
     commas, '0,1 1000,5', but commas '0.1, 1000.5'.
     """
     step = max(1, len(lines) // MAX_LINES_COMPARED)
-    shown = [line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step])]
+    sampled = (line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step]))
+    # A row without cells says nothing.
+    shown = [line for line in sampled if line.strip(" \t,;")]
     ratings = []
     for order, separator in enumerate(SEPARATORS):
         rows = [_split(line, separator, words) for line in shown]
