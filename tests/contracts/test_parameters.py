@@ -260,3 +260,18 @@ def test_evaluations_are_the_samples_that_were_solved(random, stress, algorithm,
     )  # fmt: skip
     assert 0 <= SOLVED[0] - answer.evaluations < 100 + ranked
     assert answer.evaluations <= most
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.8])
+def test_a_guide_that_misses_failures_is_doubted(scale):
+    """Failures rest on the strength at one node, if the scale is not zero, and not on the guide."""
+
+    def onset(rows: Any, stress: Any) -> Any:
+        return stress + scale * (rows.strength.reshape(rows.samples, -1)[:, 5] - 8.5e5)
+
+    answer = ask(
+        "failure_probability", method=StandIn(onset, first_stage="local_criterion"),
+        stress=5.5e5, algorithm="two_level", max_evaluations=500, workers=1,
+    )  # fmt: skip
+    doubts = [text for text in answer.warnings if "local criterion misses" in text]
+    assert len(doubts) == (scale > 0.0)
