@@ -415,3 +415,21 @@ def test_an_onset_and_its_events_are_what_a_path_says_at_their_loads(name):
     for key in sorted(compared):
         told, values = found[key][known], expected[key][known]
         np.testing.assert_allclose(told, values, rtol=close, err_msg=key)
+
+
+@pytest.mark.parametrize("name", ["plane", "plane with ends"])
+def test_bounds_of_any_tolerance_hold_the_load_of_the_first_instability(name):
+    """Of samples in which no node is at its residual strength before. The lower one is told."""
+    tolerances = (1e-10, 1e-7, 1e-4, 1e-2)
+    tight, *found = (
+        onset(name, st.Equilibrium(tolerance=tolerance, events=1)) for tolerance in tolerances
+    )
+    profile = BODIES[name].load_profile[BODIES[name].interface.breakable].mean()
+    exact = tight.event_load[:, 0].fillna(tight.critical_load)
+    assert tight.certified.sum() > 1
+    for tolerance, rough in zip(tolerances[1:], found, strict=True):
+        lower = rough.event_load[:, 0].fillna(rough.critical_load)
+        upper = lower + rough.certificate_gap / profile
+        assert (upper - lower <= tolerance * upper).all()
+        inside = (lower <= exact * (1.0 + 1e-9)) & (exact <= upper * (1.0 + 1e-9))
+        assert inside[tight.certified == 1.0].all()

@@ -105,8 +105,11 @@ class Equilibrium(Listed):
     `critical_patch_extent` (m, along 'direction') and
     `critical_patch_area` (m²) replace the length. `certified` is true
     if the bounds are rigorous, which requires that no node reaches its
-    residual strength before the first instability. Slipping nodes
-    belong to the same patch if their cells have a common edge.
+    residual strength before the first instability. This is tested at
+    the lower bound, so a large `tolerance` may miss such a node. If the
+    interface ends, the bounds hold for the load, because the mean
+    stress also depends on the slip. Slipping nodes belong to the same
+    patch if their cells have a common edge.
 
     Examples
     --------
