@@ -116,6 +116,16 @@ def test_what_survives_counts_as_survived():
     assert np.isfinite(curve.stress).all()
 
 
+def test_where_most_survive_a_curve_begins_later():
+    """Two thirds survive any stress, so there is no median stress, but a quantile at 0.29."""
+    weak = STRENGTH.marginal.distribution.ppf(1.0 / 3.0)
+    third = StandIn(lambda rows, stress: np.where(rows.strength[:, 0] < weak, stress, np.nan))
+    curve = st.failure_curve(PROBLEM, STRENGTH, method=third, smallest=0.1, progress=False)
+    assert curve.survived == pytest.approx(2.0 / 3.0, abs=0.04)  # four errors of 2000 samples
+    assert np.isfinite(curve.stress).values.tolist() == [False, True, True, True]
+    assert np.isnan(curve.to_array().values[:, 0]).all()
+
+
 def test_a_curve_of_an_event_that_never_happens_is_unknown():
     never = StandIn(lambda rows, stress: np.nan * stress)
     with pytest.warns(st.AccuracyWarning, match="the event happens in none of 2000 samples"):
