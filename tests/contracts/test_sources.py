@@ -327,3 +327,19 @@ def test_peaks_of_two_lengths_are_as_far_from_a_prediction_as_those_of_each():
     # With the same seed the draws of the posterior are the same.
     found = both.cramer_von_mises, both.largest_deviation
     assert found == pytest.approx((squares, deviation), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["posterior", "tests of two lengths", "profiles and tests"])
+def test_a_draw_of_a_posterior_describes_the_interface_at_it(name):
+    posterior = source_of(name)
+    for draw in (0, 7):
+        random = posterior.at(draw)[1]
+        strength, factor = random.strength, (random.between or {}).get("strength")
+        described = {
+            "mean": strength.mean, "marginal.mean": strength.mean,
+            "standard_deviation": strength.standard_deviation,
+            "efolding_length": strength.spectrum.efolding_length,
+            "between": factor and factor.distribution.std(),
+        }  # fmt: skip
+        drawn = {key: values[draw] for key, values in posterior.draws.items()}
+        assert drawn == pytest.approx({key: described[key] for key in drawn}, rel=1e-6)
