@@ -105,7 +105,7 @@ def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):
 def test_fast_loading_is_warned_of_and_the_rate_that_is_named_is_slow_enough(stop, text):
     """Once it is rounded to a digit, which may halve it. Arrested events need a slower rate."""
     problem, strength, _ = fault()
-    strength = strength + 2e6 * (problem.interface.x > 0.02)
+    strength = strength + 2e6 * np.outer([0.0, 1.0, 0.0], problem.interface.x > 0.02)
 
     def told(rate: float) -> list[str]:
         method = st.Rupture(loading_rate=rate, stop=stop)
