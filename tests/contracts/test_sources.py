@@ -343,3 +343,26 @@ def test_a_draw_of_a_posterior_describes_the_interface_at_it(name):
         }  # fmt: skip
         drawn = {key: values[draw] for key, values in posterior.draws.items()}
         assert drawn == pytest.approx({key: described[key] for key in drawn}, rel=1e-6)
+
+
+def test_designs_are_stresses_whatever_the_unit_of_the_peaks():
+    """Of the same tests, as stresses and as coefficients under a pressure of 2 MPa."""
+    found, given = [], {"between": "lognormal", "method": LOCAL, "samples": 100} | QUIET
+    for scale, unit in ((1.0, "Pa"), (2e6, "1")):
+        posterior = st.infer(PROBLEM, FIELD, PEAKS / scale, unit=unit, **given)
+        few = {"designs": {"few": 2}, "repetitions": 10} | QUIET
+        found.append(st.design_of_tests(PROBLEM, posterior, **few))
+    for name in ("design_low", "design_stress", "design_high"):
+        assert found[0][name].units == found[1][name].units == "Pa"
+        np.testing.assert_allclose(found[0][name], found[1][name], rtol=1e-6)
+    assert (found[0].design_low < found[0].design_high)[1]
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in SOURCES if " " in name or name == "posterior"]
+)
+def test_interfaces_of_a_source_depend_on_the_seed_alone(name):
+    first, again, other = (source_of(name).interfaces(5, seed) for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+    assert len({*first}) > 1
