@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import html
 import re
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import xarray as xr
 from contracts.bodies import BODIES, FIELD, WITH_ENDS, field_of, profiles_of, world
 
 import stiction as st
+from stiction.cli.pages import _inputs, _slip_tests
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET = {"progress": False}
@@ -154,6 +155,33 @@ def test_a_page_of_a_design_holds_its_numbers(name, tmp_path):
     for value in (design.force, design.probability, design.friction_coefficient):
         scaled = {f"{value * 10.0**power:.3g}" for power in (-3, 0, 3)}
         assert scaled & shown, value
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_the_inputs_on_a_page_are_those_of_the_problem_in_any_units(name):
+    """Of many values, the mean."""
+    w, other = world(name), world(name).in_units(Pa=0.25, m=2.0, s=8.0)
+    rows, others = ({k: row for k, *row in _inputs(at.problem, {})} for at in (w, other))
+    assert {"Pa", "m", "kg m-3"} <= {unit for _, unit, _ in rows.values()}
+    for key, (value, unit, _) in rows.items():
+        again, known, _ = others[key]
+        assert unit == known
+        if not isinstance(value, list) and re.match(r"(\d+ values, mean )?[-\d.]", str(value)):
+            shown, scaled = (float(str(cell).split()[-1]) for cell in (value, again))
+            right = np.mean(reduce(getattr, key.split("."), w.problem))
+            assert shown == pytest.approx(right, rel=5.1e-5)  # five digits
+            assert scaled == pytest.approx(shown * other.factor(unit), rel=1.1e-4)
+
+
+def test_the_slip_tests_on_a_page_are_those_of_the_file(tmp_path):
+    """A slip load is that of all surfaces."""
+    force, load = [200.0, 210.0, 190.0, 205.0], [180.0, 193.0, 165.0, 184.0]  # kN
+    columns = {"specimen": [*"ABCD"], "clamping force (kN)": force, "slip load (kN)": load}
+    pd.DataFrame(columns).to_csv(tmp_path / "slips.csv", index=False)
+    given = {"normal": "clamping force (kN)", "surfaces": 2}
+    peaks = st.read_peaks(tmp_path / "slips.csv", **given)
+    for row, name, at, slip in zip(_slip_tests(peaks), "ABCD", force, load, strict=True):
+        assert row == [name, f"{at:.3g} kN", f"{slip:.3g} kN", f"{slip / at / 2.0:.4g}"]
 
 
 @pytest.mark.parametrize("name", BODIES)
