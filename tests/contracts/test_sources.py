@@ -366,3 +366,16 @@ def test_interfaces_of_a_source_depend_on_the_seed_alone(name):
     assert first == again
     assert first != other
     assert len({*first}) > 1
+
+
+def test_records_of_one_specimen_count_by_their_length():
+    """Of a long record and a short one with a lower mean, as all their points together."""
+    long = st.Interface(0.3, 384)
+    rows = FIELD.sample(long)[0], 0.8 * FIELD.sample(INTERFACE, seed=4)[0]
+    records = [xr.DataArray(row, {"x": long.x[: row.size]}, "x") for row in rows]
+    options = {"marginal": "gamma", "noise": False, "bootstrap": 20, "spectrum": "exponential"}
+    one = st.fit_field(records, **options, **QUIET)
+    known = one._with_levels([one.field])
+    pooled, plain = np.concatenate(rows).mean(), np.mean([row.mean() for row in rows])
+    assert abs(known.levels.item() - pooled) < 0.3 * abs(plain - pooled)
+    assert known.within.item() < one._estimate.within.min()
