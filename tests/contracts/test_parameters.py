@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
@@ -111,11 +112,15 @@ def example(call: str) -> Any:
 
 
 def numbers(result: Any) -> str:
-    """All numbers of a result, as text."""
+    """All numbers of a result, as text of nine digits: round-off does not count."""
     if isinstance(result, xr.Dataset):
         pilot = {key: value for key, value in result.attrs.items() if key.startswith("pilot")}
-        return repr((result.drop_attrs().to_dict(), pilot))
-    return repr(result([8e5]) if callable(result) else result.to_dict())
+        text = repr((result.drop_attrs().to_dict(), pilot))
+    else:
+        text = repr(result([8e5]) if callable(result) else result.to_dict())
+    return re.sub(
+        r"\d\.\d{9,}(e[-+]\d+)?|\d+\.\d+", lambda found: f"{float(found[0]):.9g}", text
+    )
 
 
 def test_every_public_call_has_an_example_and_every_parameter_another_value():
