@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, PUSHER, WITH_ENDS, attempt, field_of, profiles_of
+from contracts.bodies import BODIES, FIELD, PUSHER, WITH_ENDS, attempt, field_of, profiles_of
 
 import stiction as st
 from stiction import extensions
@@ -159,6 +159,30 @@ def test_a_body_that_a_method_does_not_take_is_refused_with_its_reason(kind, nam
         with pytest.raises(st.InputError) as refused:
             call()
         assert reason in str(refused.value)
+
+
+STEEPENING = st.PiecewiseWeakening(
+    slip=[0.2, 0.6, 1.0], strength=[1.0, 0.9, 0.0], critical_slip=2e-6
+)
+
+
+def test_every_reason_against_a_problem_is_named_by_every_call():
+    problem, field = dataclasses.replace(BODIES["line"], friction=STEEPENING), FIELD
+    reasons = st.LocalCriterion().supports(problem)
+    assert len(reasons) == 2
+    given = {"method": st.LocalCriterion(), "progress": False}
+    for call in (
+        lambda: st.onset(problem, SAMPLES["line"], **given),
+        lambda: st.monte_carlo(problem, field, samples=2, **given),
+        lambda: st.failure_probability(problem, field, stress=7e5, **given),
+        lambda: st.design_stress(problem, field, probability=0.1, **given),
+        lambda: st.Study(
+            problem=problem, random=field, method=given["method"], samples=2
+        ).run(),
+    ):
+        with pytest.raises(st.InputError) as refused:
+            call()
+        assert all(reason in str(refused.value) for reason in reasons)
 
 
 @every

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from joint import FIELD, PROBLEM
-from scipy.stats import loguniform, uniform
+from scipy.stats import loguniform, norm, truncnorm, uniform
 from setups import LOCAL
 
 import stiction as st
@@ -50,6 +50,23 @@ def test_a_prior_is_the_same_however_it_is_stated(ways):
         for way in ways
     ]  # fmt: skip
     assert means == pytest.approx([means[0]] * len(ways), rel=1e-9)
+
+
+def test_a_prior_of_scatter_holds_what_lies_between_its_limits():
+    """A coefficient of variation is neither negative nor above 0.9."""
+    given = {
+        "method": LOCAL,
+        "samples": 100,
+        "progress": False,
+        "unit": "Pa",
+        "between": "normal",
+    }
+    means = [
+        st.infer(PROBLEM, None, [0.95e6, 1e6, 1.05e6], prior={"between": way}, **given)
+        .mean["between"]
+        for way in (norm(0.1, 0.1), truncnorm(-1.0, 8.0, loc=0.1, scale=0.1))
+    ]  # fmt: skip
+    assert means[0] == pytest.approx(means[1], rel=1e-9)
 
 
 @pytest.mark.parametrize("key", ["correlation_length", "marginal.cv"])

@@ -56,6 +56,12 @@ def test_noise_is_taken_out_of_a_marginal(name):
     found = family.fit(values, noise)
     assert found.distribution.std() == pytest.approx(quiet.std(), rel=0.02)
     assert found.distribution.ppf(0.01) == pytest.approx(np.quantile(quiet, 0.01), rel=0.03)
+    # Nothing near is likelier, and free bounds are at least as likely as stated bounds.
+    best = mean_log_likelihood(found, values, noise)
+    for factor in (0.99, 1.01):
+        assert mean_log_likelihood(family.widened(found, factor), values, noise) < best
+    free = family_of(name).fit(values, noise)
+    assert mean_log_likelihood(free, values, noise) > best - 1e-4
     again = family.fit(values, noise, found)  # moves nothing
     assert again.distribution.std() == pytest.approx(found.distribution.std(), rel=1e-3)
 
