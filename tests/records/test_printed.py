@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import html
 import re
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ NUMBER = r"(?<![\w.])[-\u2212]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
 UNIT = r"(?<![\w.])[GMk\u00b5mun]?(?:Pa|N|m|s|J|Hz)(?:[ /][msk]-?\d?)?(?![\w-])"
 QUANTITY = (
     "stress|force|friction|coefficient|probability|mean|deviation|variance|length|strength|slip"
-    "|travel|time|position|pressure|load|weakening|quantile|interval|index|samples|points|values"
+    "|travel|time|position|pressure|load|weakening|quantile|interval|index|samples|points|values|noise"
 )
 CLOSE = 0.011  # a number of three digits that is rounded the other way
 MARKUP = re.compile(r"<(style|script|pre).*?</\1>|<[^>]+>", re.DOTALL)
@@ -74,9 +74,14 @@ def printed() -> dict[str, Any]:
         for name in WITH_ENDS if name.split()[0] in ("line", "blocks")
     }  # fmt: skip
     kinds = {"marginal": "lognormal", "spectrum": "exponential", "noise": 0.0, "bootstrap": 20}
-    fit = st.fit_field(rows, line, quantity="friction_coefficient", **kinds, **QUIET)
+    kinds |= {"quantity": "friction_coefficient"}
+    noisy = rows + 0.05 * np.random.default_rng(1).standard_normal(rows.shape)
+    fits = {
+        "fit of coefficients": st.fit_field(rows, line, **kinds, **QUIET),
+        "fit with noise": st.fit_field(noisy, line, **kinds | {"noise": 0.05}, **QUIET),
+    }
     samples = {name: world(name).problem.sample(world(name).profiles()) for name in WITH_ENDS}
-    return objects() | answers | samples | {"fit of coefficients": fit}
+    return objects() | answers | samples | fits
 
 
 def test_prints(as_recorded):
@@ -85,9 +90,12 @@ def test_prints(as_recorded):
 
 def test_figures(as_recorded):
     texts = {}
-    for name, (make, body, draw) in DRAWN.items():
-        figure = np.ravel(draw(make(body)))[0].figure
-        artists = figure.findobj(plt.Text)
+    drawings = {name: partial(draw, make(body)) for name, (make, body, draw) in DRAWN.items()}
+    drawings |= {
+        name: partial(st.plot.fit, printed()[name]) for name in printed() if "fit" in name
+    }
+    for name, draw in drawings.items():
+        artists = np.ravel(draw())[0].figure.findobj(plt.Text)
         texts[name] = "\n".join(sorted(artist.get_text() for artist in artists))
         plt.close("all")
     as_recorded("figures", texts)
@@ -121,6 +129,7 @@ def test_commands(name, as_recorded, command, monkeypatch, tmp_path):
     ):  # fmt: skip
         _, out, errors = command(*line.split())
         texts[f"{len(texts)} {line}"] = out + errors
+    texts["stored run"] = repr(st.open_run("run"))
     for page in sorted(Path().glob("*.html")):
         body = re.sub(
             r"<(style|script|pre).*?</\1>|<[^>]+>", " ", page.read_text("utf-8"), flags=re.S
