@@ -3,10 +3,11 @@
 import dataclasses
 import re
 
+import numpy as np
 import pytest
 from joint import FIELD, PROBLEM
 from scipy.stats import loguniform, norm, truncnorm, uniform
-from setups import LOCAL
+from setups import LOCAL, make_problem
 
 import stiction as st
 from stiction.random.dotted_keys import full_key, short_key
@@ -50,6 +51,25 @@ def test_a_prior_is_the_same_however_it_is_stated(ways):
         for way in ways
     ]  # fmt: skip
     assert means == pytest.approx([means[0]] * len(ways), rel=1e-9)
+
+
+def test_a_posterior_is_the_same_in_stresses_and_in_coefficients():
+    """Of the strength and of the peaks, under a pressure or, of stresses, without."""
+    pressed, free = (make_problem(load=st.Load(normal_pressure=p)) for p in (2e6, None))
+    peaks, means = np.array([0.95e6, 1e6, 1.05e6]), []
+    for problem, unit, quantity in (
+        (free, "Pa", None), (pressed, "Pa", None), (pressed, "1", None),
+        (pressed, "Pa", "friction_coefficient"), (pressed, "1", "friction_coefficient"),
+    ):  # fmt: skip
+        scale = 2e6 if quantity else 1.0
+        marginal = st.Lognormal(mean=1e6 / scale, cv=0.2)
+        field = st.RandomField(marginal, st.PowerLawSpectrum(3e-3), quantity=quantity)
+        posterior = st.infer(
+            problem, field, peaks / (2e6 if unit == "1" else 1.0), unit=unit, method=LOCAL,
+            prior={"marginal.mean": (0.9e6 / scale, 1.3e6 / scale)}, samples=200, progress=False,
+        )  # fmt: skip
+        means.append(posterior.mean["marginal.mean"] * scale)
+    assert means == pytest.approx([means[0]] * 5, rel=1e-9)
 
 
 def test_a_prior_of_scatter_holds_what_lies_between_its_limits():

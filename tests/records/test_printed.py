@@ -18,7 +18,7 @@ import tomli_w
 from contracts.bodies import COEFFICIENTS, WITH_ENDS, World, world
 from contracts.test_plots import DRAWN
 from contracts.test_results import CALLS, LOCAL, QUIET
-from recording import compare
+from recording import compare, digest
 from user.test_notebook import objects
 
 import stiction as st
@@ -31,6 +31,8 @@ QUANTITY = (
     "stress|force|friction|coefficient|probability|mean|deviation|variance|length|strength|slip"
     "|travel|time|position|pressure|load|weakening|quantile|interval|index|samples|points|values|noise"
 )
+LONGEST = 300
+"""Numbers of a text that are recorded singly, at most."""
 CLOSE = 0.011  # a number of three digits that is rounded the other way
 MARKUP = re.compile(r"<(style|script|pre).*?</\1>|<[^>]+>", re.DOTALL)
 CLOCK = re.compile(r"^ *time .*|Computed with .*|\d{4}-\d\d-\d\d|^ *computed .*", re.MULTILINE)
@@ -44,6 +46,8 @@ def tokens(text: str) -> dict[str, Any]:
         float(part[0].replace(",", "").replace("\u2212", "-")) for part in parts if part[0]
     ]
     words = " ".join("#" if part[0] else part[1] or part[2].lower() for part in parts)
+    if len(numbers) > LONGEST:
+        return {"numbers": digest(numbers)}
     return {"numbers": [float(f"{number:.6g}") for number in numbers], "words": words}
 
 
@@ -85,7 +89,11 @@ def printed() -> dict[str, Any]:
 
 
 def test_prints(as_recorded):
-    as_recorded("prints", {name: str(result) for name, result in printed().items()})
+    texts = {name: str(result) for name, result in printed().items()}
+    for name, result in printed().items():
+        if hasattr(result, "to_dict"):
+            texts[f"{name}, plain"] = repr(result.to_dict())
+    as_recorded("prints", texts)
 
 
 def test_figures(as_recorded):
