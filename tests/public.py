@@ -1,4 +1,4 @@
-"""The public names with their parameters, the kinds of study tables and the commands, as text.
+"""The public names with parameters and defaults, kinds of study tables and commands, as text.
 
 `python tests/public.py > tests/public.txt` stores them anew. A change belongs in CHANGELOG.md.
 """
@@ -31,18 +31,20 @@ KINDS = {
 
 
 def names_of(module: ModuleType, prefix: str) -> Iterator[str]:
-    """Yield the public names of a module with their parameters."""
+    """Yield the public names of a module with their parameters and defaults."""
     for name in sorted({*module.__all__} - {"__version__"}):
         thing: Any = getattr(module, name)
         if inspect.ismodule(thing):
             yield from names_of(thing, f"{prefix}{name}.")
         elif callable(thing) and not (inspect.isclass(thing) and issubclass(thing, Exception)):
             try:
-                given = [*inspect.signature(thing).parameters]
+                given = inspect.signature(thing).parameters
             except (TypeError, ValueError):
-                given = []
+                given = {}
             # Protocols and annotations have no parameters of their own.
-            shown = ", ".join(given) if given != ["args", "kwargs"] else ""
+            usual = [name if p.default is p.empty else f"{name}={p.default!r}"
+                     for name, p in given.items()]  # fmt: skip
+            shown = ", ".join(usual) if [*given] != ["args", "kwargs"] else ""
             yield f"{prefix}{name}({shown})"
         else:
             yield f"{prefix}{name}"

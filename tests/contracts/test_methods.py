@@ -244,7 +244,7 @@ def test_a_wrong_option_is_refused_by_its_name(kind, option):
 
 @every_option
 def test_every_option_counts_or_is_refused(kind, option):
-    """Another value of it changes the result, or the refusal names it."""
+    """Another value of it changes the result, or the refusal names it; alone as in a batch."""
     counts = []
     for name in ("line", *WITH_ENDS):
         problem = BODIES[name]
@@ -260,6 +260,8 @@ def test_every_option_counts_or_is_refused(kind, option):
             assert option in refusal, (name, refusal)
         else:
             assert not same(plain(kind, name), result), f"{option} has no effect on {name}"
+            alone = onset(name, method, SAMPLES[name][2:3])
+            assert same(result.isel(sample=[2]).drop_vars("sample"), alone.drop_vars("sample"))
     assert counts, f"{option} is refused everywhere"
 
 
