@@ -9,7 +9,16 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 import xarray as xr
-from contracts.bodies import BODIES, FIELD, PUSHER, WITH_ENDS, attempt, field_of, profiles_of
+from contracts.bodies import (
+    BODIES,
+    FIELD,
+    PUSHER,
+    WITH_ENDS,
+    attempt,
+    body,
+    field_of,
+    profiles_of,
+)
 
 import stiction as st
 from stiction import extensions
@@ -212,6 +221,17 @@ def test_alone_equals_in_a_batch_in_any_order(kind, name):
     for number, strength in enumerate(SAMPLES[name]):
         alone = onset(name, method, strength[None])
         assert same(batch.isel(sample=[number]).drop_vars("sample"), alone.drop_vars("sample"))
+
+
+@pytest.mark.parametrize("nodes", [(122, 120), (120, 122)])
+def test_a_plane_may_have_any_even_numbers_of_nodes(nodes):
+    """Also those that cannot be halved twice, in either direction."""
+    problem = body(nodes, (0.023, 0.0164))
+    strength = FIELD.sample(problem.interface, seed=5)
+    found = st.onset(problem, strength, method=st.Equilibrium(), progress=False)
+    weakest, mean = strength.min(), strength.mean()
+    assert found.certified
+    assert weakest < found.critical_stress < mean
 
 
 @every
