@@ -280,3 +280,21 @@ def test_a_guide_that_misses_failures_is_doubted(scale):
     )  # fmt: skip
     doubts = [text for text in answer.warnings if "local criterion misses" in text]
     assert len(doubts) == (scale > 0.0)
+
+
+def test_the_budget_that_a_doubt_names_reaches_the_target():
+    """Of plain samples, whose coefficient of variation falls as the root of their number."""
+    given = {
+        "stress": 5.8e5,
+        "method": LOCAL,
+        "algorithm": "plain",
+        "target_cv": 0.05,
+        "workers": 1,
+    }
+    few = st.failure_probability(LINE, FIELD, max_evaluations=200, progress=False, **given)
+    (named,) = re.findall(r"raise max_evaluations to about ([\d.e+]+)", " ".join(few.warnings))
+    enough = st.failure_probability(
+        LINE, FIELD, max_evaluations=int(float(named)), progress=False, **given
+    )
+    assert few.cv > 0.1
+    assert 0.03 < enough.cv < 0.055
