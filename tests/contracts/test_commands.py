@@ -168,3 +168,24 @@ def test_each_answer_names_its_point_and_has_its_page(tmp_path, monkeypatch, run
         assert next(texts).startswith(f"{where}{agreement}")
         assert force in Path(f"page_{number}.html").read_text()
     assert not [*texts]
+
+
+def test_a_result_says_which_samples_failed_and_how_many_were_not_tried(tmp_path, monkeypatch):
+    study, quiet = dataclasses.replace(STUDY, sweep=[], samples=12), {"progress": False}
+    study.run(out=tmp_path / "run", part="1/2", pilot=False, **quiet)
+    part = st.open_run(tmp_path / "run").dataset()
+    assert part.attrs["cut_short"] == "6 of 12 samples are done"
+    assert "failed_samples" not in part.attrs
+    solve = Experiment.results
+
+    def results(self, first, count):
+        if first + count > 10:
+            raise FloatingPointError("lost")
+        return solve(self, first, count)
+
+    monkeypatch.setattr(Experiment, "results", results)
+    tried = study.run(pilot=False, workers=1, **quiet)
+    failed = [[0, sample, 3, "FloatingPointError: lost", False] for sample in (10, 11)]
+    assert json.loads(tried.attrs["failed_samples"]) == failed
+    assert "cut_short" not in tried.attrs
+    assert np.flatnonzero(np.isnan(tried.critical_stress)).tolist() == [10, 11]
