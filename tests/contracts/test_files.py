@@ -191,6 +191,8 @@ def test_a_table_of_events_holds_every_event(name):
     result = st.onset(problem, rows, method=st.Equilibrium(events=3), **QUIET)
     table = st.external.event_table(result)
     assert len(table) == int(np.isfinite(result.event_load).sum())
+    moment = f"event_moment ({result.event_moment.units})"
+    assert not table.duplicated(["sample (1)", moment]).any()  # no event is listed twice
     for key, values in result.items():
         if values.dims == ("sample", "event"):
             known = values.values[np.isfinite(result.event_load.values)]
