@@ -19,6 +19,7 @@ from contracts.bodies import COEFFICIENTS, WITH_ENDS, World, world
 from contracts.test_plots import DRAWN
 from contracts.test_results import CALLS, LOCAL, QUIET
 from recording import compare, digest
+from setups import make_problem
 from user.test_notebook import objects
 
 import stiction as st
@@ -33,6 +34,7 @@ QUANTITY = (
 )
 LONGEST = 300
 """Numbers of a text that are recorded singly, at most."""
+PRESSED = make_problem(width=0.01, load=st.Load(normal_pressure=2e6))
 CLOSE = 0.011  # a number of three digits that is rounded the other way
 MARKUP = re.compile(r"<(style|script|pre).*?</\1>|<[^>]+>", re.DOTALL)
 CLOCK = re.compile(r"^ *time .*|Computed with .*|\d{4}-\d\d-\d\d|^ *computed .*", re.MULTILINE)
@@ -85,7 +87,13 @@ def printed() -> dict[str, Any]:
         "fit with noise": st.fit_field(noisy, line, **kinds | {"noise": 0.05}, **QUIET),
     }
     samples = {name: world(name).problem.sample(world(name).profiles()) for name in WITH_ENDS}
-    return objects() | answers | samples | fits
+    slips = st.infer(PRESSED, None, [810.0, 850.0, 790.0], unit="N", **QUIET)
+    asked = {"sensitivities": False, "target_cv": 0.3} | QUIET
+    designs = {
+        "design from slips": st.design_stress(PRESSED, slips, probability=1e-3, **asked),
+        "probability from slips": st.failure_probability(PRESSED, slips, force=700.0, **QUIET),
+    }
+    return objects() | answers | samples | fits | designs
 
 
 def test_prints(as_recorded):
