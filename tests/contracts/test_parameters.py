@@ -298,3 +298,16 @@ def test_the_budget_that_a_doubt_names_reaches_the_target():
     )
     assert few.cv > 0.1
     assert 0.03 < enough.cv < 0.055
+
+
+@pytest.mark.parametrize("marginal", [FIELD.marginal, st.Lognormal(mean=1e6, cv=0.2)])
+@pytest.mark.parametrize(("stress", "certain"), [(1e3, 0.0), (1e8, 1.0)])
+def test_a_demand_far_from_all_onsets_is_certain_to_be_met_or_not(marginal, stress, certain):
+    """Whether the strength has bounds or not."""
+    field = st.RandomField(marginal, st.PowerLawSpectrum(4e-3))
+    given = {"method": LOCAL, "progress": False}
+    answer = st.failure_probability(LINE, field, stress=stress, **given)
+    low, high = answer.interval["probability"]
+    assert answer.probability == certain
+    assert low <= certain <= high
+    assert high - low < 1e-6
