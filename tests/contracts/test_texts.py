@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pint
 import pytest
+from contracts.bodies import world
 from refusals import refuses, warning_texts
 from setups import LOCAL, beta_strength, make_problem
 from small_study import small_study
@@ -197,3 +198,14 @@ def test_a_stress_below_minus_the_strength_is_told_with_its_amount():
         texts = [text for text in warning_texts(run) if "below minus the strength" in text]
         amounts += [float(text.split(", by ")[1].split(" Pa")[0]) for text in texts]
     assert 0.0 < amounts[0] < amounts[1] < 3e6
+
+
+def test_only_a_sweep_speaks_of_its_points():
+    """Of the largest difference between the local criterion and the exact onset."""
+    key = "random.strength.spectrum.correlation_length"
+    study = dataclasses.replace(world("line with ends", "local_criterion").study, samples=4)
+    study = dataclasses.replace(study, sweep=[{key: [4e-3, 6e-3]}])
+    for part in (study, dataclasses.replace(study, sweep=[])):
+        texts = warning_texts(partial(part.run, progress=False))
+        assert any("differs from the exact onset" in text for text in texts)
+        assert any("of the sweep" in text for text in texts) == bool(part.sweep)
