@@ -282,6 +282,22 @@ def test_a_guide_that_misses_failures_is_doubted(scale):
     assert len(doubts) == (scale > 0.0)
 
 
+def test_two_levels_answer_for_the_method_and_not_for_its_guide():
+    """The method is 3 % weaker than its guide, so its probability is that of a higher stress."""
+    weaker = StandIn(lambda rows, stress: 0.97 * stress, first_stage="local_criterion")
+    two, same, guide = (
+        ask("failure_probability", method=method, stress=stress, algorithm=algorithm,
+            target_cv=0.1, max_evaluations=None, workers=1)
+        for method, stress, algorithm in (
+            (weaker, 0.97 * 5.7e5, "two_level"), (LOCAL, 5.7e5, "subset"),
+            (LOCAL, 0.97 * 5.7e5, "subset"),
+        )
+    )  # fmt: skip
+    errors = 4.0 * np.hypot(two.cv, same.cv)
+    assert abs(np.log(two.probability / same.probability)) < errors
+    assert np.log(two.probability / guide.probability) > errors
+
+
 def test_the_budget_that_a_doubt_names_reaches_the_target():
     """Of plain samples, whose coefficient of variation falls as the root of their number."""
     given = {
