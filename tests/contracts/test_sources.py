@@ -345,6 +345,18 @@ def test_a_draw_of_a_posterior_describes_the_interface_at_it(name):
         assert drawn == pytest.approx({key: described[key] for key in drawn}, rel=1e-6)
 
 
+def test_fields_of_a_posterior_keep_the_shape_of_a_bounded_marginal():
+    """Another mean scales the lower bound, too."""
+    marginal = st.Lognormal(mean=1e6, cv=0.2, low=0.3e6)
+    field = st.RandomField(marginal, st.PowerLawSpectrum(4e-3))
+    given = {"between": "lognormal", "method": LOCAL, "samples": 100, "unit": "Pa"} | QUIET
+    for peaks in (PEAKS, 0.8 * PEAKS):
+        found = [
+            m.strength.marginal for m in st.infer(PROBLEM, field, peaks, **given).interfaces(4)
+        ]
+        assert [m.low / m.mean for m in found] == pytest.approx([0.3] * len(found), rel=1e-9)
+
+
 def test_designs_are_stresses_whatever_the_unit_of_the_peaks():
     """Of the same tests, as stresses and as coefficients under a pressure of 2 MPa."""
     found, given = [], {"between": "lognormal", "method": LOCAL, "samples": 100} | QUIET
