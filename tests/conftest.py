@@ -143,6 +143,7 @@ def command(monkeypatch, capfd):
 
     # pytest turns warnings into errors; on the command line they are lines of text.
     monkeypatch.setattr("warnings.showwarning", None, raising=False)
+    # A command that was interrupted leaves a hook of its own, which is taken back after the test.
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
 
     def run(*arguments):

@@ -52,6 +52,13 @@ LINES = {  # what a command says, spaces apart, and how it ends
 }  # fmt: skip
 
 
+def losing(experiment, first, count, solve=Experiment.results):
+    """The results of an experiment that loses its samples after those of SOLVED."""
+    if first + count > SOLVED[experiment.problem.interface.width != 0.01]:
+        raise FloatingPointError("lost")
+    return solve(experiment, first, count)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("commands")
@@ -62,12 +69,6 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def say(folder, monkeypatch, runs):
     """What a command prints: some samples of the run failed, and some chunks are damaged."""
-    solve = Experiment.results
-
-    def results(self, first, count):
-        if first + count > (10 if self.problem.interface.width == 0.01 else 12):
-            raise FloatingPointError("lost")
-        return solve(self, first, count)
 
     def say(line):
         return said.read_text() if line == "run study.toml" else runs(line, code=LINES[line][0])
@@ -75,9 +76,9 @@ def say(folder, monkeypatch, runs):
     monkeypatch.chdir(folder)
     said = folder / "said"
     if not said.exists():
-        monkeypatch.setattr(Experiment, "results", results)
-        said.write_text(runs("run study.toml --out run --no-pilot", code=1))
-        monkeypatch.setattr(Experiment, "results", solve)
+        with monkeypatch.context() as patch:
+            patch.setattr(Experiment, "results", losing)
+            said.write_text(runs("run study.toml --out run --no-pilot", code=1))
         for i in range(14):
             Path(f"run/chunks/{i:032x}.npz").write_text("damaged")
     return say
@@ -176,14 +177,7 @@ def test_a_result_says_which_samples_failed_and_how_many_were_not_tried(tmp_path
     part = st.open_run(tmp_path / "run").dataset()
     assert part.attrs["cut_short"] == "6 of 12 samples are done"
     assert "failed_samples" not in part.attrs
-    solve = Experiment.results
-
-    def results(self, first, count):
-        if first + count > 10:
-            raise FloatingPointError("lost")
-        return solve(self, first, count)
-
-    monkeypatch.setattr(Experiment, "results", results)
+    monkeypatch.setattr(Experiment, "results", losing)
     tried = study.run(pilot=False, workers=1, **quiet)
     failed = [[0, sample, 3, "FloatingPointError: lost", False] for sample in (10, 11)]
     assert json.loads(tried.attrs["failed_samples"]) == failed

@@ -89,7 +89,7 @@ def test_a_run_folder_and_its_exports_hold_the_study(name, tmp_path):
     assert again == study == st.Study.from_result(whole)
 
 
-def crooked(name: str) -> st.RandomInterface:
+def linked(name: str) -> st.RandomInterface:
     """Three linked properties, of which the first was measured, and two factors."""
     places = {"x": [0.004, 0.017], "y": [0.009, 0.0131, 0.0132]}
     places = {key: places[key] for key in BODIES[name].interface.dims}
@@ -113,7 +113,7 @@ def crooked(name: str) -> st.RandomInterface:
 @pytest.mark.parametrize("name", ["line", "plane with ends"])
 def test_whatever_is_random_comes_back_from_each_file(name, tmp_path):
     """With the same profiles and onsets, also in a list."""
-    random = crooked(name)
+    random = linked(name)
     problem = dataclasses.replace(BODIES[name], load=st.Load())
     given = {"random": [random, random], "method": st.LocalCriterion(), "keep": random.names}
     study = st.Study(problem=problem, samples=4, **given)

@@ -176,17 +176,17 @@ STEEPENING = st.PiecewiseWeakening(
 
 
 def test_every_reason_against_a_problem_is_named_by_every_call():
-    problem, field = dataclasses.replace(BODIES["line"], friction=STEEPENING), FIELD
+    problem = dataclasses.replace(BODIES["line"], friction=STEEPENING)
     reasons = st.LocalCriterion().supports(problem)
     assert len(reasons) == 2
     given = {"method": st.LocalCriterion(), "progress": False}
     for call in (
         lambda: st.onset(problem, SAMPLES["line"], **given),
-        lambda: st.monte_carlo(problem, field, samples=2, **given),
-        lambda: st.failure_probability(problem, field, stress=7e5, **given),
-        lambda: st.design_stress(problem, field, probability=0.1, **given),
+        lambda: st.monte_carlo(problem, FIELD, samples=2, **given),
+        lambda: st.failure_probability(problem, FIELD, stress=7e5, **given),
+        lambda: st.design_stress(problem, FIELD, probability=0.1, **given),
         lambda: st.Study(
-            problem=problem, random=field, method=given["method"], samples=2
+            problem=problem, random=FIELD, method=given["method"], samples=2
         ).run(),
     ):
         with pytest.raises(st.InputError) as refused:

@@ -300,18 +300,10 @@ def test_two_levels_answer_for_the_method_and_not_for_its_guide():
 
 def test_the_budget_that_a_doubt_names_reaches_the_target():
     """Of plain samples, whose coefficient of variation falls as the root of their number."""
-    given = {
-        "stress": 5.8e5,
-        "method": LOCAL,
-        "algorithm": "plain",
-        "target_cv": 0.05,
-        "workers": 1,
-    }
-    few = st.failure_probability(LINE, FIELD, max_evaluations=200, progress=False, **given)
+    given = {"stress": 5.8e5, "algorithm": "plain", "target_cv": 0.05, "workers": 1}
+    few = ask("failure_probability", max_evaluations=200, **given)
     (named,) = re.findall(r"raise max_evaluations to about ([\d.e+]+)", " ".join(few.warnings))
-    enough = st.failure_probability(
-        LINE, FIELD, max_evaluations=int(float(named)), progress=False, **given
-    )
+    enough = ask("failure_probability", max_evaluations=int(float(named)), **given)
     assert few.cv > 0.1
     assert 0.03 < enough.cv < 0.055
 

@@ -78,7 +78,7 @@ def test_an_interruption_whose_exception_is_lost(runs, monkeypatch, where, done,
 
     class HalfBuilt:
         def __del__(self):
-            self.closed  # noqa: B018 (it was never set)
+            raise AttributeError("closed was never set")
 
     def lose(*given):
         original(*given)

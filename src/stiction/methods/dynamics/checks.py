@@ -24,9 +24,13 @@ MISSED_PERCENT = 2.0
 """Distance of a first instability from equilibrium, %, from which there
 is a warning."""
 # Fractions of the stress scale:
-_ROUNDED = 0.75  # part of a rate that is below it also once it is rounded to one digit
 _COARSE_RISE, _MAX_RISE = 5e-3, 0.2  # rise of the load in an explicit step: warning, and error
 _MIN_REVERSE = 1e-3  # stress below minus the strength from which there is a warning
+
+
+def _rate_below(rate: float) -> str:
+    """Return a loading rate in one digit that is not above `rate`, although it is rounded."""
+    return f"{0.75 * rate:.1g}"
 
 
 def warn_of_coarse_grid(problem: Problem, rows: Sample) -> None:
@@ -87,10 +91,10 @@ def at_first_slip(run: Run) -> RuptureState | None:
         raise InputError("initial_stress: is far below the strength. Check the units of both")
     rise = run.slope(time) * step / scale
     if rise > _COARSE_RISE:
-        slower = _ROUNDED * run.slope(time) * _COARSE_RISE / rise
+        slower = _rate_below(run.slope(time) * _COARSE_RISE / rise)
         text = (
             f"loading_rate: in one explicit step of {step:.3g} s the load rises by {rise:.2g} of "
-            f"the stress scale, {scale:.3g} Pa. Load at {slower:.1g} Pa/s or slower"
+            f"the stress scale, {scale:.3g} Pa. Load at {slower} Pa/s or slower"
         )
         if rise > _MAX_RISE:
             raise InputError(text)
@@ -159,7 +163,7 @@ def warn_of_fast_loading(rises: Iterable[tuple[float, float]]) -> None:
         warn_accuracy(
             f"loading_rate: the load rises by {rise:.2g} of the stress scale while shear waves"
             " cross the nucleation length. Number and size of arrested events then depend on the"
-            f" rate. Load at {_ROUNDED * FAST_RISE / rise * loading_rate:.1g} Pa/s or slower"
+            f" rate. Load at {_rate_below(FAST_RISE / rise * loading_rate)} Pa/s or slower"
         )
 
 

@@ -190,7 +190,7 @@ def _separator(lines: Sequence[str], words: set[str]) -> str:
     step = max(1, len(lines) // MAX_LINES_COMPARED)
     sampled = (line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step]))
     # A row without cells says nothing.
-    shown = [line for line in sampled if line.strip(" \t,;")]
+    shown = [line for line in sampled if line.strip("".join(SEPARATORS))]
     ratings = []
     for order, separator in enumerate(SEPARATORS):
         rows = [_split(line, separator, words) for line in shown]
