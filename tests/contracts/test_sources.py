@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import SOLID, attempt
-from scipy.stats import norm
 
 import stiction as st
 from stiction.problem.sample import REPLACED
@@ -255,57 +254,6 @@ def test_a_member_is_refused_and_doubted_at_any_place_of_a_list(name, call):
         told.append(refusal or {str(one.message) for one in caught})
     assert told[0] == told[1] == told[2]
     assert isinstance(told[0], str) or len(told[0]) == 2  # and the few nodes of the grid
-
-
-def numbers_of(result: Any) -> dict[str, tuple[float, Any]]:
-    """The number and the interval of each row that a result may print, from its attributes."""
-    if not hasattr(result, "cv"):  # a fit or a posterior
-        values = result.parameters if hasattr(result, "parameters") else result.mean
-        return {name: (values[name], result.interval[name]) for name in values}
-    answer, ends = result, result.interval
-    names = ("stress", "force", "friction_coefficient", "probability", "partial_factor")
-    own = {name: (getattr(answer, name), ends.get(name, ())) for name in names}
-    own |= {
-        "coefficient_of_variation": (answer.cv, ()),
-        "of_which_by_choice_of_the_interfaces": (answer.members_cv, ()),
-        "90_%_of_interfaces_are_between": (answer.band[0], answer.band),
-        "reliability_index": (-norm.ppf(answer.probability), ()),
-        "lower_bound_of_the_stress": (answer.lower_bound, ()),
-        "5_%_value,_confidence_75_%": (answer.characteristic_stress * answer.area, ()),
-    }
-    return own
-
-
-WEIBULL = dataclasses.replace(FACTORED, between={"strength": st.Weibull(mean=1.0, cv=0.15)})
-PRINTED: dict[str, Any] = {
-    "design": lambda: st.design_stress(
-        PROBLEM, [FACTORED, WEIBULL], probability=0.02, sensitivities=True, method=LOCAL, **ASKED),
-    "probability": lambda: st.failure_probability(
-        PROBLEM, [FIELD, OTHER], force=455.0, method=LOCAL, **ASKED),
-    "bounded": lambda: st.failure_probability(
-        PROBLEM, dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.2, low=5e5)), 7e5,
-        method=LOCAL, **ASKED),
-} | {name: SOURCES[name] for name in ("fit with scatter", "tests of two lengths")}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", PRINTED)
-def test_a_printed_row_is_the_number_that_it_names(name):
-    """With its interval; and what moves a design is printed at the end where it does."""
-    result = PRINTED[name]()
-    known = numbers_of(result)
-    for row in result._summary().rows:
-        value, interval = known[row.name.replace(" ", "_")]
-        assert row.value == pytest.approx(value, rel=1e-9), row.name
-        assert [*row.interval] == pytest.approx([*interval], rel=1e-9), row.name
-    if name != "design":
-        return
-    for source, at in result.sensitivities.to_dataframe().iterrows():
-        (line,) = (line for line in str(result).splitlines() if f" {source}: " in line)
-        ends = [float(text.split()[0]) for text in line.split(": ")[-1].split(" to ")]
-        assert ends == pytest.approx([at.force_at_low, at.force_at_high], rel=5e-3), line
-        if "distribution" in source:
-            families = [result.by_family[end] for end in (at.low, at.high)]
-            assert families == pytest.approx([at.stress_at_low, at.stress_at_high], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["posterior", "tests alone"])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 import re
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import tomli_w
 from contracts.bodies import COEFFICIENTS, WITH_ENDS, World, world
 from contracts.test_plots import DRAWN
 from contracts.test_results import CALLS, LOCAL, QUIET
+from contracts.test_sources import FACTORED, FIELD, OTHER, PROBLEM, source_of
 from recording import compare, digest
 from setups import make_problem
 from user.test_notebook import objects
@@ -89,11 +91,21 @@ def printed() -> dict[str, Any]:
     samples = {name: world(name).problem.sample(world(name).profiles()) for name in WITH_ENDS}
     slips = st.infer(PRESSED, None, [810.0, 850.0, 790.0], unit="N", **QUIET)
     asked = {"sensitivities": False, "target_cv": 0.3} | QUIET
+    several = {"method": st.LocalCriterion(), "target_cv": 0.5, "seed": 5} | QUIET
+    weibull = replace(FACTORED, between={"strength": st.Weibull(mean=1.0, cv=0.15)})
+    bounded = replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.2, low=5e5))
     designs = {
+        "design of several": st.design_stress(
+            PROBLEM, [FACTORED, weibull], probability=0.02, sensitivities=True, **several),
+        "probability of several": st.failure_probability(
+            PROBLEM, [FIELD, OTHER], force=455.0, **several),
+        "probability of a bounded strength": st.failure_probability(
+            PROBLEM, bounded, 7e5, **several),
         "design from slips": st.design_stress(PRESSED, slips, probability=1e-3, **asked),
         "probability from slips": st.failure_probability(PRESSED, slips, force=700.0, **QUIET),
-    }
-    return objects() | answers | samples | fits | designs
+    }  # fmt: skip
+    sources = {name: source_of(name) for name in ("fit with scatter", "tests of two lengths")}
+    return objects() | answers | samples | fits | designs | sources
 
 
 def test_prints(as_recorded):
