@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from refusals import refuses
+from refusals import says
 
 FLOOR = 1e-9
 """Distance of numbers that count as equal, as a share of the largest of an output."""
@@ -137,12 +137,12 @@ def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
 
 
 def refusals(name: str, scope: dict[str, Any]) -> Callable[..., None]:
-    """A test of each call that a record of this name holds as text, with words of its refusal."""
+    """A test of each call that a record of this name holds as text: words of what it tells."""
     words = stored(name)
 
     @pytest.mark.parametrize("call", words)
     def test(call: str) -> None:
-        refuses(words[call], partial(eval, call, scope))
+        says(words[call], partial(eval, call, scope))
 
     return test
 

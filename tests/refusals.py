@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from contracts.bodies import attempt
 
 import stiction as st
 
@@ -19,6 +20,14 @@ def refuses(
         call()
     for word in words.split(" ... "):
         assert word.lower() in str(caught.value).lower(), str(caught.value)
+
+
+def says(words: str, call: Callable[[], Any]) -> None:
+    """Fail unless the refusal and the doubts of a call hold all words, in any case."""
+    told: list[str] = []
+    told += warning_texts(lambda: told.append(attempt(call)[1]))
+    for word in words.split(" ... "):
+        assert word.lower() in " ".join(told).lower(), told
 
 
 def warning_texts(call: Callable[[], Any]) -> list[str]:

@@ -17,7 +17,7 @@ import setups
 import xarray as xr
 from crooked import LINE as CROOKED
 from crooked import LINE_STRENGTH
-from recording import mistakes
+from recording import mistakes, refusals
 from ruptures import BREAKING_PLANE
 from scipy import stats
 from setups import EXACT, LENGTH, LOCAL, RATE, beta_strength, ensemble, make_problem
@@ -221,3 +221,4 @@ SCOPE = vars(setups) | {
 }
 simulator = partial(st.external.simulator, PROBLEM, FIELD, method=LOCAL, samples=3)
 test_each_mistake_is_refused_as_recorded = mistakes(__file__, SCOPE | globals())
+test_a_refusal_or_a_doubt_holds_the_numbers_that_it_names = refusals("told", SCOPE | globals())
