@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from contracts.bodies import BODIES, FIELD
+from ruptures import run_of as run_at_rest
+from setups import make_problem
 
 import stiction as st
+from stiction.methods.dynamics import medium
+from stiction.methods.dynamics.memory import implicit_tables
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 TIMES, LOADS = np.array([[0.0, 6e-4, 8e-4, 9e-4, 1e-3], [0.0, 6.3e5, 6.3e5, 2e5, 6e5]])
@@ -233,3 +237,18 @@ def test_a_run_takes_as_many_steps_as_it_may(name):
     assert_close(onset(needed).radiated_energy, run.radiated_energy[-1:])
     with pytest.raises(st.InputError, match=f"max_steps: {needed - 1} steps"):
         onset(needed - 1)
+
+
+def bytes_in(part: Any) -> int:
+    """Memory of the arrays in a tuple."""
+    return sum(map(bytes_in, part)) if isinstance(part, tuple) else getattr(part, "nbytes", 0)
+
+
+@pytest.mark.parametrize(("nodes", "length"), [(4096, 0.1), ((180, 248), (0.1, 0.12))])
+def test_a_run_takes_the_memory_that_it_asks_for(nodes, length, monkeypatch):
+    asked, problem = [], make_problem(nodes, length, weakening_rate=5e10)
+    monkeypatch.setattr(medium, "check_memory", lambda _, size, __: asked.append(size))
+    monkeypatch.setattr(medium, "largest_step", lambda *_: 1e-6)
+    run = run_at_rest(problem, 1e6 * np.ones(nodes), st.Rupture(loading_rate=1e7))
+    tables = implicit_tables(run.medium.grid), run.medium.step_table
+    assert bytes_in((run.start(0.0), run.setting, *tables)) == pytest.approx(asked[0], rel=0.05)

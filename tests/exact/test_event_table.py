@@ -78,15 +78,24 @@ def run():
     return st.simulate_rupture(problem, strength, method=method, save=save)
 
 
-def test_a_spectrum_is_that_of_the_lines_between_the_times():
-    """A triangle of any knots has the spectrum M sinc²(f T)."""
-    inner = np.sort(np.random.default_rng(1).uniform(0.0, 2.0, 300))
-    time = np.sort(np.concatenate([[0.0, 1.0, 2.0], inner]))
-    frequencies, amplitude = rate_spectrum(
-        make_problem(128, 0.05), 5.0 + time, 7.0 * (1.0 - np.abs(time - 1.0))
+@pytest.mark.parametrize(("inner", "unit"), [(0, 1.0), (300, 1.0), (300, 1e-3)])
+def test_a_spectrum_is_that_of_the_lines_between_the_times(inner, unit):
+    """A triangle of any knots has the spectrum M sinc²(f T), from one period in all.
+
+    Up to eight nodes in a shear wave, and two times in a period, but at least two periods in all.
+    """
+    problem = make_problem((64, 60), (0.1, 0.11), weakening_rate=5e10)
+    knots = np.random.default_rng(1).uniform(0.0, 2.0, inner)
+    time = unit * np.sort(np.concatenate([[0.0, 1.0, 2.0], knots]))
+    rate = 7.0 / unit * (1.0 - np.abs(time / unit - 1.0))
+    frequencies, amplitude = rate_spectrum(problem, 5.0 * unit + time, rate)
+    np.testing.assert_allclose(
+        amplitude[0], 7.0 * np.sinc(frequencies[0] * unit) ** 2, atol=1e-9
     )
-    np.testing.assert_allclose(amplitude[0], 7.0 * np.sinc(frequencies[0]) ** 2, atol=1e-9)
-    assert frequencies[0][0] == pytest.approx(0.5)
+    wave = problem.solid.shear_wave_speed / (8.0 * 0.11 / 60)
+    highest = max(1.0 / unit, min(wave, 0.5 / np.median(np.diff(time))))
+    assert frequencies[0][[0, -1]] == pytest.approx([0.5 / unit, highest])
+    assert rate_spectrum(problem, time[:2], rate[:2])[0][0].size == 0
 
 
 def test_the_spectrum_of_a_rupture_tends_to_its_moment(run):

@@ -77,12 +77,6 @@ def test_a_function_cannot_be_written_down(tmp_path):
 # -- points of a sweep ---------------------------------------------------------------------------
 
 
-def test_a_key_of_toml_without_quotes():
-    rupture = {"type": "rupture", "loading_rate": 1e8}
-    points = swept({"method": {"start": ["rest", "equilibrium"]}}, method=rupture).experiments
-    assert [point.method.start for point in points] == ["rest", "equilibrium"]
-
-
 def test_whole_tables_are_values_too():
     marginals = [STUDY["random"]["strength"]["marginal"], LOGNORMAL]
     study = swept({"random.strength.marginal": marginals})
