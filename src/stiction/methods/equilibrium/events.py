@@ -106,7 +106,7 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
         "event_energy_stress_drop": variable(
             "Pa", "twice the energy released above the residual strength, over the slip added"
         ),
-        "event_fracture_energy": variable("J/m", "energy dissipated above the residual"),
+        "event_fracture_energy": variable("J/m", "dissipation of the event above the residual"),
         **(WITH_INERTIA if inertia else {}),
         **(OF_SPECIMENS if interface.is_free else BETWEEN_HALF_SPACES if inertia else {}),
     }
