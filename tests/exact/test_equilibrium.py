@@ -1,5 +1,7 @@
 """Equilibrium: closed forms, and the conditions of optimality checked with independent products."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from oracles import symbol_of, times
@@ -8,11 +10,13 @@ from specimens import crooked
 
 import stiction as st
 from stiction.elasticity.line import stiffness_column
+from stiction.elasticity.protocol import DenseEntries
+from stiction.methods.equilibrium.dense import cholesky
 from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
 from stiction.methods.equilibrium.dense.runaway import Runs, unstoppable_length
 from stiction.methods.equilibrium.dense.search import DenseSearch
-from stiction.methods.equilibrium.patches import count_patches, main_patch
+from stiction.methods.equilibrium.patches import count_patches, line_patch, main_patch
 from stiction.methods.equilibrium.solver import sample_of
 from stiction.methods.equilibrium.strength import LINEAR, make_sample, pieces_of
 
@@ -90,6 +94,28 @@ def test_certificate_is_the_distance_of_both_bounds(problem, make_strength):
     assert gap == pytest.approx(load - excess.min(), rel=1e-9)
 
 
+def test_a_factor_is_that_of_its_matrix_however_it_was_reached():
+    """After nodes joined, left, or weakened less or more; singular or not."""
+    rng, n, failures = np.random.default_rng(1), 30, 0
+    K = 0.02 * rng.uniform(-1.0, 0.0, (n, n)) + np.diag(rng.uniform(1.0, 2.0, n))
+    K = 0.5 * (K + K.T)
+    workspace = make_workspace(DenseEntries(K.flatten(), n, 0.0), n)
+    slips, W = rng.random(n) < 0.5, np.zeros(n)
+    for _ in range(200):
+        slips ^= rng.random(n) < 0.02
+        W = np.where(rng.random(n) < 0.1, rng.choice([0.0, 0.3, 0.6, 1.1], n), W)
+        workspace.is_slipping[:], workspace.diagonal[:n] = slips, np.diag(K) - W
+        rows, x = cholesky.factor_slipping(workspace), rng.normal(size=n)
+        S, b = workspace.slipping[:rows], x[:rows].copy()
+        cholesky.forward_substitute(workspace.factor, 0, rows, x)
+        cholesky.back_substitute(workspace.factor, rows, x)
+        product = (K - np.diag(W))[np.ix_(S, S)] @ x[:rows]
+        np.testing.assert_allclose(product, b, atol=1e-13 * (1.0 + np.abs(x).max()))
+        np.testing.assert_array_equal(workspace.is_slipping, slips)
+        failures += rows < slips.sum()
+    assert 20 < failures < 180
+
+
 @pytest.mark.parametrize(
     ("field", "count", "start", "length", "centre"),
     [
@@ -105,6 +131,9 @@ def test_patches_on_the_circle(field, count, start, length, centre):
     first, nodes, middle = main_patch(np.array(field))
     assert (first, nodes) == (start, length)
     assert middle == pytest.approx(centre)
+    ring = SimpleNamespace(spacing=0.5, first=0.0, is_free=False)
+    expected = 0.5 * np.array([centre, length, length, (start - 0.5) % len(field)])
+    np.testing.assert_allclose(np.hstack(line_patch(np.array(field), ring)), expected)
 
 
 def test_a_length_that_nothing_stops_has_the_least_drop_and_the_largest_energy():

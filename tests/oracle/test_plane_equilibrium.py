@@ -15,6 +15,7 @@ from setups import (
     make_problem,
     repeated,
     smooth_noise,
+    turns,
 )
 
 import stiction as st
@@ -24,9 +25,10 @@ from stiction.methods.criterion.average import _between_nodes
 from stiction.methods.equilibrium.solver import sample_of
 from stiction.methods.equilibrium.strength import present_pieces
 from stiction.methods.equilibrium.transforms import plane as program
-from stiction.methods.equilibrium.transforms.bracket import Bracket
+from stiction.methods.equilibrium.transforms.bracket import Bracket, bisect
 from stiction.methods.equilibrium.transforms.plane import PlaneSearch, plane_onset
 from stiction.methods.equilibrium.transforms.relaxation import stable_equilibrium
+from stiction.methods.equilibrium.transforms.turning_point import close_by_newton
 
 NODES, SMALL = (24, 24), (20, 20)
 SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)
@@ -57,6 +59,12 @@ def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     assert found.lower == pytest.approx(exact, rel=1e-9)
     error = np.abs(found.multiplier - multiplier).max()
     assert error < 1e-6 * multiplier.max()
+    # On one grid, bisection and Newton's method get there by themselves.
+    bracket = Bracket(plane.symbol(shape), weakening_rate, strength, profile)
+    direction = bisect(bracket, 5e-3, 5e-6)
+    assert exact * (1.0 - 6e-3) < bracket.lower < exact * (1.0 + 1e-12)
+    given = direction, bracket.lower, bracket.slip, 1e-8
+    assert close_by_newton(bracket, *given)[0] or wavenumbers == "spectral"
 
 
 def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
@@ -188,8 +196,10 @@ LAWS = {
 def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name):
     """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
     law = st.PiecewiseWeakening(**LAWS[name], residual_strength=0.25e6)
-    line = make_problem(64, 0.02, friction=law)
-    strip = make_problem((64, 8), (0.02, 0.0025), friction=law)
+    load = {"profile": 1.1 + 0.2 * np.sin(turns(64)), "initial_stress": 3e4 * np.cos(turns(64))}
+    line = make_problem(64, 0.02, friction=law, load=st.Load(**load))
+    wide = st.Load(**{key: repeated(value, 8) for key, value in load.items()})
+    strip = make_problem((64, 8), (0.02, 0.0025), friction=law, load=wide)
     tau_p = beta_strength(3e-3, 0.3e6, 2.66e6).sample(line.interface, samples=4, seed=2)
     exact = exact_onset(line, tau_p)
     assert exact["residual_reached"].any()
