@@ -6,7 +6,7 @@ from setups import beta_strength
 
 import stiction as st
 from stiction.inference.estimate import bands
-from stiction.inference.whittle import Observed, SpectrumFamily, Whittle
+from stiction.inference.whittle import Observed, SpectrumFamily, Whittle, periodograms_of
 from stiction.inference.window import RecordWindow
 
 SPACING = 1e-4
@@ -108,14 +108,14 @@ SHARES = np.array([0.0, 0.9, 0.08, 0.02])
 
 
 @pytest.mark.parametrize(
-    ("windows", "noise"),
-    [(CROOKED, None), (CROOKED, 0.5), ((MAP,), None)],
-    ids=["lines", "of a known noise", "map"],
+    ("windows", "noise", "longest"),
+    [(CROOKED, None, 1.0), (CROOKED, 0.5, 1.0), ((MAP,), None, 1.0), (CROOKED, None, 1.1e-3)],
+    ids=["lines", "of a known noise", "map", "at an end of a range"],
 )
-def test_score_and_information_are_derivatives_of_the_likelihood(windows, noise):
+def test_score_and_information_are_derivatives_of_the_likelihood(windows, noise, longest):
     """By differences: of any record, and where each is as expected, the information."""
     ratio = None if windows[0].measured.ndim == 2 else 1.0
-    family = SpectrumFamily("power_law", {}, ratio, noise, (1e-4, 1.0))
+    family = SpectrumFamily("power_law", {}, ratio, noise, (1e-4, longest))
     values = {"variance": 2.3, "correlation_length": 1.1e-3, "exponent": 1.7, "anisotropy": 1.4}
     at = family.vector([(values | {"noise_share": 0.13})[name] for name in family.free])
     rng, step = np.random.default_rng(7), 1e-3
@@ -149,12 +149,17 @@ def test_the_likelihood_of_many_records_is_the_sum_of_theirs():
     """Of three of one geometry and two of another, over all wavenumbers of a whole transform."""
     family = SpectrumFamily("power_law", {}, 1.0, None, (1e-4, 1.0))
     at, rng = family.vector([2.3, 1.1e-3, 1.7, 0.13]), np.random.default_rng(8)
-    model = family.model(at, SHARES)
-    total, observed = 0.0, []
-    for window, records, floor in zip(CROOKED, (3, 2), (0.02, 0.05), strict=True):
-        e = model.expectation(window)
-        powers = e * rng.exponential(size=(records, e.size))
-        observed.append(Observed(window, records, powers.mean(axis=0), floor))
+    model, total = family.model(at, SHARES), 0.0
+    windows = [CROOKED[number] for number in (0, 1, 0, 1, 0)]
+    rows = [rng.standard_normal(int(window.measured.sum())) for window in windows]
+    observed = periodograms_of(rows, windows)
+    for window, floor in zip(CROOKED, (group.floor for group in observed), strict=True):
+        e, own = (
+            model.expectation(window),
+            [row for row, w in zip(rows, windows, strict=True) if w is window],
+        )
+        powers = np.array([window.periodogram(row) for row in own])
+        assert 3e-4 * powers.mean() < floor < 3e-3 * powers.mean()
         terms = np.log(e + floor) + (powers + floor) / (e + floor)
         n = window.shape[0]
         every = terms[:, np.minimum(np.arange(1, n), n - np.arange(1, n))]

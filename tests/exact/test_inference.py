@@ -18,7 +18,7 @@ from stiction.inference.likelihood import (
     simulate,
 )
 from stiction.inference.posterior import grid_of
-from stiction.inference.prior import find_scaling, make_prior
+from stiction.inference.prior import _tails, find_scaling, make_prior
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
@@ -239,10 +239,25 @@ def test_grid_against_a_sum_by_hand():
     draws = grid.draws(20_000, 0)[:, 0]
     exact = np.interp([0.05, 0.5, 0.95], np.cumsum(density) / density.sum(), u)
     assert np.quantile(draws, [0.05, 0.5, 0.95]) == pytest.approx(exact, abs=3e-3)
+    # Of two parameters, each with peaks of its own, evidences multiply.
+    box = np.repeat(likelihood.box, 2, axis=1)
+    pair = grid_of(lambda u: likelihood(u[:, :1]) + likelihood(u[:, 1:]), box, 10_000)
+    assert pair.log_evidence == pytest.approx(2.0 * evidence, abs=1e-2)
+    assert [pair.information(i) for i in (0, 1)] == pytest.approx([information] * 2, abs=1e-2)
 
 
 def test_a_prior_that_begins_where_its_density_is_zero():
-    """A length of zero is impossible, and so unlikely that it need not be simulated."""
+    """A length of zero is impossible, and so unlikely that it need not be simulated.
+
+    A finite end with a density belongs to the prior, below or above.
+    """
+    for distribution, ends in (
+        (scipy.stats.expon(), (1, 0)), (scipy.stats.powerlaw(3.0), (0, 1)),
+        (scipy.stats.uniform(), (1, 1)), (scipy.stats.norm(), (0, 0)),
+    ):  # fmt: skip
+        low, high = _tails(distribution)
+        assert ((low == 0.0), (high == 1.0)) == ends
+        assert 0.0 <= low < 0.01 < 0.99 < high <= 1.0
     distribution = scipy.stats.gamma(9.0, scale=H_N / 9.0)  # no density at its infinite end
     prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": distribution})
     low, high = prior.ends[:, 0]
