@@ -7,8 +7,9 @@ import pytest
 import scipy.stats
 
 import stiction as st
-from stiction.inference.estimate import FitSetting, estimate
-from stiction.inference.marginal_fit import family_of, mean_log_likelihood
+from stiction.inference.estimate import BestFit, FitSetting, estimate, windowed
+from stiction.inference.marginal_fit import family_of, mean_log_likelihood, normal_of
+from stiction.inference.records import Record
 from stiction.inference.specimens import FactorPrior, Profiles, grid_of_profiles
 from stiction.inference.whittle import SpectrumFamily
 from stiction.inference.window import RecordWindow
@@ -229,6 +230,14 @@ def test_what_mean_and_trend_take_is_given_back():
         tuple(windows[i % 2] for i in range(16)), family_of("lognormal"), family
     )
     used = [w.without_trend(r[w.measured]) for r, w in zip(rows, setting.windows, strict=True)]
+    records = [
+        Record(np.where(w.measured, r, np.nan), (0.05 / 64 * (1 + i // 8),))
+        for i, (r, w) in enumerate(zip(rows, setting.windows, strict=True))
+    ]
+    for record, window, row, own in zip(records, *windowed(records, 3), used, strict=True):
+        assert window.spacings == record.spacings
+        np.testing.assert_array_equal(window.without_trend(record.values[window.measured]), row)
+        np.testing.assert_array_equal(own, row)
     found = estimate(used, setting)
     sizes = [row.size for row in used]
     total = np.zeros((sum(sizes),) * 2)
@@ -244,6 +253,37 @@ def test_what_mean_and_trend_take_is_given_back():
     wider = found.marginal.cv / found.of_values.cv
     assert wider == pytest.approx(share**-0.5, rel=1e-6)
     assert found.parameters["standard_deviation"] == pytest.approx(0.2e6, rel=0.12)
+
+
+@pytest.mark.parametrize("across", [(), (5e-4,)], ids=["lines", "maps"])
+def test_means_of_records_scatter_as_their_field_says(across):
+    """Of two geometries: their variances, and p-values of campaigns, which are uniform."""
+    shapes, spacings = ((64, 9), (40, 12)), ((8e-4, *across), (5e-4, *across))
+    windows = (
+        tuple(
+            RecordWindow(spacing, np.ones(shape[: len(spacing)], dtype=bool))
+            for shape, spacing in zip(shapes, spacings, strict=True)
+        )
+        * 2
+    )
+    family = SpectrumFamily(
+        "power_law", {"exponent": 2.0}, None if across else 1.0, 0.0, (1e-3, 1.0)
+    )
+    model = family.model(
+        family.vector([1.0, 3e-3, 1.4][: 2 + len(across)]), np.array([0.0, 1.0])
+    )
+    marginal = normal_of(1e6, 1e5)
+    setting = FitSetting(windows, family_of("normal"), family)
+    fit = BestFit(setting, marginal, marginal, model, 0.0, 0.0, (0.0, 0.0))
+    rng, count = np.random.default_rng(3), 50 if across else 400
+    levels = np.array([[row.mean() for row in fit.simulate(rng)] for _ in range(count)])
+    four_errors = 4.0 * np.sqrt(2.0 / count)
+    np.testing.assert_allclose(levels.var(axis=0), fit.of_means, rtol=four_errors)
+    p_values = [fit.chance_of_scatter(campaign) for campaign in levels]
+    assert scipy.stats.kstest(p_values, "uniform").pvalue > 1e-3
+    extents = sum(np.prod(np.multiply(w.spacings, w.measured.shape)) for w in windows)
+    lengths = 3e-3 * (1.4 * 3e-3 if across else 1.0)
+    assert fit.lengths_held == pytest.approx(extents / lengths, rel=1e-9)
 
 
 def test_a_spectrum_without_truncation_is_one_and_the_same_in_simulations_and_fits():
