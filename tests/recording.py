@@ -1,7 +1,8 @@
 """Outputs of public calls, compared with recorded values.
 
 Records are files of JSON with one line for each output. Texts are never recorded: a refusal is
-recorded by the arguments that it names, and a warning by its class.
+recorded by the arguments that it names, and a warning by its class; both by the numbers, the names
+and the units in them.
 `pytest -n 0 FILE --record` writes them anew and prints what changed.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 import tempfile
 import warnings
 from collections import Counter
@@ -19,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from refusals import says
 
 FLOOR = 1e-9
@@ -27,6 +30,10 @@ WHOLE = 8
 """Most numbers of an output that are recorded singly. Of more, five sums are recorded."""
 MAX_WORDS_OF_A_NAME = 3
 """Texts of more words are prose, which is not recorded."""
+NUMBER = r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
+NAME = r"'[^' ]*'|(?!scipy)\b[A-Za-z]\w*(?:[._]\w+)+|\b[GMk\u00b5mu]?(?:Pa|N|m)\b"
+OF_OTHERS = r"\S+ GiB|numba cannot compile it: .*"
+"""Parts of messages that belong to the machine or to another package."""
 
 
 def digest(values: Any) -> list[float]:
@@ -95,30 +102,38 @@ def write(path: Path, records: Mapping[str, Mapping[str, Any]]) -> None:
     path.write_text("{\n" + ",\n".join(blocks) + "\n}\n")
 
 
-def refusal(call: Callable[[], Any]) -> Any:
-    """The result of a call, or the class of its error with the arguments that the error names."""
-    try:
-        return call()
-    except (ValueError, RuntimeError) as error:
-        named = [text.partition(": ")[0] for text in getattr(error, "problems", ())]
-        arguments = [name for name in named if len(name.split()) <= MAX_WORDS_OF_A_NAME]
-        return f"{type(error).__name__} {','.join(dict.fromkeys(arguments))}".strip()
-
-
-def said(call: Callable[[], Any]) -> str:
-    """How a call is refused, or the number of its warnings by class."""
+def said(call: Callable[[], Any]) -> tuple[str, str, Any]:
+    """The arguments that a refusal names, or the number of warnings by class; texts and result."""
+    result = None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        result = refusal(call)
-    if isinstance(result, str):
-        return result
+        try:
+            result = call()
+        except (ValueError, RuntimeError) as error:
+            named = [text.partition(": ")[0] for text in getattr(error, "problems", ())]
+            arguments = [name for name in named if len(name.split()) <= MAX_WORDS_OF_A_NAME]
+            names = ",".join(dict.fromkeys(arguments))
+            return f"{type(error).__name__} {names}".strip(), str(error), None
     texts = {
         (warning.category.__name__, str(warning.message))
         for warning in caught
         if warning.category is UserWarning or warning.category.__module__.startswith("stiction")
     }
     counts = sorted(Counter(name for name, _ in texts).items())
-    return " ".join(f"{name}:{count}" for name, count in counts) or "taken"
+    answer = " ".join(f"{name}:{count}" for name, count in counts) or "taken"
+    return answer, "\n".join(sorted(text for _, text in texts)), result
+
+
+def figures(text: str, result: Any) -> dict[str, Any]:
+    """The numbers and names in messages, in their order, and the numbers that a call returns."""
+    text = re.sub(OF_OTHERS, "", text)
+    numbers = [float(part.replace(",", "")) for part in re.findall(NUMBER, text)]
+    known, returned = " ".join(re.findall(NAME, text)), []
+    if isinstance(result, xr.DataArray):
+        known += repr(result.attrs)
+    with contextlib.suppress(TypeError, ValueError):
+        returned = digest(result) if result is not None else []
+    return {"numbers": numbers, "names": known, "returned": returned}
 
 
 def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
@@ -130,8 +145,12 @@ def mistakes(file: str, scope: dict[str, Any]) -> Callable[..., None]:
 
     @pytest.mark.parametrize("name", read(path))
     def test(name: str, request: pytest.FixtureRequest) -> None:
-        outputs = {text: said(partial(eval, text, scope)) for text in read(path)[name]}
-        compare(path, name, outputs, request.config.getoption("--record"), 0.0)
+        record, second = request.config.getoption("--record"), f"figures_in_{path.name}"
+        told = {text: said(partial(eval, text, scope)) for text in read(path)[name]}
+        compare(path, name, {text: answer for text, (answer, *_) in told.items()}, record, 0.0)
+        texts = {f"{text}, {part}": values for text, (_, *more) in told.items()
+                 for part, values in figures(*more).items() if values}  # fmt: skip
+        compare(path.with_name(second), name, texts, record, 0.011)
 
     return test
 

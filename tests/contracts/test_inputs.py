@@ -48,6 +48,7 @@ PROFILES = {  # of a line, and what comes of it: values at the nodes, or words o
     "table with an index": (pd.DataFrame({"x": X, "strength": STRENGTH}).set_index("x"), PLACED),
     "table of text": (pd.DataFrame({"x": X, "strength": [f"a{v}" for v in X]}), "numbers"),
     "DataArray": (xr.DataArray(KPA, {"x": X}, ("x",), attrs={"units": "kPa"}), PLACED),
+    "DataArray of pint": (xr.DataArray(KPA * Q.kPa, {"x": X}, "x", attrs={"unit": "kPa"}), PLACED),
     "pint": (KPA * Q.kPa, IN_ORDER),
     "astropy": (KPA * u.kPa, IN_ORDER),
     "list of pint": ([v * Q.kPa for v in KPA], IN_ORDER),

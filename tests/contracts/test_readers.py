@@ -51,7 +51,7 @@ OPTIONS: dict[str, dict[str, Any]] = {  # reader: option: a table in which it co
         "quantity": ([row[::2] for row in PROFILE], "initial_stress"),
         "strength": (HEIGHTS, lambda h: 1e6 + 1e11 * h), "missing": (PROFILE, 1.0625),
         "decimal": (of_three_digits(PROFILE), ","), "skip": (ABOVE + PROFILE, 2), 
-        "sheet": (PROFILE, 1),
+        "sheet": (PROFILE, "More"),
         "interface": (TURNED, st.Interface(4e-3, 8)),
     },
     "read_curve": {
@@ -67,7 +67,7 @@ OPTIONS: dict[str, dict[str, Any]] = {  # reader: option: a table in which it co
         "value": (PEAKS, "other (kN)"),
         "unit": (headed(PEAKS, "", "peak", "other", ""), "N"), "normal": (PEAKS, "normal (kN)"),
         "surfaces": (PEAKS, 2), "missing": (PEAKS, 12.5), "decimal": (of_three_digits(PEAKS), ","),
-        "skip": (ABOVE + PEAKS, 2), "sheet": (PEAKS, 1),
+        "skip": (ABOVE + PEAKS, 2), "sheet": (PEAKS, "More"),
     },
 }  # fmt: skip
 BASE = {("read_peaks", "surfaces"): {"normal": "normal (kN)"}}
@@ -83,7 +83,7 @@ def as_text(table: Any, folder: Path) -> Path:
 def as_workbook(table: Any, folder: Path) -> Path:
     """With a second sheet, whose numbers are twice as large."""
     book, path = openpyxl.Workbook(), folder / "table.xlsx"
-    for sheet, factor in ((book.active, 1), (book.create_sheet("more"), 2)):
+    for sheet, factor in ((book.active, 1), (book.create_sheet("More"), 2)):
         for row in table:
             numbers = [c if isinstance(c, str) else factor * c for c in row]
             sheet.append([None if c == "" else c for c in numbers])

@@ -51,8 +51,9 @@ def test_kernels_follow_the_law(law):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_integral_and_inverse_of_a_law_follow_from_f(law):
     """A law that states neither has those of its f: pieces are cubic, so a kink costs 1e-7."""
-    u = np.array([0.0, 0.1, 0.37, 0.95, 1.0, 3.0, np.inf])
-    np.testing.assert_allclose(FrictionLaw.area(law, u), law.area(u), rtol=1e-6, atol=1e-9)
+    u, close = np.array([0.0, 0.1, 0.37, 0.95, 1.0, 3.0, np.inf]), 1e-6
+    close = 1e-10 if law.type == "exponential" else close
+    np.testing.assert_allclose(FrictionLaw.area(law, u), law.area(u), close, 1e-3 * close)
     for fraction in (0.95, 0.37, 0.01):
         assert FrictionLaw.slip_at(law, fraction) == pytest.approx(
             law.slip_at(fraction), rel=1e-12

@@ -98,6 +98,13 @@ def test_an_interruption_at_the_end_leaves_no_meter_behind(hasty, monkeypatch):
     assert progress._running == []
 
 
+@pytest.mark.parametrize("show", [True, False, lambda done, total: None])
+def test_an_interrupted_run_ends_with_its_next_sample(show, monkeypatch):
+    monkeypatch.setattr(progress.interrupted, "is_set", lambda: True)
+    with pytest.raises(KeyboardInterrupt):
+        Meter("", 2, show).advance()
+
+
 def test_a_terminal_gets_a_bar_that_goes_away_with_warnings_above_it(hasty, monkeypatch):
     terminal = io.StringIO()
     terminal.isatty = lambda: True
