@@ -7,7 +7,8 @@ import stat
 import warnings
 import zipfile
 import zlib
-from functools import cache
+from contextlib import suppress
+from functools import cache, partial
 from pathlib import Path
 
 import h5py
@@ -322,17 +323,23 @@ def test_a_workbook_is_looked_at_before_its_cells_are_kept(tmp_path):
 
 
 def test_a_file_that_is_written_again_keeps_its_permissions(tmp_path):
+    """And its content, with nothing beside it, if writing fails."""
     path = tmp_path / "result.csv"
     path.write_text("")
 
-    def write(aside):
+    def write(failure, aside):
         assert stat.S_IMODE(aside.stat().st_mode) == mode
-        aside.write_text("new")
+        aside.write_text("half" if failure else "new")
+        if failure:
+            raise failure
 
-    for mode in (0o600, 0o644):
+    for failure in (None, OSError, RuntimeError, KeyboardInterrupt):
+        mode = 0o640 if failure is RuntimeError else 0o604
         path.chmod(mode)
-        files.write_whole(path, write)
+        with suppress(st.RunError, KeyboardInterrupt):
+            files.write_whole(path, partial(write, failure))
         assert stat.S_IMODE(path.stat().st_mode) == mode
+        assert [path.read_text(), *tmp_path.iterdir()] == ["new", path]
 
 
 def test_check_lists_files_outside(tmp_path, command):
