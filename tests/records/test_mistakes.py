@@ -17,7 +17,7 @@ import setups
 import xarray as xr
 from crooked import LINE as CROOKED
 from crooked import LINE_STRENGTH
-from recording import mistakes, refusals
+from recording import inside, mistakes, refusals
 from ruptures import BREAKING_PLANE
 from scipy import stats
 from setups import EXACT, LENGTH, LOCAL, RATE, beta_strength, ensemble, make_problem
@@ -106,6 +106,13 @@ def scanned(values, places=(0.01, 0.02), units="Pa", x_units="m"):
 def study(**options):
     given = {"method": LOCAL, "samples": 2} | options
     return st.Study(problem=PROBLEM, random=FIELD, **given)
+
+
+def exported(name, part=None, method=LOCAL, **options):
+    """A run on disk, or a part of it, as a file of its own."""
+    with inside():
+        study(samples=24, method=method).run(out="run", part=part, pilot=False, progress=False)
+        st.open_run("run").export(name, **options)
 
 
 def gathered(share):
