@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import scipy.stats
 
-from stiction.base.errors import InputError, prefixed
-from stiction.base.model import describe, is_finite
+from stiction.base.errors import InputError
+from stiction.base.model import check, describe, is_finite
 from stiction.base.variables import PROFILES
-from stiction.random.marginals import Marginal, ScipyMarginal, marginal_of
+from stiction.random.marginals import Marginal, MarginalObject, ScipyMarginal
 
 INTERFACE_KEYS = (*PROFILES, "correlation", "between")
 FIELD_KEYS = ("marginal", "spectrum", "anisotropy", "conditions")
@@ -118,8 +118,7 @@ def distribution_of(key: str, value: Any) -> Any:
     A marginal of a field, or its table, is also accepted.
     """
     if isinstance(value, Marginal) or (isinstance(value, Mapping) and "type" in value):
-        with prefixed(key):
-            return marginal_of(value).distribution
+        return check(key, value, MarginalObject).distribution
     if isinstance(getattr(value, "dist", None), scipy.stats.rv_continuous):
         return value
     if isinstance(value, list | tuple) and len(value) == 2:
