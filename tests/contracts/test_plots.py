@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import itertools
 import re
 from functools import cache
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pint
 import pytest
 import xarray as xr
 from contracts.bodies import COEFFICIENTS, World, world
 from contracts.test_results import CALLS, LOCAL, QUIET, SHAKEN, design, table
-from matplotlib.patches import Rectangle
 
 import stiction as st
 
@@ -24,7 +21,6 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 PEAKS = np.array([5.9e5, 6.2e5, 6.6e5])
 LENGTH = "random.strength.spectrum.correlation_length"
 COEFFICIENT = "friction_coefficient"
-Q = pint.UnitRegistry()
 
 
 RESULTS: dict[tuple[str, World], Any] = {}
@@ -99,7 +95,7 @@ DRAWN: dict[str, Any] = {  # the first word is the function: the world, its body
         two_paths(w), measured=pushed(w), **options)),
 }  # fmt: skip
 ELSEWHERE = {"film", "fit"}
-"""A film is a file, see test_files, and a fit has no units of a world, see tests/user."""
+"""A film is a file, see test_files, and a fit has no units of a world, see tests/records."""
 TAKE_A_PROBLEM = {
     name for name in st.plot.__all__
     if "problem" in [*inspect.signature(getattr(st.plot, name)).parameters][1:]
@@ -117,16 +113,21 @@ def drawn(panels: Any) -> list[Any]:
     figure.canvas.draw()
     parts: list[Any] = []
     for axes in figure.axes:
-        labels = axes.get_xlabel() or np.ravel(panels)[-1].get_xlabel(), axes.get_ylabel()
+        bar, last = axes.get_label() == "<colorbar>", np.ravel(panels)[-1]
+        labels = axes.get_xlabel() or last.get_xlabel() * (not bar), axes.get_ylabel()
         across = axes.get_xaxis_transform(), axes.get_yaxis_transform()
         shapes = [(line.get_xydata(), line.get_transform()) for line in axes.lines]
-        shapes += [(path.vertices, axes.transData) for lines in axes.collections
-                   for path in lines.get_paths() if lines.get_array() is None]  # fmt: skip
+        for lines in axes.collections:
+            outlines = [path.vertices for path in lines.get_paths()]
+            outlines = outlines if lines.get_array() is None else [np.concatenate(outlines)]
+            shapes += [(outline, axes.transData) for outline in outlines]
         shapes += [
-            (bar.get_bbox().corners(), axes.transData)
-            for bar in itertools.chain(*axes.containers)
-            if isinstance(bar, Rectangle)
+            (patch.get_patch_transform().transform(patch.get_path().vertices), own)
+            for patch in axes.patches
+            if (own := patch.get_data_transform()) != axes.transAxes
         ]
+        shapes *= not bar
+        shapes.append((np.transpose([axes.get_xlim(), axes.get_ylim()]), axes.transData))
         for points, transform in shapes:
             for column, label in enumerate(labels):
                 if transform != across[1 - column]:  # else a share of the height or width
@@ -194,7 +195,7 @@ def test_a_figure_draws_the_numbers_of_its_result_in_their_units(name):
         if unit in sizes:
             largest = np.abs(values[np.isfinite(values)]).max(initial=0.0)
             ratios = largest / (np.array(sizes[unit]) + 1e-300)
-            assert largest == 0.0 or np.any((ratios > 0.05) & (ratios < 20.0)), (unit, largest)
+            assert largest == 0.0 or np.any((ratios > 0.03) & (ratios < 30.0)), (unit, largest)
     other = make(body).in_units(Pa=0.25, m=2.0, s=8.0)
     assert_drawn_alike(drawn(draw(other)), shown, 1e-3, other.factor)
 
@@ -212,91 +213,6 @@ def pushed(w: World) -> Any:
     force = force + 0.1 * np.random.default_rng(0).normal(size=force.size)
     travel = np.linspace(0.0, 3e-4, force.size) * w.units["m"]
     return st.read_curve((travel, force * w.factor("N")), unit="N", travel_unit="m")
-
-
-def points_of(name: str, w: World) -> Any:
-    """Points in SI that a figure has to show, each group as vertices of a single shape."""
-    result = RESULTS.get((CALL_OF.get(name, name), w))
-    if name == "onset":
-        yield w.interface.x, w.strength[0]
-        averaged = st.theory.nucleation_stress(w.problem, w.strength[0])
-        inside = np.isfinite(averaged)  # elsewhere no window fits
-        yield w.interface.x[inside], averaged[inside]
-        yield result.critical_position[:1], result.critical_load[:1]
-    elif name == "onset of a plane":
-        yield result.critical_position[0, :1], result.critical_position[0, 1:]
-    elif name == "specimen":
-        yield w.interface.x, w.strength[0] / w.strength[0].mean()
-    elif name == "field":
-        yield w.interface.x, w.strength[0]
-    elif name == "monte_carlo":
-        yield result.critical_force, 0.0 * result.critical_force
-    elif name == "quantiles":
-        for rank in (0.25, 0.5, 0.75):
-            values = np.quantile(result.critical_force, rank, axis=1, method="median_unbiased")
-            yield result.correlation_length, values
-    elif name == "failure_curve":
-        for which in ("probability", "probability_low", "probability_high"):
-            yield result.stress, result[which]
-    elif name == "sensitivities":
-        table, place = result.sensitivities, np.arange(3.0)[::-1]
-        yield table.force_at_high, place
-        for bar, *ends in zip(place, table.force_at_low, table.force_at_high, strict=True):
-            yield ends, [bar - 0.25]
-    elif name == "agreement":
-        yield PEAKS * w.Pa, np.array([1.0, 2.0, 3.0]) / 3.0
-    elif name == "rupture":
-        yield [result.critical_position], [0.0]
-    elif name == "precursors of two":
-        (test,), lines = pushed(w), []
-        yield test.travel, test.force
-        yield test.drops.travel, test.drops.force
-        yield test.drops.travel, np.full(1, w.interface.length)
-        for path in two_paths(w):
-            (travel, _), (force, _), *_ = drawn(st.plot.precursors(path))
-            lines.append((travel, force))
-            yield path.event_travel[-1:], path.event_start[-1:]
-        last = np.mean([travel[np.isfinite(travel)].max() for travel, _ in lines])
-        grid = np.linspace(0.0, last, 400)[:-1:19]
-        rows = [np.interp(grid, travel, force) for travel, force in lines]
-        for rank in (0.05, 0.5, 0.95):
-            yield grid, np.quantile(rows, rank, axis=0)
-    elif name == "precursors":
-        yield result.travel[:3], result.force[:3]
-        yield result.event_travel, result.event_force
-        for start, length, at in zip(
-            result.event_start, result.event_length, result.event_travel, strict=True
-        ):
-            yield [at], [start]
-            yield [at], [start + length]
-
-
-CALL_OF = {"onset of a plane": "onset", "specimen": "onset", "quantiles": "sweep"}
-CALL_OF |= {"sensitivities": "sensitive", "rupture": "simulate_rupture"}
-CALL_OF |= {"precursors": "equilibrium_path"}
-
-
-@pytest.mark.parametrize("name", sorted({*DRAWN} - {"specimen on a base"}))
-def test_a_figure_has_the_points_that_its_description_names(name):
-    make, body, draw = DRAWN[name]
-    w = make(body)
-    parts = drawn(draw(w))
-    shapes = [
-        np.stack([x, y]) for (x, _), (y, _) in itertools.pairwise(parts)
-        if x.shape == y.shape and x.ndim == 1
-    ]  # fmt: skip
-    for group in points_of(name, w):
-        points = np.broadcast_arrays(*(np.asarray(part, dtype=float) for part in group))
-        size = np.abs(points).max(axis=1)[:, None, None]
-        off = [
-            np.abs(np.stack(points)[:, :, None] - shape[:, None]) / (size + 1e-300)
-            for shape in shapes
-        ]
-        furthest = min(
-            np.nan_to_num(apart.max(axis=0), nan=9.0).min(axis=1, initial=9.0).max()
-            for apart in off
-        )
-        assert furthest < 1e-6, points
 
 
 @pytest.mark.parametrize("name", SAMPLES)
@@ -368,37 +284,6 @@ def test_the_band_of_a_field_holds_the_fraction_that_its_label_names():
         assert inside.mean() == pytest.approx(0.9, abs=4.0 * (0.9 * 0.1 / 400) ** 0.5)
 
 
-@pytest.mark.parametrize("name", ["onset", "field", "failure_curve", "without an area"])
-def test_a_second_scale_is_a_force_of_the_area_or_a_coefficient(name):
-    make, body, draw = DRAWN.get(name, DRAWN["failure_curve"])
-    w = make(body)
-    axes = draw(w)
-    if name == "without an area":
-        axes = st.plot.failure_curve(of("failure_curve", w).drop_vars("force"))
-    axes.figure.canvas.draw()
-    (scale,), along = axes.child_axes, "y" if name in ("onset", "field") else "x"
-    (stress, _), (other, unit) = (
-        in_si(np.array(getattr(a, f"get_{along}lim")()), getattr(a, f"get_{along}label")())
-        for a in (axes, scale)
-    )
-    area, pressure = w.interface.width * w.interface.length, w.problem.load.normal_pressure
-    assert unit == ("N" if name == "failure_curve" else "1")
-    np.testing.assert_allclose(other, stress * (area if unit == "N" else 1.0 / pressure))
-
-
-@pytest.mark.parametrize("name", ["onset", "onset of a plane"])
-def test_the_legend_of_an_onset_states_its_numbers(name):
-    make, body, draw = DRAWN[name]
-    texts = draw(make(body), sample=1).figure.findobj(plt.Text)
-    (text,) = [text.get_text() for text in texts if "coefficient" in text.get_text()]
-    load, coefficient, *place = map(float, re.findall(r"\d+\.\d+", text))
-    result = of("onset", make(body)).isel(sample=1)
-    assert " MPa (" in text
-    assert load == pytest.approx(1e-6 * result.critical_load.item(), abs=5.1e-5)
-    assert coefficient == pytest.approx(result.friction_coefficient.item(), abs=5.1e-5)
-    assert place == pytest.approx(1e3 * np.ravel(result.critical_position), abs=5.1e-3)
-
-
 def test_curves_and_ticks_have_the_names_of_their_numbers():
     """Of few samples, each is marked."""
     swept = of("sweep", LOCAL("line")).isel(sample=slice(5))
@@ -417,45 +302,3 @@ def test_curves_and_ticks_have_the_names_of_their_numbers():
     for place, source in zip(axes.lines[-1].get_ydata(), table.source.values, strict=True):
         low, high = table.sel(source=source).low.item(), table.sel(source=source).high.item()
         assert named[place].get_text() == f"{source.removeprefix('problem.')}: {low} to {high}"
-
-
-def panels_in_si(result: Any) -> Any:
-    """The curves, bands and bars in each panel of a fit, with their units by pint."""
-    for axes in st.plot.fit(result):
-        labels = axes.get_xlabel(), axes.get_ylabel()
-        assert all(in_si(0.0, label) for label in labels)  # their nouns suit their units
-        units = [(re.findall(r"\(([^()]*)\)$", label) or ["1"])[0] for label in labels]
-        shapes = [line.get_xydata() for line in axes.lines]
-        shapes += [path.vertices for band in axes.collections for path in band.get_paths()]
-        shapes += [bar.get_bbox().get_points() for bar in axes.patches]
-        yield [shape * [Q(unit).to_base_units().m for unit in units] for shape in shapes]
-
-
-def test_a_fit_is_drawn_in_the_units_of_its_quantity():
-    """Strengths are as coefficients times a pressure, to its powers in each panel."""
-    pressure, pure = 2.0**21, fit(LOCAL("line"))
-    panels = [*panels_in_si(pure)]
-    strengths = panels_in_si(fit(LOCAL("line"), pressure, "strength"))
-    powers = (1, -1), (1, 1), (0, 0), (0, 2)
-    for power, shapes, others in zip(powers, panels, strengths, strict=True):
-        for shape, other in zip(shapes, others, strict=True):
-            size = np.abs(shape).max(axis=0) + 1e-300
-            alike = other / pressure ** np.array(power) / size
-            np.testing.assert_allclose(alike, shape / size, atol=1e-5)  # of two fits
-    values, marginal = np.ravel(pure._rows), pure.field.marginal.distribution
-    np.testing.assert_allclose(panels[0][0][:, 1], marginal.pdf(panels[0][0][:, 0]))
-    heights, _ = np.histogram(values, 40, density=True)
-    np.testing.assert_allclose([bar[1, 1] for bar in panels[0][-40:]], heights)
-    share = (np.arange(200) + 0.5) / 200
-    expected, measured = marginal.ppf(share), np.quantile(values, share)
-    np.testing.assert_allclose(panels[1][0], np.transpose([expected, expected]))
-    np.testing.assert_allclose(panels[1][1], np.transpose([expected, measured]))
-
-
-def test_the_unit_of_an_axis_suits_all_that_it_shows():
-    """Of two results, ten thousand times apart, in either order."""
-    strong = of("monte_carlo", LOCAL("line"))[["critical_stress"]]
-    weak = strong.assign(critical_stress=1e-4 * strong.critical_stress)
-    for results in ({"a": weak, "b": strong}, {"a": strong, "b": weak}):
-        axes = st.plot.monte_carlo(results, quantity="critical_stress")
-        assert axes.get_xlabel().endswith("(MPa)")

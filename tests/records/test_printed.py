@@ -6,28 +6,38 @@ Words may change: a text is recorded as its numbers, and as the units and quanti
 from __future__ import annotations
 
 import html
+import itertools
 import re
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import joint  # noqa: F401  # figures.json calls it, and the next two
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import sliders  # noqa: F401
+import specimens  # noqa: F401
 import tomli_w
+import xarray as xr
+from contracts import bodies, test_plots
 from contracts.bodies import COEFFICIENTS, WITH_ENDS, World, world
-from contracts.test_plots import DRAWN
+from contracts.test_plots import DRAWN, drawn
 from contracts.test_results import CALLS, LOCAL, QUIET
 from contracts.test_sources import FACTORED, FIELD, OTHER, PROBLEM, source_of
-from recording import compare, digest
+from matplotlib.colors import to_rgba_array
+from matplotlib.legend import Legend
+from recording import WHOLE, compare, digest, read
 from setups import make_problem
 from user.test_notebook import objects
 
 import stiction as st
+from stiction.base.variables import unit_of_key
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 RECORDS = Path(__file__).with_name("printed.json")
+FIGURES = Path(__file__).with_name("figures.json")
 NUMBER = r"(?<![\w.])[-\u2212]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
 UNIT = r"(?<![\w.])[GMk\u00b5mun]?(?:Pa|N|m|s|J|Hz)(?:[ /][msk]-?\d?)?(?![\w-])"
 QUANTITY = (
@@ -117,17 +127,49 @@ def test_prints(as_recorded):
     as_recorded("prints", texts)
 
 
-def test_figures(as_recorded):
-    texts = {}
-    drawings = {name: partial(draw, make(body)) for name, (make, body, draw) in DRAWN.items()}
-    drawings |= {
-        name: partial(st.plot.fit, printed()[name]) for name in printed() if "fit" in name
-    }
-    for name, draw in drawings.items():
-        artists = np.ravel(draw())[0].figure.findobj(plt.Text)
-        texts[name] = "\n".join(sorted(artist.get_text() for artist in artists))
-        plt.close("all")
-    as_recorded("figures", texts)
+def numbers(values: Any, unit: str = "Pa", name: str = "critical_stress", **axes: Any) -> Any:
+    """A result of a few numbers, along the axes of a sweep."""
+    coords = {key: (key, at, {"units": unit_of_key(key, unit)}) for key, at in axes.items()}
+    return xr.Dataset({name: ((*axes, "sample"), values, {"units": unit})}, coords)
+
+
+def part(name: str) -> Any:
+    """A figure of test_plots."""
+    make, body, draw = DRAWN[name]
+    return draw(make(body))
+
+
+def filmed(run: xr.Dataset, frame: int) -> Any:
+    """The panels of a film at one of its frames."""
+    ruptures = st.plot.ruptures
+    figure, moving = (ruptures._plane_film if "y" in run.dims else ruptures._line_film)(run)
+    for artist, name, values in moving:
+        artist.set(**{name: values[frame]})
+    return figure.axes
+
+
+WAVE = np.sin(np.arange(60.0)) + 0.3
+SCOPE = globals() | vars(test_plots) | vars(bodies)
+
+
+@pytest.mark.parametrize("call", read(FIGURES))
+def test_each_figure_is_as_recorded(call, request):
+    """Its numbers in SI, the words beside them, what looks alike, and the entries of legends."""
+    panels = eval(call, SCOPE)
+    figure, looks, colours = np.ravel(panels)[0].figure, [], {}
+    texts = "\n".join(sorted(text.get_text() for text in figure.findobj(plt.Text)))
+    for axes in figure.axes:
+        looks += [axes.get_xscale(), axes.get_yscale(), *(one.origin for one in axes.images)]
+        for artist in [*axes.lines, *axes.collections, *axes.patches]:
+            paint = getattr(artist, "get_color", getattr(artist, "get_facecolor", None))()
+            number = colours.setdefault(str(to_rgba_array(paint)[:1, :3]), len(colours))
+            looks.append(f"{number}{getattr(artist, 'get_marker', str)()}")
+    outputs = tokens(texts) | {"looks": " ".join(key for key, _ in itertools.groupby(looks))}
+    outputs["inches"] = digest(figure.get_size_inches())
+    outputs["legends"] = [len(legend.get_texts()) for legend in figure.findobj(Legend)]
+    for n, (values, unit) in enumerate(drawn(panels)):
+        outputs[f"{n} {unit}"] = digest(values)[2 * (values.size > WHOLE) :]  # without sizes
+    compare(FIGURES, call, outputs, request.config.getoption("--record"), CLOSE)
 
 
 def swept(w: World, **tables: Any) -> dict[str, Any]:

@@ -93,29 +93,6 @@ def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():
     assert np.abs(deviations / fit.field.standard_deviation - 1.0).max() < 0.5
 
 
-def test_a_picture_of_a_fit_is_of_all_records():
-    """Records with different gaps: the correlation is the mean over them, in any order."""
-    rows = FIELD.sample(st.Interface(COUNT * SPACING, COUNT), samples=3, seed=2)
-    for number, row in enumerate(rows):
-        row[40 * number : 40 * number + 9] = np.nan
-    records = [labelled(row) for row in rows]
-    fit = fitted(records)
-    for panel in st.plot.fit(fit):  # every band has a width
-        vertices = panel.collections[0].get_paths()[0].vertices
-        rows = [np.ptp(vertices[vertices[:, 0] == at, 1]) for at in np.unique(vertices[:, 0])]
-        assert np.median(rows) > 0.0
-    panels, reversed_panels = (st.plot.fit(each)[2:] for each in (fit, fitted(records[::-1])))
-    for panel, other in zip(panels, reversed_panels, strict=True):
-        points, swapped = (axes.lines[1].get_xydata() for axes in (panel, other))
-        np.testing.assert_allclose(points, swapped, rtol=1e-9)  # sums in another order
-    windows = fit._estimate.setting.windows
-    pairs = zip(windows, fit._rows, strict=True)
-    covariances = [np.fft.irfft(window.periodogram(row), COUNT) for window, row in pairs]
-    mean = np.mean(covariances, axis=0)  # as many values in each
-    measured = panels[0].lines[1].get_ydata()
-    np.testing.assert_allclose(measured, (mean / mean[0])[: measured.size], rtol=1e-9)
-
-
 def test_positions_of_few_digits_and_dropouts():
     """x with an error of 0.3 % of the spacing at 8,064 points; a smooth record with a dropout."""
     rng = np.random.default_rng(0)
