@@ -14,7 +14,8 @@ import stiction as st
 from stiction import extensions
 from stiction.problem.friction.laws import LAWS
 from stiction.random.dotted_keys import with_values
-from stiction.random.marginals import MARGINALS
+from stiction.random.mapping import correlation_of_mapped, hermite_coefficients
+from stiction.random.marginals import MARGINALS, affine_parameters
 from stiction.random.spectra import SPECTRA
 from stiction.statistics import density
 
@@ -35,6 +36,7 @@ STRENGTHS = {
     "weibull": st.Weibull(**OF_MOMENTS, low=3e5),
     "gamma": st.Gamma(**OF_MOMENTS, low=1e5),
     "truncated_normal": st.TruncatedNormal(**OF_MOMENTS, low=7e5, high=1.9e6),
+    "lognormal from zero": st.Lognormal(**OF_MOMENTS),
     "normal up to a bound": st.TruncatedNormal(**OF_MOMENTS, high=1.4e6),
     "normal from a bound": st.TruncatedNormal(**OF_MOMENTS, low=6e5),
 }
@@ -161,11 +163,20 @@ def test_a_marginal_agrees_with_itself(name):
                        "cv": distribution.std() / distribution.mean()}.items():  # fmt: skip
         if hasattr(marginal, key):
             assert value == pytest.approx(getattr(marginal, key), rel=1e-6), key
+    names, shift, scale = affine_parameters(marginal)
+    for key in names:  # which change nothing else
+        other = dataclasses.replace(marginal, **{key: 1.05 * getattr(marginal, key)})
+        _, a, b = affine_parameters(other)
+        alike = (other.distribution.ppf(q) - a) / b
+        np.testing.assert_allclose(alike, (x - shift) / scale, rtol=1e-6, atol=1e-9)
     field = st.RandomField(marginal, DENSITIES["power_law"])
     mean, square = (quad(lambda p, n=n: distribution.ppf(p) ** n, 0.0, 1.0, limit=400)[0]
                     for n in (1, 2))  # fmt: skip
     assert field.mean == pytest.approx(mean, rel=1e-4)
     assert field.standard_deviation == pytest.approx(np.sqrt(square - mean**2), rel=2e-3)
+    rho = field.spectrum.correlation(np.array(field.efolding_length()))
+    found = correlation_of_mapped(rho, hermite_coefficients(marginal))
+    assert found == pytest.approx(np.exp(-1.0), rel=1e-9)
     low, high = getattr(marginal, "low", 0.0) or 0.0, getattr(marginal, "high", None) or np.inf
     # scipy keeps bounds in units of the scale, here about 1e6: 1e-9 is its round-off.
     assert distribution.support() == pytest.approx((low, high), rel=1e-12, abs=1e-9)

@@ -32,6 +32,15 @@ def test_every_way_to_name_a_parameter_is_printed_as_one_key(key):
         assert full_key(name) == full_key(key)
 
 
+@pytest.mark.parametrize(
+    ("owner", "kind"), [("random", st.RandomInterface), ("random.strength", st.RandomField)]
+)
+def test_a_printed_key_leads_back_to_its_parameter(owner, kind):
+    for field in dataclasses.fields(kind):
+        key = f"{owner}.{field.name}.part"
+        assert full_key(short_key(key)) == key
+
+
 LOGNORMAL = st.Lognormal(mean=4e-3, cv=0.3)
 WAYS = {  # to state the same prior
     "range": [(2e-3, 6e-3), [2e-3, 6e-3], {"low": 2e-3, "high": 6e-3}, uniform(2e-3, 4e-3)],

@@ -16,6 +16,8 @@ from contracts.bodies import SOLID, attempt
 import stiction as st
 from stiction.problem.sample import REPLACED
 from stiction.random.dotted_keys import with_values
+from stiction.random.equally_likely import EquallyLikely
+from stiction.random.stresses import mean_in_stress, profiles_in_stress, support_in_stress
 from stiction.random.synthesis import FACTORS
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -220,6 +222,71 @@ def test_what_a_result_holds_gives_its_numbers_again():
     onsets = drawn.critical_stress
     labelled, plain = (inferred(FIELD, peaks).mean["mean"] for peaks in (onsets, onsets.values))
     assert labelled == plain
+
+
+SHAPED = {  # by the number of the group of strengths that are proportional
+    "plain": (0, FACTORED),
+    "another mean": (0, st.RandomInterface(
+        strength=dataclasses.replace(FIELD, marginal=st.Gamma(mean=7e5, cv=0.2)),
+        between={"pressing_force": st.Weibull(mean=1.0, cv=0.3)})),
+    "no mean mode, another factor": (1, st.RandomInterface(
+        strength=dataclasses.replace(FIELD, mean_mode=False),
+        between={"critical_slip": FACTORED.between["strength"]})),
+    "more modes": (2, dataclasses.replace(
+        FACTORED, strength=dataclasses.replace(FIELD, spectrum=st.ExponentialSpectrum(6e-3)))),
+    "shifted": (3, dataclasses.replace(FACTORED, strength=dataclasses.replace(
+        FIELD, marginal=st.Gamma(mean=1.4e6, cv=1.0 / 7.0, low=4e5)))),
+    "measured": (4, st.RandomInterface(strength=FIELD.given(
+        xr.DataArray([0.9e6, 1.1e6], {"x": [0.01, 0.03]}, "x"), noise=1e4))),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [(), (3, 0, 5, 1, 4, 2)])
+def test_a_sample_of_a_list_is_that_of_its_member_alone(order):
+    """With the same draws for the same modes and factors, across two blocks of samples."""
+    groups, members = zip(*SHAPED.values(), strict=True)
+    mixture, count = EquallyLikely(members, order), 40
+    assert mixture.groups.tolist() == [*groups]
+    draws = mixture.draws(INTERFACE, count, SEED, 230)
+    for chosen in (mixture.member(draws), np.arange(count) % 6):
+        mixture.select(draws, np.arange(count), chosen)
+        np.testing.assert_array_equal(mixture.member(draws), chosen)
+        profiles = mixture.from_draws(INTERFACE, draws)
+        for number, member in enumerate(members):
+            rows = np.flatnonzero(chosen == number)
+            alone = member.profiles(INTERFACE, samples=count, seed=SEED, first=230)
+            assert rows.size
+            assert {*alone} <= {*profiles}
+            assert len(profiles) == 3  # the strength, and factors of slip and of pressure
+            for name, values in profiles.items():
+                expected = alone.get(name, np.ones_like(values))
+                np.testing.assert_array_equal(values[rows], expected[rows])
+
+
+NARROW = st.Beta(alpha=2.0, beta=3.0, low=0.6, high=0.6001)
+
+
+@pytest.mark.parametrize("pressing", ["frictionless", "glued"])
+@pytest.mark.parametrize("given", ["problem", "factor", "random"])
+def test_means_and_bounds_of_a_property_are_those_of_its_stress(pressing, given):
+    """Of friction coefficients that hardly vary, under a pressure that differs along x."""
+    interface, load = st.Interface(0.05, 64), st.Load()
+    if given != "random":
+        pressure = 2e6 if pressing == "glued" else 2e6 + 1e6 * np.cos(60.0 * interface.x)
+        load = st.Load(normal_pressure=pressure)
+    blocks = st.Blocks(height=0.02, thickness=0.01, pressing=pressing)
+    problem = st.Problem(SOLID, interface, FRICTION, load, specimen=blocks)
+    field = st.RandomField(NARROW, SPECTRUM, quantity="friction_coefficient")
+    more = {"normal_pressure": st.RandomField(st.Gamma(mean=3e6, cv=1e-5), SPECTRUM)}
+    more = more if given == "random" else {}
+    factor = {"normal_pressure": st.Gamma(mean=1.0, cv=1e-5)} if given == "factor" else None
+    random = st.RandomInterface(strength=field, **more, between=factor)
+    profiles = profiles_in_stress(problem, random, random.profiles(interface))
+    for name in random.names:
+        values, close = profiles[name], {"rel": 1e-3}
+        assert mean_in_stress(problem, random, name) == pytest.approx(values.mean(), **close)
+        ends = support_in_stress(problem, random, name, 1e-3)
+        assert ends == pytest.approx((values.min(), values.max()), **close)
 
 
 OTHER = dataclasses.replace(FIELD, marginal=st.Gamma(mean=9e5, cv=0.2))

@@ -45,7 +45,7 @@ def strengths(random, samples, seed):
 
 
 def kriging(field, interface, places, z, error, grid):
-    """Mean and covariance on a grid from z at places, by sums over waves and dense matrices."""
+    """Mean, covariance on a grid and chi-square from z at places, by sums over waves."""
     modes = field.modes(interface)
 
     def correlation(one, other):
@@ -57,14 +57,17 @@ def kriging(field, interface, places, z, error, grid):
     across = correlation(grid, places)
     inner = correlation(places, places) + error**2 * np.eye(z.size)
     weights = np.linalg.solve(inner, across.T).T
-    return weights @ z, correlation(grid, grid) - weights @ across.T
+    chi_square = z @ np.linalg.solve(inner, z)
+    return weights @ z, correlation(grid, grid) - weights @ across.T, chi_square
 
 
 @pytest.mark.parametrize(
-    ("interface", "shift", "mean_mode"),
-    [(LINE, 0.0, True), (FREE, 0.31, False), (PLANE, 0.0, False), (PLANE, 0.31, True)],
-)
-def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mode):
+    ("interface", "shift", "mean_mode", "error"),
+    [(LINE, 0.0, True, 0.1), (FREE, 0.31, False, 0.1), (PLANE, 0.0, False, 0.1),
+     (PLANE, 0.31, True, 2e-4)],
+)  # fmt: skip
+def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mode, error):
+    """Also of values that are off by fifty of their errors."""
     # Of a normal marginal z and its error are the values and the noise, scaled.
     field = st.RandomField(scipy.stats.norm(1e6, 0.2e6), FIELD.spectrum, mean_mode=mean_mode)
     numbers = np.arange(5.0, 12.0), np.arange(2.0, 5.0)
@@ -72,13 +75,17 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
     at = {dim: (number + shift) * spacing for dim, number, spacing in sides}
     places, grid = all_of(at), all_of(interface.coordinates)
     values = scan(interface, places, field)
+    values += 2e3 * np.cos(7.0 * np.arange(values.size))
     known = xr.DataArray(values.reshape([one.size for one in at.values()]), at, tuple(at))
-    given = field.given(known, noise=20e3)
-    expected, covariance = kriging(field, interface, places, (values - 1e6) / 0.2e6, 0.1, grid)
+    given = field.given(known.T, noise=0.2e6 * error)
+    z = (values - 1e6) / 0.2e6
+    expected, covariance, misfit = kriging(field, interface, places, z, error, grid)
     known = conditioning(given, interface)
+    assert known.misfit == pytest.approx(misfit, rel=1e-6)
+    assert max(known.error) < 1e-6  # all likelihoods are normal
     mean, deviation = known.regression.moments(field.modes(interface).basis(grid))
-    np.testing.assert_allclose(mean, expected, atol=1e-10)  # round-off of the dense solution
-    np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-10)
+    np.testing.assert_allclose(mean, expected, atol=1e-11 / error)  # round-off
+    np.testing.assert_allclose(deviation**2, np.diag(covariance), atol=1e-11 / error)
     # 20,000 samples: an entry of a covariance scatters by 0.01, the largest of 16,384 by 4.5 of it.
     draws = known.draws(st.RandomInterface(strength=field).draws(interface, 20_000, seed=1))
     sampled = field.modes(interface).gaussian(draws).reshape(20_000, -1)

@@ -145,7 +145,7 @@ def test_short_sum_reaches_its_tolerance_on_times_it_never_saw(mode, eta):
     assert kernel.error < 1e-6
     assert kernel.poles.real.max() <= -0.3 / 1e5
     assert np.abs(kernel.weights).max() < 10.0
-    assert kernel.poles.size <= 28
+    assert kernel.poles.size <= (10 if mode == "III" else 24)  # or one less
 
 
 def test_a_real_pole_has_a_weight():

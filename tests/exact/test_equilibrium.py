@@ -5,12 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from oracles import symbol_of, times
+from scipy.linalg import eigh
 from setups import exact_onset, make_problem, turns
 from specimens import crooked
 
 import stiction as st
-from stiction.elasticity.line import stiffness_column
-from stiction.elasticity.protocol import DenseEntries
+from stiction.elasticity.line import WIDTH_RATIO, line_of, stiffness_column
+from stiction.elasticity.protocol import DenseEntries, HalfSpaces, Windows
+from stiction.elasticity.weakest import window_bound
 from stiction.methods.equilibrium.dense import cholesky
 from stiction.methods.equilibrium.dense.cholesky import make_workspace
 from stiction.methods.equilibrium.dense.linear_program import certificate
@@ -163,3 +165,57 @@ def test_no_sensitivity_beyond_a_corner_where_a_law_steepens():
     assert (~proved).sum() >= 3
     assert np.isnan(found.sensitivity.values[~proved]).all()
     assert np.isfinite(found.sensitivity.values[proved]).all()
+
+
+@pytest.mark.parametrize("places", ["anywhere", "fixed"])
+@pytest.mark.parametrize("level", [0.0, 0.4])
+def test_the_weakest_window_is_the_lowest_of_all_windows_and_places(places, level):
+    """By trying all, of rates and a load that vary (or not) in runs across the seam."""
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        n, widths = (100, [2, 34, 70]) if seed % 3 == 0 else (12, [2, 3, 7])
+        W = np.repeat([3.0, 2.0, 1.4], [n // 4, n // 3, n - n // 4 - n // 3])
+        W = np.roll(W if level else np.full(n, 2.0), rng.integers(n))
+        W = np.append(W, 0.0)[:n]  # 0 beyond its end
+        profile = 1.0 + level * np.sin(W + 1.0)
+        rates, modes = np.array([2.5, 2.0, 1.0]), np.zeros((3, widths[-1]))
+        for mode, width in zip(modes, widths, strict=True):  # with little weight at its ends
+            mode[:width] = np.sin(np.pi * (np.arange(width) + 0.5) / width)
+        starts = rng.integers(0, n - np.array(widths)) if places == "fixed" else np.full(3, -1)
+        excess = 2.0 - np.cos(2.0 * np.pi * (np.arange(n) - rng.normal(0.0, 0.1 * n)) / n)
+        windows = Windows(rates, starts, np.array(widths), modes)
+        best = excess.sum() / profile.sum()
+        for c in range(1 if level == 0.0 else 0, 2 if (rates[1] <= W).all() else 3):
+            for start in range(n) if places == "anywhere" else starts[c : c + 1]:
+                nodes = (start + np.arange(widths[c])) % n
+                if (W[nodes] >= rates[c]).all():
+                    y = modes[c, : widths[c]]
+                    best = min(best, excess[nodes] @ y / (profile[nodes] @ y))
+        y = np.empty(n)
+        bound = window_bound(excess, profile, W, windows, np.empty(n), y)
+        assert bound == pytest.approx(best, rel=1e-12)
+        assert (y @ profile, y @ excess) == pytest.approx((1.0, bound), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "low", "high"),
+    [(256, 1.3e11, 1.3e11), (256, 0.9e11, 7e11), (1024, 0.3e11, 0.3e11), (64, 1e9, 1e9)],
+)
+def test_windows_of_a_line_are_just_unstable(nodes, low, high):
+    """From the narrowest at the highest rate to that at the lowest, with their eigenvectors."""
+    line = line_of(HalfSpaces((0.1,), (1e9,)), nodes)
+
+    def lowest(width):
+        value, vector = eigh(line.block(np.arange(width)), subset_by_index=[0, 0])
+        return value[0], np.abs(vector[:, 0]) / np.abs(vector).sum()
+
+    windows = line.windows(low, high)
+    assert windows.widths.size == (0 if nodes == 64 else 1 if low == high else 12)
+    for rate, width, mode in zip(*windows[:1], *windows[2:], strict=False):
+        assert rate == pytest.approx(lowest(width)[0], rel=1e-9)
+        np.testing.assert_allclose(mode[:width], lowest(width)[1], atol=1e-9)
+        assert not mode[width:].any()
+    ends = windows.widths[:1], windows.widths[-1:]
+    for width, rate in zip(np.concatenate(ends), (high, low), strict=False):
+        narrower = width - 1 if low == high else int(width / WIDTH_RATIO)
+        assert lowest(width)[0] <= rate < lowest(narrower)[0]
