@@ -406,3 +406,6 @@ def test_records_of_one_specimen_count_by_their_length():
     pooled, plain = np.concatenate(rows).mean(), np.mean([row.mean() for row in rows])
     assert abs(known.levels.item() - pooled) < 0.3 * abs(plain - pooled)
     assert known.within.item() < one._estimate.within.min()
+    several = fit(True)
+    (within,) = several._with_levels([several.field]).within
+    np.testing.assert_allclose(within, several._estimate.within, rtol=1e-9)

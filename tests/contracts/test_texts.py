@@ -177,6 +177,8 @@ def test_curves_are_as_many_as_their_tests(cycles):
     assert len(curves) == len([*curves]) == curves.peaks.size
     assert f"Peaks of {len(curves)} tests" in str(curves)
     assert len(curves) in (cycles - 1, cycles)  # the last fall is not in the record
+    names = [curve.name for curve in curves]
+    assert names == [f"test, cycle {number + 1}" for number in range(len(curves))]
 
 
 def test_cracks_up_to_the_whole_period_are_found():

@@ -127,7 +127,9 @@ def test_a_design_by_draws_is_a_quantile_of_the_predictive_distribution():
     posterior = st.infer(
         LINE, scattering(1e6, 0.2, 0.1), peaks, unit="Pa", samples=2000, **LOCAL
     )
-    exact = Prediction(posterior.likelihood, posterior.grid).quantile(1e-2)
+    prediction = Prediction(posterior.likelihood, posterior.grid)
+    exact = prediction.quantile(1e-2)
+    assert prediction.probability(exact) == pytest.approx(1e-2, rel=1e-4)
     given = LOCAL | {"probability": 1e-2, "target_cv": 0.2}
     low, high = st.design_stress(LINE, posterior, seed=1, **given).interval["stress"]
     assert low < exact < high

@@ -9,6 +9,7 @@ from setups import EXACT, LOCAL, turns
 
 import stiction as st
 from stiction.inference.density import densities_of, log_likelihoods
+from stiction.inference.infer import _grown
 from stiction.inference.likelihood import (
     Simulation,
     effective_samples,
@@ -244,6 +245,17 @@ def test_grid_against_a_sum_by_hand():
     pair = grid_of(lambda u: likelihood(u[:, :1]) + likelihood(u[:, 1:]), box, 10_000)
     assert pair.log_evidence == pytest.approx(2.0 * evidence, abs=1e-2)
     assert [pair.information(i) for i in (0, 1)] == pytest.approx([information] * 2, abs=1e-2)
+
+
+@pytest.mark.parametrize("at", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_a_box_grows_by_its_width_at_the_ends_that_draws_reach(at):
+    box = np.array([[0.3, 0.5], [0.4, 0.6]])
+    u = np.tile(box.mean(axis=0), (1000, 1))
+    np.testing.assert_array_equal(_grown(box, u), box)
+    u[:5, at[1]] = box[at] + (0.002 if at[0] == 0 else -0.002)
+    wider = box.copy()
+    wider[at] += 0.1 if at[0] else -0.1
+    np.testing.assert_allclose(_grown(box, u), wider, rtol=1e-12)
 
 
 def test_a_prior_that_begins_where_its_density_is_zero():

@@ -9,6 +9,7 @@ from setups import beta_strength
 from specimens import crooked
 
 import stiction as st
+from stiction.base.units import in_words
 from stiction.inference.agreement import summary_of
 from stiction.inference.curves import Curves, noise_of, turning_points
 from stiction.inference.peaks import make_peaks
@@ -40,7 +41,15 @@ def test_what_a_curve_says(noise):
     (curve,) = st.read_curve((TRAVEL * 1e3 * u.mm, force * u.N))
     assert is_machine(curve, noise)
     assert curve.noise == pytest.approx(noise, rel=0.1, abs=1e-9)
-    assert "2 precursors from 40" in str(curve)
+    first, most = (
+        in_words("N", size) for size in (curve.drops.force[0], max(curve.drops.size))
+    )
+    assert f"2 precursors from {first} on, of up to {most}" in str(curve)
+    # Backwards from half a millimetre, a pull is a push.
+    with pytest.warns(st.AccuracyWarning, match="only falls|negative"):
+        (back,) = st.read_curve(((5e-4 - TRAVEL) * u.m, -force * u.N))
+    np.testing.assert_allclose(back.travel, TRAVEL - 5e-4, atol=1e-18)
+    assert (back.peak, [*back.drops.size]) == (curve.peak, [*curve.drops.size])
     assert len(curve.drops) == 2
     assert curve == st.read_curve((TRAVEL * 1e3 * u.mm, force * u.N))[0]
     assert "plateau 73 N" in str(curve)

@@ -76,6 +76,16 @@ def test_forces_say_what_stresses_say(prior):
         for given, unit in ((forces, "kN"), (groups, "Pa"))
     )
     np.testing.assert_allclose(in_newtons.u, in_pascals.u, rtol=1e-6)
+    if prior:
+        more = LOCAL | {
+            "designs": {"one": {0.075: 3}, "both": {0.05: 2, 0.075: 3}},
+            "prior": prior,
+        }
+        of_newtons, of_pascals = (
+            st.design_of_tests(PROBLEM, ROUGH, unit=unit, repetitions=10, **more)
+            for unit in ("kN", "Pa")
+        )
+        np.testing.assert_allclose(of_newtons.information, of_pascals.information, rtol=1e-6)
 
 
 def test_five_strengths_give_what_proportion_gives(monkeypatch):
@@ -142,7 +152,9 @@ def test_profiles_and_peaks_are_joined():
     assert f"up to {share:.0%} of all" in text
     # The prior of the scatter decides where it is narrow, and that of the mean.
     prior = {"between": (0.2, 0.21), "mean": scipy.stats.norm(1.2e6, 1e3)}
-    told = st.infer(PROBLEM, fit, peaks, unit="Pa", prior=prior, between=["weibull"], **LOCAL)
+    more = {"prior": prior, "between": ["weibull"], "seed": 3}
+    told = st.infer(PROBLEM, fit, peaks, unit="Pa", **more, **LOCAL)
+    assert told.grid.profiles.fields == fit.profiles(60, 3).fields
     assert 0.2 < told.mean["between"] < 0.21
     assert told.mean["mean"] == pytest.approx(1.2e6, rel=3e-3)
     assert {*told.families} == {"weibull"}
