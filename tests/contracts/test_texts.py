@@ -106,17 +106,6 @@ def test_a_grid_that_a_doubt_asks_for_is_fine_enough(name, mean_mode):
     assert not doubts(interface, dataclasses.replace(field, spectrum=smooth))
 
 
-@pytest.mark.parametrize("wrong", [1, 3])
-def test_a_refusal_counts_the_samples_after_the_first(wrong):
-    problem = make_problem(NODES, 0.05, load=st.Load(initial_stress=2e5))
-    strength = np.full((5, NODES), 1e6)
-    strength[1 : 1 + wrong, 7] = 1e5
-    with pytest.raises(st.InputError) as caught:
-        st.onset(problem, strength, method=LOCAL)
-    assert ("further samples: 2" in str(caught.value)) == (wrong == 3)
-    assert ("further" in str(caught.value)) == (wrong == 3)
-
-
 def test_a_table_of_the_largest_size_is_read(monkeypatch, tmp_path):
     path = tmp_path / "table.csv"
     for columns, letters in ((4, 12), (5, 12), (4, 13)):

@@ -2,13 +2,16 @@
 
 import os
 import shutil
+from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import numba
 import pytest
 from checks import python
 
 from stiction.base import files
+from stiction.base.arrays import one_blas_thread
 from stiction.base.jit import decorators, internals
 
 SOURCES = Path(__file__).parents[2] / "src"
@@ -138,3 +141,19 @@ def test_a_newer_numba_is_plain_numba(monkeypatch):
     # Its cache cannot be guarded: nothing is kept.
     monkeypatch.setattr(decorators, "_Guard", None)
     assert decorators._plain(lambda x: 2.0 * x)(4.0) == 8.0
+
+
+def test_blas_has_one_thread_until_its_last_user_leaves(monkeypatch):
+    """Whichever entered first, and again for those who come later."""
+    calls, limit = [], SimpleNamespace(restore_original_limits=lambda: calls.append("free"))
+    monkeypatch.setattr(
+        "threadpoolctl.threadpool_limits", lambda **_: calls.append("one") or limit
+    )
+    for times in range(3):
+        first, second = ExitStack(), ExitStack()
+        for user in (first, second):
+            user.enter_context(one_blas_thread())
+        first.close()
+        assert calls == ["one", "free"] * times + ["one"]
+        second.close()
+    assert calls == ["one", "free"] * 3

@@ -173,7 +173,7 @@ def named(
         dims = dims or (("x", "y") if {"x", "y"} <= {*data.dims} else ("x",))
         array, read = data, None
         if hasattr(data, "data_vars"):
-            array, read = _of_dataset(data, quantity, dims, value)
+            array, read = _of_dataset(data, quantity, dims, x, value)
         elif value not in (None, data.name):
             raise InputError(f"value: must be the only variable, {data.name!r}, got {value!r}")
         if x is not None or {*array.coords} != {*dims}:
@@ -215,7 +215,9 @@ def _of_table(
     return array, reading_of(table, chosen, QUANTITIES[quantity].units, places)
 
 
-def _of_dataset(data: Any, quantity: str, dims: Any, value: Wanted) -> tuple[Any, Reading]:
+def _of_dataset(
+    data: Any, quantity: str, dims: Any, x: Wanted, value: Wanted
+) -> tuple[Any, Reading]:
     """Return a variable of a dataset, with others along it as coordinates, and what was read."""
     names = [*data.data_vars]
     columns = tuple(
@@ -234,7 +236,13 @@ def _of_dataset(data: Any, quantity: str, dims: Any, value: Wanted) -> tuple[Any
         if name != array.name and data[name].ndim == 1 and {*data[name].dims} <= {*array.dims}
     }
     table = Table(columns, "", np.zeros(0))
-    read = reading_of(table, chosen, QUANTITIES[quantity].units, {})
+    called = [_plain(x)] if x is not None else dims if len(dims) == 2 else PLACES
+    used = {
+        _plain(column.name) if len(dims) == 2 else "x": column
+        for column in columns
+        if _plain(column.name) in {*called} & {*map(_plain, along)}
+    }
+    read = reading_of(table, chosen, QUANTITIES[quantity].units, used)
     return array.assign_coords(along), read
 
 
