@@ -12,6 +12,8 @@ from scipy.stats import binom, entropy
 from setups import EXACT, LOCAL, make_problem
 
 import stiction as st
+from stiction.base.variables import unit_of_key
+from stiction.inference.bootstrap import Refits, intervals
 
 QUIET = {"progress": False}
 RECORDS = st.Interface(0.12, 512)
@@ -55,6 +57,17 @@ def test_intervals_of_a_fit_hold_its_estimates(marginal, noise):
             assert abs(np.array([low, high]) - values.mean()).max() < 11.0 * np.ptp(values)
 
 
+def test_a_noise_that_is_negative_by_chance_has_an_interval_from_zero():
+    """As wide as that of an estimate of zero."""
+    fit, values = fitted("beta", True)
+    width, repeated = fit._estimate.noise[1], []
+    for estimate in (0.0, -1e11):
+        truth = dataclasses.replace(fit._estimate, noise=(estimate, width))
+        repeated.append(intervals([Refits(truth, fit._repeated[0].fits)], values)["noise"])
+    assert repeated[0][0] == 0.0 < repeated[0][1]
+    assert repeated[1] == pytest.approx(repeated[0], rel=1e-9)
+
+
 def test_a_p_value_is_the_fraction_of_repetitions_that_differ_as_much():
     """Of fits to different records, of which a fraction p of 20 repetitions scatters."""
     of = dataclasses.replace(TRUTHS["beta"], alpha=1.1)
@@ -82,6 +95,21 @@ def test_ends_of_an_interval_are_admissible_with_ends_of_another():
         assert end <= limits[1] * (1.0 + 1e-12)
         inside.append(end > limits[0])
     assert any(inside)
+
+
+def test_a_fit_in_another_unit_is_the_fit_in_that_unit():
+    """Of strengths as of coefficients, with noise that is fitted."""
+    fit, values = fitted("gamma", True)
+    given = {"marginal": "gamma", "spectrum": FIXED, "bootstrap": 20} | QUIET
+    given |= {"quantity": "friction_coefficient"}
+    other = st.fit_field(values * 2.0**-21, RECORDS, noise=True, **given)
+    for name, value in fit.parameters.items():
+        factor = 2.0**-21 if unit_of_key(name, "Pa") == "Pa" else 1.0
+        found = (other.parameters[name], *other.interval[name])
+        assert found == pytest.approx(
+            np.multiply((value, *fit.interval[name]), factor), rel=1e-6
+        )
+    assert other.p_values == pytest.approx(fit.p_values, rel=1e-6)
 
 
 MANY = [pytest.param(*row, 40, marks=pytest.mark.slow) for row in ((1.1, False), (1.5, 8e3))]

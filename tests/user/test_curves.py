@@ -94,6 +94,8 @@ def test_files_of_testing_machines(tmp_path):
         assert all(is_machine(curve, 0.0) for curve in curves)
     frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine()})
     assert is_machine(st.read_curve(frame, speed=1e-4)[0], 0.0)
+    both = pd.DataFrame({"a (s)": TRAVEL * 1e4, "b (mm)": 1e3 * TRAVEL, "load (N)": machine()})
+    assert is_machine(st.read_curve(both)[0], 0.0)  # of two columns without a name
     with pytest.warns(st.AccuracyWarning, match="negative"):
         assert is_machine(st.read_curve(frame * [1.0, -1.0], speed=1e-4)[0], 0.0)
     with pytest.warns(st.AccuracyWarning, match="ends at its peak in test"):

@@ -91,6 +91,7 @@ def test_the_unit_is_a_specimen(written):
     given = QUIET | {"between": "lognormal"}
     unit, tens = (st.infer(JOINT, None, peaks, **given) for peaks in (twice, single))
     assert (unit.specimens, tens.specimens) == (5, 10)
+    assert "5 peaks, means of 10 slip loads" in str(unit)
     # Pairs with ten numbers and five means: half of the pooled variance is that of a mean.
     squares = (FACTORS / FACTORS.mean(axis=1, keepdims=True) - 1.0) ** 2
     assert any(
