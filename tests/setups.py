@@ -6,6 +6,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+from recording import stored
 
 import stiction as st
 
@@ -29,6 +30,12 @@ def make_problem(
     law = st.LinearWeakening(**weakening) if friction is None else friction
     interface = st.Interface(length, nodes, width=width)
     return st.Problem(solid, interface, law, load or st.Load(), mode)
+
+
+def examples(name: str) -> dict[str, Any]:
+    """Objects of the package by name, from a table of their classes and arguments."""
+    table = stored("examples")[name]
+    return {key: getattr(st, kind)(**given) for key, (kind, given) in table.items()}
 
 
 def load_of(interface: st.Interface, place: float, shape: Any, **more: Any) -> st.Load:

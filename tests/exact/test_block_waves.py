@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from ruptures import stepped
-from setups import make_problem
+from setups import examples, make_problem
 from specimens import crooked, rough
 
 import stiction as st
@@ -21,12 +21,7 @@ LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
 FREE = st.Pusher(height=0.006, width=0.004)
 SLOW = 0.05e12
 """A weakening rate that few nodes resolve in mode III, too."""
-DRIVES = [
-    st.Platen(), st.Platen(stiffness=2e7, mass=0.1), st.Platen(stiffness=float("inf")),
-    st.Pusher(height=0.012, width=0.005, side="right"),
-    st.Pusher(height=0.006, width=0.004, stiffness=3e7, mass=0.05),
-    st.Pusher(height=0.016, width=0.004, side="both", stiffness=float("inf")),
-]  # fmt: skip
+DRIVES = [*zip(examples("drives of events").values(), ("III", "II") * 3, strict=True)]
 
 
 def of(problem, strength):
@@ -151,9 +146,7 @@ def test_waves_along_the_interface_run_at_rayleighs_speed():
 
 
 @pytest.mark.parametrize("attenuation", [0.0, 2e4])
-@pytest.mark.parametrize(
-    ("drive", "mode"), list(zip(DRIVES, ["III", "II", "III", "II", "II", "III"], strict=True))
-)
+@pytest.mark.parametrize(("drive", "mode"), DRIVES)
 def test_energy_is_kept(drive, mode, attenuation):
     """What the stress before the event gives is stored, moves, or is lost to friction and so on."""
     W = 0.19e12 if mode == "II" else SLOW

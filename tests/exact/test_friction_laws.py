@@ -2,24 +2,14 @@
 
 import numpy as np
 import pytest
+from setups import examples
 
 import stiction as st
 from stiction.problem.friction import FrictionLaw
 from stiction.problem.friction.kernels import line_at, strength_at, strengths
 
 DROP, RESIDUAL, RATE = 1.1e6, 0.3e6, 0.4e12
-TWO_PIECES = {"slip": [0.2, 1.0], "strength": [0.4, 0.0]}
-LAWS = {
-    "linear": st.LinearWeakening(weakening_rate=RATE),
-    "exponential": st.ExponentialWeakening(weakening_rate=RATE),
-    "dual": st.PiecewiseWeakening(**TWO_PIECES, weakening_rate=RATE),
-    "plateau": st.PiecewiseWeakening(
-        slip=[0.2, 0.8, 1.0], strength=[1.0, 0.3, 0.0], weakening_rate=RATE
-    ),
-    "steepening": st.PiecewiseWeakening(
-        slip=[0.3, 0.8, 1.0], strength=[0.9, 0.2, 0.0], weakening_rate=RATE
-    ),
-}
+LAWS = examples("laws of one weakening rate")
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -1,22 +1,15 @@
 """Laws of statics along the path of a slider, and the same rig described in two ways."""
 
-import dataclasses
-
 import numpy as np
 import pytest
+from setups import examples
 from sliders import coefficients, rig_problem
 
 import stiction as st
 from stiction.methods.equilibrium import slider as module
 
 PUSH = st.Pusher(height=0.006, width=0.004)
-RIGS = {
-    "soft": {"drive": PUSH},
-    "tilted, high": {"drive": st.Pusher(height=0.06, width=0.01), "tilt": -0.5},
-    "machine": {"drive": dataclasses.replace(PUSH, stiffness=5e6)},
-    "rigid machine": {"drive": dataclasses.replace(PUSH, stiffness=float("inf"))},
-    "shear of the top": {"drive": st.TopShear()},
-}
+DRIVES = examples("drives of sliders")
 
 
 def solved(problem, mu, **options):
@@ -24,9 +17,9 @@ def solved(problem, mu, **options):
 
 
 @pytest.mark.filterwarnings("ignore::stiction.AccuracyWarning")
-@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("name", DRIVES)
 def test_forces_balance_along_the_path(name):
-    problem = rig_problem(**RIGS[name])
+    problem = rig_problem(drive=DRIVES[name], tilt=-0.5 if name == "tilted, high" else 0.0)
     mu, slider = coefficients(problem), problem.specimen
     found = solved(problem, mu)
     loads = float(found.critical_load[0]) * np.linspace(0.0, 1.0, 40)

@@ -9,7 +9,7 @@ import pytest
 from brute_force import BruteForce, along
 from refusals import warning_texts
 from scipy.linalg import eigvalsh
-from setups import EXACT, LOCAL, exact_onset, without
+from setups import EXACT, LOCAL, exact_onset, examples, without
 from specimens import crooked, rough
 
 import stiction as st
@@ -23,15 +23,7 @@ from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import make_sample, pieces_of
 
 INF = float("inf")
-DRIVES = {
-    "platen": st.Platen(),
-    "platen, machine": st.Platen(stiffness=3e7),
-    "platen, rigid": st.Platen(stiffness=INF),
-    "pusher": st.Pusher(height=0.01, width=0.004),
-    "low pusher, machine": st.Pusher(height=0.004, width=0.003, stiffness=2e7),
-    "right pusher, rigid": st.Pusher(height=0.012, width=0.005, side="right", stiffness=INF),
-    "both": st.Pusher(height=0.014, width=0.01, side="both"),
-}
+DRIVES = examples("drives of specimens")
 
 
 def first(problem, strength):
@@ -101,22 +93,7 @@ def test_a_stiff_machine_on_a_short_specimen_slides_stably():
     assert held.critical_load.item() > free.critical_load.item()
 
 
-LAWS = {
-    "linear": {"nodes": 64, "residual": 0.2e6, "weakening_rate": 0.12e12},
-    "out of plane": {"nodes": 64, "residual": 0.2e6, "weakening_rate": 0.12e12, "mode": "III"},
-    "two pieces": {
-        "nodes": 48,
-        "friction": st.PiecewiseWeakening(
-            slip=(0.3, 1.0), strength=(0.5, 0.0), weakening_rate=0.13e12, residual_strength=0.15e6
-        ),
-    },
-    "two pieces, steeper": {
-        "nodes": 48,
-        "friction": st.PiecewiseWeakening(
-            slip=(0.4, 1.0), strength=(0.75, 0.0), weakening_rate=0.06e12, residual_ratio=0.2
-        ),
-    },
-}  # fmt: skip
+LAWS = examples("laws of lap joints")
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -126,11 +103,9 @@ def test_nodes_stop_rest_and_slip_again(name):
     Nodes stop between events, within one, and where another passes a corner.
     """
     drive = st.Pusher(height=0.004, width=0.003, side="both", stiffness=INF)
-    given = dict(LAWS[name])
-    law = given.pop("friction", None)
-    problem = crooked(drive=drive, height=0.009, **given)
-    if law is not None:
-        problem = dataclasses.replace(problem, friction=law)
+    nodes, mode = 48 if "pieces" in name else 64, "III" if name == "out of plane" else "II"
+    problem = crooked(drive=drive, height=0.009, nodes=nodes, mode=mode)
+    problem = dataclasses.replace(problem, friction=LAWS[name])
     strength = rough(problem, 3)
     brute, states = follow(problem, strength)
     if problem.friction.residual_ratio is None:  # else residual strength changes with it

@@ -20,6 +20,7 @@ from setups import (
     beta_strength,
     ensemble,
     exact_onset,
+    examples,
     local_onset,
     make_problem,
     turns,
@@ -159,22 +160,15 @@ def test_a_line_slides_above_its_exact_onset_only(ratio):
         assert slides(*row, (1.0 + 1e-3) * load * sample.load_profile) is True
 
 
-@pytest.mark.parametrize(
-    ("drive", "mode"),
-    [
-        (st.Platen(stiffness=4e7), "III"),
-        (st.Platen(stiffness=float("inf")), "II"),
-        (st.Pusher(height=0.004, width=0.003, stiffness=3e6), "II"),
-        (st.Pusher(height=0.005, width=0.002, side="right", stiffness=float("inf")), "III"),
-    ],
-    ids=["platen", "rigid platen", "left pusher", "right pusher"],
-)
-def test_behind_a_machine_the_local_criterion_returns_a_stress_and_not_the_drive(drive, mode):
+MACHINES = examples("machines")
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_behind_a_machine_the_local_criterion_returns_a_stress_and_not_the_drive(name):
     """Its drive is an upper bound; the slip of the patch takes most of what the exact slip does."""
-    weakening_rate = (
-        0.16e12 if mode == "II" else 0.3e12
-    )  # below it nodes reach their residual strength
-    problem = crooked(drive=drive, mode=mode, weakening_rate=weakening_rate, residual=0.0)
+    mode = "II" if name in ("rigid platen", "left pusher") else "III"
+    rate = 0.16e12 if mode == "II" else 0.3e12  # below it nodes reach their residual strength
+    problem = crooked(drive=MACHINES[name], mode=mode, weakening_rate=rate, residual=0.0)
     tau_p = rough(problem, 5, 12)
     local, exact = local_onset(problem, tau_p), exact_onset(problem, tau_p, slip=True)
     relief = problem.blocks.mean_relief(exact.slip.values)

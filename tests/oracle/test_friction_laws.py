@@ -5,28 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from oracles import relaxed
-from setups import beta_strength, exact_onset, make_problem
+from setups import beta_strength, exact_onset, examples, make_problem
 
 import stiction as st
 
-RATE = {"weakening_rate": 0.5e12, "residual_strength": 0.2e6}
-SLIP = {"critical_slip": 8e-6, "residual_strength": 0.2e6}
-GENTLE = {"weakening_rate": 0.25e12, "residual_strength": 0.2e6}
-LAWS = {
-    "dual": st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[0.4, 0.0], **RATE),
-    "eight pieces": st.PiecewiseWeakening.from_law(st.ExponentialWeakening(**RATE), 8),
-    "uniform critical slip": st.PiecewiseWeakening(
-        slip=[0.3, 0.6, 1.0], strength=[0.5, 0.2, 0.0], **SLIP
-    ),
-    "plateau": st.PiecewiseWeakening(slip=[0.3, 1.0], strength=[1.0, 0.0], **RATE),
-    "long plateau": st.PiecewiseWeakening(
-        slip=[0.8, 1.0], strength=[1.0, 0.0], weakening_rate=0.1e12, residual_strength=0.2e6
-    ),
-    "plateau, then steepening": st.PiecewiseWeakening(
-        slip=[0.2, 0.5, 1.0], strength=[1.0, 0.8, 0.0], **GENTLE
-    ),
-    "steepening": st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.7, 0.0], **GENTLE),
-}
+LAWS = examples("polygons")
+LAWS["eight pieces"] = st.PiecewiseWeakening.from_law(
+    st.ExponentialWeakening(weakening_rate=0.5e12, residual_strength=0.2e6), 8
+)
 
 
 def short(law):

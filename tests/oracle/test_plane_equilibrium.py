@@ -12,6 +12,7 @@ from setups import (
     ROUND_OFF,
     beta_strength,
     exact_onset,
+    examples,
     make_problem,
     repeated,
     smooth_noise,
@@ -30,7 +31,7 @@ from stiction.methods.equilibrium.transforms.plane import PlaneSearch, plane_ons
 from stiction.methods.equilibrium.transforms.relaxation import stable_equilibrium
 from stiction.methods.equilibrium.transforms.turning_point import close_by_newton
 
-NODES, SMALL = (24, 24), (20, 20)
+NODES = (24, 24)
 SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)
 WIDE = (5.0 * LENGTH, 5.0 * LENGTH)
 
@@ -185,17 +186,12 @@ def test_nodes_that_become_residual_one_by_one_are_events_only_where_stability_i
     assert found["critical_load"].item() / first == pytest.approx(1.01224, abs=2e-4)
 
 
-LAWS = {
-    "flattens": {"slip": [0.3, 1.0], "strength": [0.4, 0.0], "weakening_rate": RATE},
-    "steepens": {"slip": [0.5, 1.0], "strength": [0.7, 0.0], "weakening_rate": 0.5 * RATE},
-    "three": {"slip": [0.2, 0.6, 1.0], "strength": [0.7, 0.2, 0.0], "weakening_rate": RATE},
-}
+LAWS = examples("laws of strips")
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(name):
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_laws_of_several_pieces_on_a_strip_are_those_of_the_line(law):
     """Strength uniform along y; the line follows each corner exactly, with a dense factor."""
-    law = st.PiecewiseWeakening(**LAWS[name], residual_strength=0.25e6)
     load = {"profile": 1.1 + 0.2 * np.sin(turns(64)), "initial_stress": 3e4 * np.cos(turns(64))}
     line = make_problem(64, 0.02, friction=law, load=st.Load(**load))
     wide = st.Load(**{key: repeated(value, 8) for key, value in load.items()})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from ruptures import BREAKING_PLANE, dip, run_of, wavy_line
-from setups import QUARTER, beta_strength, exact_onset, make_problem
+from setups import QUARTER, beta_strength, exact_onset, examples, make_problem
 from specimens import crooked, rough
 
 import stiction as st
@@ -86,14 +86,10 @@ def test_creep_stops_where_the_load_falls_and_never_runs_back():
     assert slip.max() > 0.0
 
 
-LOW = st.Pusher(height=0.006, width=0.004, stiffness=3e7)
-DRIVES = [
-    LOW, st.Pusher(height=0.012, width=0.005), st.Platen(stiffness=2e7, mass=0.1),
-    st.Pusher(height=0.01, width=0.004, side="both", stiffness=float("inf")),
-]  # fmt: skip
+DRIVES = examples("drives with arrested events")
 
 
-@pytest.mark.parametrize("drive", DRIVES)
+@pytest.mark.parametrize("drive", DRIVES.values(), ids=DRIVES)
 def test_no_event_is_shorter_than_without_inertia_and_each_ends_in_equilibrium(drive):
     problem = crooked(nodes=64, drive=drive)
     search, overdamped = RuptureSearch(problem, Rupture()), make_search(problem)
@@ -179,13 +175,7 @@ def test_a_restart_records_the_rest_to_the_bit(case, tmp_path):
         assert np.array_equal(streamed[name], run[name])
 
 
-GAMMA = {"fracture_energy": 2.5, "residual_strength": 0.2e6}
-LAWS = {
-    "linear": st.LinearWeakening(**GAMMA),
-    "exponential": st.ExponentialWeakening(**GAMMA),
-    "bilinear": st.PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.4, 0.0], **GAMMA),
-    "steepening": st.PiecewiseWeakening(slip=[0.4, 1.0], strength=[0.8, 0.0], **GAMMA),
-}
+LAWS = examples("laws of one fracture energy")
 
 
 @pytest.fixture(scope="module")
