@@ -19,6 +19,7 @@ from contracts.bodies import (
     field_of,
     profiles_of,
 )
+from recording import stored
 
 import stiction as st
 from stiction import extensions
@@ -96,28 +97,8 @@ EXAMPLES: dict[str, Any] = {  # type: what it needs on a problem
 }
 UNFIT = {("local_criterion", "slider"), ("rupture", "slider"), ("weakest", "slider")}
 """Bodies that a method does not take; its `supports` says why."""
-OPTIONS: dict[str, dict[str, Any]] = {  # type: another value of each option
-    "local_criterion": {},
-    "weakest": {"node": "second"},
-    "equilibrium": {"sensitivity": True, "slip": True, "events": 2, "tolerance": 1e-4},
-    "rupture": {
-        "load_history": {"load_history": ([0.0, 1.0], [0.0, 2e9]), "loading_rate": None},
-        "loading_rate": 3e9, "end_time": 3e-4, "kernel_tolerance": 1e-4, "courant": 0.5,
-        "implicit": False, "arrival": 0.2,
-        "start": "rest", "stop": "onset", "max_steps": 3, "events": 2,
-    },
-}  # fmt: skip
-WRONG: dict[str, dict[str, Any]] = {  # type: a wrong value of each option
-    "local_criterion": {},
-    "weakest": {"node": "third"},
-    "equilibrium": {"sensitivity": 1.0, "slip": "yes", "events": -1, "tolerance": 0.1},
-    "rupture": {
-        "loading_rate": 0.0, "load_history": ([1.0, 2.0], [0.0, 1.0]), "end_time": -1.0,
-        "kernel_tolerance": 0.0, "courant": 1.1, "implicit": 0, "arrival": 0.0,
-        "start": "slip", "stop": "never", "max_steps": 0,
-        "events": 1.5,
-    },
-}  # fmt: skip
+OPTIONS = stored("options")
+"""By type: another value of each option, and a wrong one."""
 SILENT = {"start": ["line with ends", "plane with ends"]}  # as its docstring says
 CASES = [(kind, name) for kind in EXAMPLES for name in BODIES if (kind, name) not in UNFIT]
 every = pytest.mark.parametrize(("kind", "name"), CASES)
@@ -132,7 +113,7 @@ SAMPLES = {
 
 def method_of(kind: str, option: str, problem: st.Problem) -> Any:
     """The example, with another value of an option; a mapping also makes room for it."""
-    value = OPTIONS[kind].get(option, {})
+    value, _ = OPTIONS[kind].get(option, ({}, None))
     return example(kind, problem, **(value if isinstance(value, dict) else {option: value}))
 
 
@@ -154,10 +135,10 @@ def same(result: Any, expected: Any) -> bool:
 
 
 def test_every_method_and_option_has_a_line():
-    assert set(CLASSES) == EXAMPLES.keys() == OPTIONS.keys() == WRONG.keys()
+    assert set(CLASSES) == EXAMPLES.keys() == OPTIONS.keys()
     for kind in CLASSES:
         names = {field.name for field in dataclasses.fields(CLASSES[kind])} - {"type"}
-        assert names == OPTIONS[kind].keys() == WRONG[kind].keys()
+        assert names == OPTIONS[kind].keys()
 
 
 @pytest.mark.parametrize(("kind", "name"), sorted(UNFIT))
@@ -259,7 +240,7 @@ def study_by(kind: str, option: str, problem: st.Problem) -> st.Study:
 @every_option
 def test_a_wrong_option_is_refused_by_its_name(kind, option):
     with pytest.raises(st.InputError, match=rf"\b{option}\b"):
-        example(kind, BODIES["line"], **{option: WRONG[kind][option]})
+        example(kind, BODIES["line"], **{option: OPTIONS[kind][option][1]})
 
 
 @every_option

@@ -1,10 +1,9 @@
 """The local criterion, mean and variance of its stress, and cracks, against closed forms."""
 
-import dataclasses
-
 import numpy as np
 import pytest
-from setups import ROUND_OFF, edge_load, local_onset, make_problem, turns
+from recording import stored
+from setups import edge_load, local_onset, make_problem, turns
 
 import stiction as st
 from stiction.elasticity.protocol import SMALLEST_EIGENVALUE
@@ -53,12 +52,7 @@ def test_multiplier_is_the_fourier_transform_of_the_weight():
 
 
 # Largest error for waves of |k| h_n/2 up to 1, 3, 6 and 12, rounded up from what was measured.
-@pytest.mark.parametrize(
-    ("half_width", "errors"),
-    [(2.0, (1.0, 1.0, 1.0, 1.0)), (4.4, (2e-5, 2e-4, 2e-3, 2e-2)),
-     (8.0, (2e-6, 1e-5, 1e-4, 2e-3)), (17.5, (1e-9, 5e-9, 2e-8, 1e-6)),
-     (70.0, (2e-11, 1e-10, 1e-9, 1e-8)), (1000.0, (1e-13, 1e-13, 1e-13, 1e-13))],
-)  # fmt: skip
+@pytest.mark.parametrize(("half_width", "errors"), stored("cases")["errors of weights"])
 def test_weights_on_a_grid_do_to_smooth_waves_what_the_eigenfunction_does(half_width, errors):
     nodes = 16 * int(np.ceil(half_width))
     w = grid_weights(half_width)
@@ -93,17 +87,6 @@ def test_moduli_and_wave_speeds_of_both_plane_states(plane, nu):
     assert function == pytest.approx(0.0, abs=1e-13)
 
 
-def test_a_load_that_jumps_keeps_the_ratio_between_its_bounds():
-    """Spectral averages of such a load were negative."""
-    profile = np.where(np.arange(128) < 20, 1.0, 1e-3)
-    problem, tau_p = make_problem(128, load=st.Load(profile=profile)), np.full(128, 1e6)
-    # Twenty nodes hold several patches of 4.4 nodes that see the unit load only.
-    assert first_onset(problem, tau_p)["critical_load"] == pytest.approx(1e6, rel=1e-12)
-    tau_n = st.theory.nucleation_stress(problem, tau_p)
-    assert tau_n.min() >= 1e6 * (1.0 - ROUND_OFF)
-    assert tau_n.max() <= 1e9 * (1.0 + ROUND_OFF)
-
-
 def test_weakening_rate_of_each_sample(make_strength):
     """Samples of different W in one call are the same as one by one; columns are broadcast."""
     problem = make_problem(weakening_rate=None)
@@ -129,60 +112,31 @@ def test_position_lies_on_the_interface(problem):
     np.testing.assert_allclose(places, at % 0.1, atol=1e-7)
 
 
-def test_periodic_variance_is_that_of_the_grid(problem, make_strength):
-    """The covariance matrix of the nodes, averaged by the weights of nucleation_stress itself."""
-    strength = make_strength(0.5, mean_mode=True)
-    c = strength.correlation(problem.interface)
-    weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - 1e6
-    matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
-    found = nucleation_statistics(problem, strength)
-    # 1e6 + 1 keeps ten digits of the one.
-    assert found.variance_ratio == pytest.approx(weights @ matrix @ weights, rel=1e-8)
-    assert found.mean == pytest.approx(strength.mean, rel=1e-14)
+def test_moments_of_the_nucleation_stress_are_those_of_the_grid():
+    """The covariance matrix of the nodes, averaged by the weights of nucleation_stress itself.
 
-
-def test_friction_coefficients_are_taken_times_the_pressure(problem):
-    """0.22 was taken for 0.22 Pa."""
-    pressed = dataclasses.replace(problem, load=st.Load(normal_pressure=2e6))
-    in_pascals, of_one = (
-        st.Beta(alpha=2.0, beta=3.0, low=b, high=3.0 * b) for b in (0.4e6, 0.2)
-    )
+    Of friction coefficients: 0.22 was taken for 0.22 Pa.
+    """
+    load = st.Load(profile=2.0, initial_stress=1e5, normal_pressure=2e6)
+    problem, marginal = make_problem(load=load), st.Beta(alpha=2.0, beta=3.0, low=0.2, high=0.6)
     spectrum = st.PowerLawSpectrum(correlation_length=5e-3)
-    in_pascals = st.RandomField(in_pascals, spectrum)
-    coefficient = st.RandomField(of_one, spectrum, quantity="friction_coefficient")
-    found, expected = (nucleation_statistics(pressed, f) for f in (coefficient, in_pascals))
-    assert found.mean == pytest.approx(expected.mean, rel=1e-12)
-    assert found.variance == pytest.approx(expected.variance, rel=1e-12)
-    varying = make_problem(load=st.Load(normal_pressure=np.linspace(1e6, 2e6, 256)))
-    with pytest.raises(st.InputError, match=r"load\.normal_pressure: varies"):
-        nucleation_statistics(varying, coefficient)
-
-
-def test_uniform_load_and_initial_stress_scale(problem, make_strength):
-    """tau_n = (<g, tau_p> - tau_i)/p."""
-    loaded = dataclasses.replace(problem, load=st.Load(profile=2.0, initial_stress=1e5))
-    plain = nucleation_statistics(problem, make_strength())
-    found = nucleation_statistics(loaded, make_strength())
-    assert found.mean == pytest.approx((plain.mean - 1e5) / 2.0)
-    assert found.variance == pytest.approx(plain.variance / 4.0)
+    field = st.RandomField(marginal, spectrum, True, quantity="friction_coefficient")
+    c = field.correlation(problem.interface)
+    # 1e6 + 1 keeps ten digits of the one.
+    weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - (1e6 - 1e5) / 2.0
+    matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
+    found = nucleation_statistics(problem, field)
+    variance = (2e6 * field.standard_deviation) ** 2 * (weights @ matrix @ weights)
+    assert found.variance == pytest.approx(variance, rel=1e-8)
+    assert found.mean == pytest.approx((2e6 * field.mean - 1e5) / 2.0, rel=1e-12)
 
 
 PROBLEM = st.paper.problem(nodes=1024)
-LENGTH, MODULUS = PROBLEM.interface.length, PROBLEM.effective_modulus
-
-
-def test_uniform_drop_is_koiters_row_of_cracks():
-    """G = L drop^2 tan(pi a/L)/(2 G*), a the half-length, for any length (Koiter, 1959)."""
-    whole = np.array([[0.001], [0.02], [0.05], [0.09]])
-    found = release_rates(PROBLEM, 0.7e6, whole[:, 0], 0.013)
-    exact = LENGTH * 0.7e6**2 * np.tan(0.5 * np.pi * whole / LENGTH) / (2.0 * MODULUS)
-    # The drop is interpolated between nodes, to round-off where it is uniform.
-    np.testing.assert_allclose(found, np.repeat(exact, 2, axis=1), rtol=1e-8)
 
 
 def test_cracks_shorter_than_any_that_is_looked_at():
     """A short crack under a uniform drop: 2a = 4 G* Gamma/(pi drop^2)."""
-    exact = 4.0 * MODULUS * 1e-9 / (np.pi * 0.7e6**2)
+    exact = 4.0 * PROBLEM.effective_modulus * 1e-9 / (np.pi * 0.7e6**2)
     assert griffith_length(PROBLEM, 0.7e6, 1e-9) == pytest.approx(exact, rel=1e-5)
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from oracles import symbol_of, times
+from recording import stored
 from scipy.linalg import eigh
 from setups import exact_onset, make_problem, turns
 from specimens import crooked
@@ -119,13 +120,7 @@ def test_a_factor_is_that_of_its_matrix_however_it_was_reached():
 
 
 @pytest.mark.parametrize(
-    ("field", "count", "start", "length", "centre"),
-    [
-        ([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0], 2, 0, 2, 0.25),
-        ([1.0, 3.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0], 2, 7, 3, 7.875),
-        ([3.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0], 2, 7, 3, 0.0),
-        ([1.0, 2.0, 1.0, 6.0, 1.0, 1.0, 1.0], 1, 0, 7, 37.0 / 13.0),
-    ],
+    ("field", "count", "start", "length", "centre"), stored("cases")["patches on a circle"]
 )
 def test_patches_on_the_circle(field, count, start, length, centre):
     assert count_patches(np.array(field)) == count

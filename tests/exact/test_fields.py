@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 import scipy.stats
+from contracts.test_laws import DENSITIES, STRENGTHS
 from scipy.integrate import quad
 from setups import beta_strength
 
@@ -23,25 +24,16 @@ from stiction.random.mapping import (
 
 LINE = st.Interface(length=0.1, nodes=256)
 COARSE = st.Interface(length=0.1, nodes=64)
-SPECTRA = [
-    st.PowerLawSpectrum(correlation_length=0.3, power_kept=0.9999),
-    st.PowerLawSpectrum(correlation_length=0.3, exponent=1.2, power_kept=0.9),
-    st.SquaredExponentialSpectrum(correlation_length=0.3),
-    st.ExponentialSpectrum(correlation_length=0.3, power_kept=0.95),
-]
-EACH = pytest.mark.parametrize(
-    "spectrum", SPECTRA, ids=lambda s: f"{s.type} {getattr(s, 'exponent', '')}"
-)
 
 
 def field_of(marginal, correlation_length=2e-3, **options):
     return st.RandomField(marginal, st.PowerLawSpectrum(correlation_length), **options)
 
 
-@EACH
+@pytest.mark.parametrize("spectrum", DENSITIES.values(), ids=DENSITIES)
 def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     """g(kx) of the line is the integral over ky of the plane's."""
-    wave = 2.0 * np.pi / 0.3
+    wave = 2.0 * np.pi / spectrum.correlation_length
     k = np.array([0.0, 0.3, 1.0, 2.0]) * wave
 
     def density(q, a=0.0):
@@ -57,10 +49,7 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
 @pytest.mark.parametrize(
     "distribution",
     [
-        scipy.stats.beta(1.5, 3.0, 0.66e6, 1e6),
-        scipy.stats.lognorm(0.3, scale=1e6),
-        scipy.stats.gamma(4.0, scale=2e5),
-        scipy.stats.truncnorm(-2.0, 3.0, loc=1e6, scale=2e5),
+        *(marginal.distribution for marginal in STRENGTHS.values()),
         scipy.stats.triang(0.3, loc=1.0, scale=2.0),
         scipy.stats.invgauss(0.145),  # whose tails scipy inverts poorly
     ],

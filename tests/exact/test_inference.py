@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
-from setups import EXACT, LOCAL, turns
+from recording import stored
+from setups import LOCAL, turns
 
 import stiction as st
 from stiction.inference.density import densities_of, log_likelihoods
@@ -56,6 +57,10 @@ def onsets(prior, theta, method=LOCAL, samples=60, seed=3):
 WAVE = np.cos(turns(256))
 PRESSED = with_load(normal_pressure=3e6)
 UNEVEN = with_load(normal_pressure=3e6 * (1.0 + 0.7 * WAVE))
+SPECIMEN = dataclasses.replace(
+    with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
+    specimen=st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.004)),
+)
 WITH_RESIDUAL = with_friction(weakening_rate=0.5e12, residual_strength=0.3e6)
 WEIBULL = with_marginal(scipy.stats.weibull_min(4.0, scale=1e6))
 COEFFICIENTS = dataclasses.replace(
@@ -64,53 +69,13 @@ COEFFICIENTS = dataclasses.replace(
     quantity="friction_coefficient",
 )
 
-SCALING = {
-    "both bounds": (PROBLEM, STRENGTH, LOCAL, THREE, 2),
-    "loc and scale": (
-        PROBLEM, with_marginal(scipy.stats.lognorm(0.3, loc=0.3e6, scale=0.5e6)), LOCAL,
-        {"marginal.loc": (0.1e6, 0.5e6), "marginal.scale": (0.3e6, 0.9e6)}, 2,
-    ),
-    "uniform initial stress, local": (
-        with_load(initial_stress=0.1e6), STRENGTH, LOCAL, THREE, 2,
-    ),
-    "coefficients": (PRESSED, COEFFICIENTS, LOCAL, SMALL, 1),
-    "coefficients under a pressure that varies": (
-        UNEVEN, with_marginal(scipy.stats.weibull_min(4.0, scale=0.5), COEFFICIENTS), LOCAL,
-        {"marginal.scale": (0.2, 0.8)}, 1,
-    ),
-    "stretch by equilibrium": (
-        with_friction(weakening_rate=0.5e12, residual_ratio=0.4), WEIBULL, EXACT,
-        {"marginal.scale": (0.5e6, 2e6)}, 1,
-    ),
-    "stretch of a specimen": (
-        dataclasses.replace(
-            with_friction(weakening_rate=0.5e12, residual_ratio=0.4),
-            specimen=st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.004)),
-        ),
-        WEIBULL, EXACT, {"marginal.scale": (0.5e6, 2e6)}, 1,
-    ),
-    # None scales where scaling does not hold.
-    "critical slip": (with_friction(critical_slip=2e-6), STRENGTH, EXACT, THREE, 0),
-    "shift by equilibrium": (PROBLEM, STRENGTH, EXACT, LOW, 0),
-    "residual strength by equilibrium": (
-        WITH_RESIDUAL, WEIBULL, EXACT, {"marginal.scale": (0.8e6, 2e6)}, 0,
-    ),
-    "load profile": (with_load(profile=1.0 + 0.3 * WAVE), STRENGTH, LOCAL, LOW, 0),
-    "initial stress and load profile": (
-        with_load(profile=1.0 + 0.3 * WAVE, initial_stress=0.1e6), WEIBULL, LOCAL,
-        {"marginal.scale": (0.8e6, 2e6)}, 0,
-    ),
-    "shift of coefficients under a pressure that varies": (UNEVEN, COEFFICIENTS, LOCAL, SMALL, 0),
-    "normal pressure": (
-        PRESSED, COEFFICIENTS, LOCAL, SMALL | {"problem.load.normal_pressure": (1e6, 2e6)}, 0,
-    ),
-    "shape": (PROBLEM, STRENGTH, LOCAL, {"marginal.alpha": (1.0, 3.0)}, 0),
-}  # fmt: skip
+SCALING = stored("cases")["scaling of onsets"]
+"""Problem, field, method, prior and the number of keys that scale: none where scaling fails."""
 
 
 @pytest.mark.parametrize("name", SCALING)
 def test_parameters_scale_every_onset(name):
-    problem, random, method, prior, count = SCALING[name]
+    problem, random, method, prior, count = eval(SCALING[name], globals())
     prior = make_prior(problem, random, prior)
     scaling = find_scaling(prior, method, "critical_stress")
     assert len(scaling.keys) == count

@@ -76,17 +76,6 @@ def test_levels_are_tenths_and_chains_move():
         assert ceilings == sorted(ceilings, reverse=True)
 
 
-def test_levels_chosen_from_the_samples_do_not_bias_the_estimate():
-    """Four hundred small runs: ten seeds a level, where a biased rule adds a tenth each."""
-    options = {"samples": 100, "threshold": -3.5}
-    runs = [descend(first, 20, rng=generator(seed, 6), **options) for seed in range(400)]
-    found = np.array([run.probability(-3.5) for run in runs]) / norm.cdf(-3.5)
-    # With the threshold at the highest value that goes on, not the lowest that does not, the mean
-    # is 1.34.
-    assert standard_error(found) < 0.07
-    assert_mean(found, 1.0, errors=4.0)
-
-
 def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
     runs, across = descents()
     excess = []
@@ -322,9 +311,6 @@ def test_as_many_members_are_drawn_as_the_target_needs(monkeypatch):
     carriers = 1 + np.searchsorted(np.cumsum(np.sort(shares)[::-1]), 0.9)
     told = int(re.search(r"(\d+) of 12.*90% of the mean", given.warnings[-1])[1])
     assert told == pytest.approx(carriers, abs=1)
-    shown = re.search(r"of which by choice of the interfaces +([\d.]+)", str(given))
-    assert float(shown[1]) == pytest.approx(given.members_cv, rel=1e-5)  # six digits are shown
-    assert f"coefficient of variation {given.cv:.6g}" in " ".join(str(given).split())
     assert np.isnan(found.band[0])  # few members have samples so low
     shown = re.search(r"95 % of interfaces have at most +([\d.e-]+)", str(given))
     assert float(shown[1]) == pytest.approx(given.band[1], rel=1e-5)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from recording import stored
 
 from stiction.elasticity.blocks import Pushes, block_response
 from stiction.elasticity.columns import Body, block, eliminated
@@ -9,21 +10,15 @@ from stiction.elasticity.rig import Rig, contact_rig, loaded, on_cells
 
 LENGTH = 0.14
 ACRYLIC, STEEL = (1.11e9, 2.65 / 1.35), (77e9, 2.7 / 1.3)
-SLIDER, BASE = Body(0.075, *ACRYLIC), Body(0.03, *ACRYLIC)
+SLIDER = Body(0.075, *ACRYLIC)
 PUSH = (0.015, 0.025)
-RIGS = {
-    "acrylic": {"base": BASE, "push": PUSH, "behind": 0.06, "ahead": 0.1},
-    "steel base, tilted press": {"base": Body(0.02, *STEEL), "push": PUSH, "tilt": -0.4},
-    "soft base on rollers": {
-        "base": Body(0.05, 0.3e9, 1.7), "push": (0.0, 0.004), "behind": 0.02,
-        "ahead": 0.3, "bottom": "rollers",
-    },
-    "sheared top": {"base": BASE, "push": None, "ahead": 0.01, "tilt": 0.7},
-}  # fmt: skip
+RIGS = stored("cases")["rigs"]
 
 
 def rig_of(name: str, nodes: int = 64, **more: object) -> Rig:
-    return contact_rig(LENGTH, nodes, SLIDER, **(RIGS[name] | more))
+    given = RIGS[name] | {"base": Body(*RIGS[name]["base"])} | more
+    given["push"] = given["push"] and tuple(given["push"])
+    return contact_rig(LENGTH, nodes, SLIDER, **given)
 
 
 @pytest.mark.parametrize("name", RIGS)

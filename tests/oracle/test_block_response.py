@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sparse
 from numpy.polynomial import legendre
+from recording import stored
 from scipy.sparse.linalg import splu
 
 from stiction.elasticity.blocks import Pushes, block_response, glued_pressure
@@ -110,14 +111,7 @@ def middles(length, nodes):
     return (np.arange(nodes) + 0.5) * length / nodes
 
 
-PUSHES = {
-    "at the top": (0.5, 0.35, "stress", 0.8, 1.0, 1e-5),
-    "at the interface": (1.0, 0.2, "strain", 0.0, 0.25, 2e-4),
-    "all of a flat side": (0.15, 0.45, "strain", 0.0, 1.0, 2e-4),
-    "high on a tall block": (3.0, -0.3, "stress", 0.9, 0.97, 1e-5),
-}
-
-
+PUSHES = stored("cases")["pushes"]
 LENGTH, SLOW = 1.0, pytest.mark.slow
 
 

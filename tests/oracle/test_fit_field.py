@@ -5,6 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 import scipy.stats
+from recording import stored
+from setups import examples
 
 import stiction as st
 from stiction.inference.estimate import BestFit, FitSetting, estimate, windowed
@@ -18,16 +20,7 @@ VALUES = st.Lognormal(mean=1e6, cv=0.25, low=0.2e6).distribution.rvs(800, random
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("weibull", "gamma")]
 
 
-@pytest.mark.parametrize(
-    ("given", "family", "fixed"),
-    [
-        ({"type": "lognormal", "low": 0.2e6}, "lognorm", {"floc": 0.2e6}),
-        ({"type": "gamma", "low": 0.2e6}, "gamma", {"floc": 0.2e6}),
-        ({"type": "weibull", "low": 0.2e6}, "weibull_min", {"floc": 0.2e6}),
-        ({"type": "beta", "low": 1e5, "high": 4e6}, "beta", {"floc": 1e5, "fscale": 3.9e6}),
-        ({"type": "normal"}, "norm", {}),
-    ],
-)
+@pytest.mark.parametrize(("given", "family", "fixed"), stored("cases")["families of scipy"])
 def test_marginals_are_scipys_of_greatest_likelihood(given, family, fixed):
     ours = family_of(given).fit(VALUES).distribution
     scipys = getattr(scipy.stats, family)
@@ -42,12 +35,7 @@ def test_marginals_are_scipys_of_greatest_likelihood(given, family, fixed):
 @pytest.mark.parametrize("name", ["lognormal", "beta", *SLOW])
 def test_noise_is_taken_out_of_a_marginal(name):
     """Of many independent values: two per cent of the standard deviation, by sampling."""
-    truth = {
-        "lognormal": st.Lognormal(mean=1e6, cv=0.25),
-        "weibull": st.Weibull(mean=1e6, cv=0.25),
-        "gamma": st.Gamma(mean=1e6, cv=0.25),
-        "beta": st.Beta(alpha=1.5, beta=3.0, low=0.5e6, high=2e6),
-    }[name]
+    truth = examples("strengths with noise")[name]
     rng = np.random.default_rng(3)
     quiet = truth.distribution.rvs(20_000, random_state=rng)
     noise = 0.3 * quiet.std()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 from checks import standard_error
+from recording import stored
 from setups import EXACT, LOCAL, QUARTER, ensemble, gradient_load, turns
 from specimens import crooked
 
@@ -37,23 +38,12 @@ def lognormal(cv):
 
 
 SMALL, LARGE = ("marginal.low", (0.1, 0.3), 0.2), ("marginal.low", (0.4e6, 0.8e6), 0.6e6)
-CASES = {
-    "coefficients": (problem(normal_pressure=3e6), coefficient, LOCAL, *SMALL, 30),
-    "coefficients under a pressure that varies": (
-        problem(normal_pressure=3e6 * WAVE), coefficient, LOCAL, *SMALL, 30,
-    ),
-    "gradient load": (problem(profile=GRADIENT), beta, LOCAL, *LARGE, 30),
-    "residual strength": (problem(64, 0.25, residual_ratio=0.5), beta, EXACT, *LARGE, 30),
-    "lap joint in which nodes stop": (
-        crooked(
-            nodes=24, height=0.009, weakening_rate=0.04e12, residual=0.2e6,
-            drive=st.Pusher(height=0.004, width=0.003, side="both", stiffness=np.inf),
-        ), beta, EXACT, *LARGE, 30,
-    ),
-    "beyond what the local criterion finds": (
-        problem(64, 0.25), lognormal, EXACT, "marginal.cv", (0.1, 1.5), 0.9, 60,
-    ),
-}  # fmt: skip
+LAP_JOINT = crooked(
+    nodes=24, height=0.009, weakening_rate=0.04e12, residual=0.2e6,
+    drive=st.Pusher(height=0.004, width=0.003, side="both", stiffness=np.inf),
+)  # fmt: skip
+CASES = {name: eval(row) for name, row in stored("cases")["posteriors"].items()}
+"""Problem, field by value, method, key, prior, the right value, and the number of peaks."""
 
 
 def simulate(base, field, method, samples, seed):

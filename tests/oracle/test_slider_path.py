@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+from recording import stored
 from rigs import LoadSteps
 
 from stiction.elasticity.columns import Body
@@ -25,26 +26,15 @@ from stiction.methods.equilibrium.slider import (
 )
 
 N = 1e6 * 0.14  # 1 MPa
-ACRYLIC = (1.11e9, 2.65 / 1.35)
-RIGS = {
-    "acrylic": {"push": (0.002, 0.006)},
-    "steel base": {"base": Body(0.03, 77e9, 2.7 / 1.3)},
-    "soft base, tilt": {"base": Body(0.03, 0.18e9, 2.6 / 1.4), "tilt": -0.6},
-    "plate": {"pressing": "plate", "push": (0.05, 0.06)},
-    "short base, high push": {"behind": 0.0, "ahead": 0.0, "push": (0.028, 0.032)},
-}
+RIGS = stored("cases")["rigs of paths"]
 
 
 @functools.lru_cache
 def rig(name):
     """A rig of 24 cells, as arrays of one kind."""
-    usual = {
-        "base": Body(0.03, *ACRYLIC),
-        "push": (0.004, 0.008),
-        "behind": 0.05,
-        "ahead": 0.05,
-    }
-    *arrays, C = contact_rig(0.14, 24, Body(0.075, *ACRYLIC), **usual | RIGS[name])
+    base, push = Body(*RIGS[name]["base"]), tuple(RIGS[name]["push"])
+    given = RIGS[name] | {"base": base, "push": push}
+    *arrays, C = contact_rig(0.14, 24, Body(0.075, 1.11e9, 2.65 / 1.35), **given)
     return Rig(*(array.copy() for array in arrays), C)
 
 

@@ -6,14 +6,13 @@ objects beside the table of a study in which they stand.
 """
 
 import dataclasses
-import json
 import math
 import re
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from recording import stored
 from setups import LOCAL, SOLID, beta_strength, make_problem
 from small_study import small_study
 
@@ -23,7 +22,7 @@ SCOPE = {
     "st": st, "np": np, "partial": partial, "dataclasses": dataclasses, "LOCAL": LOCAL,
     "SOLID": SOLID, "PROBLEM": make_problem(), "FIELD": beta_strength(4e-3),
 }  # fmt: skip
-RANGES = json.loads((Path(__file__).parents[1] / "records" / "ranges.json").read_text())
+RANGES = stored("ranges")
 FIELDS = [
     (eval(text, SCOPE), fields.pop("table"), fields)
     for text, fields in RANGES["fields"].items()
@@ -34,12 +33,7 @@ CALLED = [
     for text, names in RANGES["calls"].items()
     for name, valid in names.items()
 ]
-WHOLE = ("nodes", "events", "samples", "seed", "first", "every", "max_steps", "workers")
-WHOLE += ("max_evaluations", "bootstrap")
-PROFILES = ("normal_pressure", "profile", "weakening_rate", "residual_strength")
-PROFILES += ("critical_slip", "residual_ratio", "fracture_energy")
-OPTIONAL = ("width", "ends", "thickness", "power_kept", "anisotropy", "end_time")
-OPTIONAL += ("loading_rate", "workers", "max_evaluations", "pressing_force", *PROFILES)
+WHOLE, PROFILES, OPTIONAL = (RANGES[kind] for kind in ("whole", "profiles", "optional"))
 OTHERS = ("1.5", "", [], {}, 1j, math.nan, -math.inf)
 
 
@@ -54,7 +48,7 @@ def wrong_values(name, valid):
     wrong += [] if valid[-4:] == "inf]" else [math.inf]
     if valid == "flag":
         return [*wrong, 0, 1, 1.0, np.ones(1)]
-    wrong += [True, False, *([] if name in OPTIONAL else [None])]
+    wrong += [True, False, *([] if name in [*OPTIONAL, *PROFILES] else [None])]
     if isinstance(valid, list):
         return [*wrong, valid[0].upper(), f" {valid[0]}"]
     low, high, with_low, with_high = borders(valid)
