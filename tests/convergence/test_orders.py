@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from checks import assert_second_order
 from oracles import angle_rule
-from ruptures import STRESS, dip, radiated_energy, stepped
+from ruptures import dip, radiated_energy, stepped
 from setups import QUARTER, exact_onset, make_problem
 
-import stiction as st
 from stiction.methods.criterion.windows import weight
-from stiction.methods.dynamics import method
 
 
 def rupture(nodes, steps):
@@ -45,28 +43,6 @@ def test_slip_converges_with_second_order_in_space():
         fine = reference.slip[:: 2048 // nodes]
         errors.append(np.abs(state.slip - fine).max() / fine.max())
     assert_second_order(errors, 0.8)  # with the kink of the law at d_c between 3.4 and 4.6
-
-
-@pytest.mark.slow
-def test_implicit_steps_approach_the_explicit_solution(monkeypatch):
-    """The same slow onset by explicit steps only, and by implicit steps of two sizes."""
-    problem = make_problem(128, 0.05, solid=STRESS, weakening_rate=2e11)
-    rows = problem.sample(1e6 - 3e5 * dip(problem.interface, 0.025, 0.01))
-
-    def stress(**options):
-        solver = st.Rupture(loading_rate=1e8, **options).prepare(problem)
-        return float(solver(rows)["critical_stress"][0])
-
-    def error(slip_step, load_step):
-        monkeypatch.setattr(method, "SLIP_STEP", slip_step)
-        monkeypatch.setattr(method, "LOAD_STEP", load_step)
-        return abs(stress() / exact - 1.0)
-
-    exact = stress(implicit=False)
-    coarse, fine = error(0.06, 4e-3), error(0.0075, 5e-4)
-    # Default steps are between the two; 1e-4 is what the onset is asked to be good for.
-    assert coarse < 3e-4
-    assert fine < 5e-5
 
 
 DEPTH = 0.4e6

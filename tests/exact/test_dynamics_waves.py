@@ -68,37 +68,6 @@ def test_stress_inside_a_growing_crack_is_minus_the_drop(mode, speed, short):
     assert inside == pytest.approx(-1.0, abs=1e-6)
 
 
-def released(steps, end, mode="II"):
-    """Amplitude of a slip cos(kx) on an interface without friction law, at c_s k t = end."""
-    # Everything has slipped beyond d_c and slides on at the residual strength.
-    friction = {"weakening_rate": 1e9, "residual_strength": 1e6}
-    problem = make_problem(32, solid=SOLID, mode=mode, **friction)
-    k = problem.interface.wavenumbers[2]
-    slip = 1e-3 + 1e-6 * np.cos(k * problem.interface.x)
-    time = end / (k * SOLID.shear_wave_speed)
-    _, state = stepped(problem, np.full(32, 1.001e6), 2e6, time, steps, slip)
-    return state.slip_hat[2].real / 16.0 / 1e-6
-
-
-def release_by_laplace(t, mode):
-    """a/a_0 = inverse transform of (1 - D0/D)/s."""
-
-    def transform(s):
-        if mode == "III":
-            return (1 - 1 / mode_three_stiffness(s)) / s
-        return (1 - static_stiffness("II", ETA) / mode_two_stiffness(s, ETA)) / s
-
-    return from_laplace(transform, t)
-
-
-@pytest.mark.parametrize("mode", ["II", "III"])
-def test_released_wave_converges_to_the_laplace_solution_with_second_order(mode):
-    expected = release_by_laplace(10.0, mode)
-    errors = [abs(released(steps, 10.0, mode) - expected) for steps in (100, 200, 400)]
-    assert_second_order(errors, 0.3)  # measured between 3.9 and 4.1
-    assert errors[2] < 5e-4
-
-
 ALMOST_INCOMPRESSIBLE = np.sqrt(1.02 / 0.02)
 """In plane strain at nu = 0.49."""
 

@@ -49,7 +49,7 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
 @pytest.mark.parametrize(
     "distribution",
     [
-        *(marginal.distribution for marginal in STRENGTHS.values()),
+        *(marginal.distribution for marginal in [*STRENGTHS.values()][:5]),  # of finite ends
         scipy.stats.triang(0.3, loc=1.0, scale=2.0),
         scipy.stats.invgauss(0.145),  # whose tails scipy inverts poorly
     ],
@@ -323,16 +323,13 @@ def test_multiples_share_one_table(family):
 def test_covariance_of_a_chain_of_properties_with_spectra_of_their_own(nodes):
     """A and B are correlated, B and C: the response to each draw, as a matrix, times itself."""
     plane = isinstance(nodes, tuple)
-    interface = st.Interface((1.0, 0.7) if plane else 1.0, nodes)
+    interface = st.Interface((0.008, 0.006) if plane else 0.008, nodes)
     options = {"anisotropy": 1.3} if plane else {}
-    spectra = {
-        "strength": st.PowerLawSpectrum(0.5),
-        "residual_strength": st.SquaredExponentialSpectrum(0.3),
-        "initial_stress": st.ExponentialSpectrum(0.4, power_kept=0.9),
-    }
+    names = ("strength", "residual_strength", "initial_stress")
+    spectra = dict(zip(names, DENSITIES.values(), strict=True))
     fields = {
         name: st.RandomField(scipy.stats.norm(), spectra[name], name != "strength", **options)
-        for name in spectra
+        for name in names
     }
     chain = {
         ("strength", "residual_strength"): 0.7, ("residual_strength", "initial_stress"): -0.6,

@@ -166,9 +166,6 @@ def test_specimens_of_two_lengths_have_samples_of_their_own():
     assert one.onsets.mean() == pytest.approx(other.onsets.mean(), rel=0.01)
 
 
-ONE = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
-
-
 def test_onsets_moved_to_another_method_are_worth_what_they_say():
     """The scatter of their mean over many campaigns, in a unit of their own."""
     rng, means, alike = np.random.default_rng(5), [], 0.9
@@ -177,7 +174,8 @@ def test_onsets_moved_to_another_method_are_worth_what_they_say():
         rest = rng.standard_normal((1, 100))
         exact = alike * local[:, :100] + np.sqrt(1.0 - alike**2) * rest
         few, many = 0.7e6 + 2e4 * exact, 0.9e6 + 3e4 * local
-        means.append(moved(many, few, many[:, :100], *ONE).mean())
+        node = np.zeros((1, 1), dtype=np.int64), np.ones((1, 1))
+        means.append(moved(many, few, many[:, :100], *node).mean())
     assert np.mean(means) == pytest.approx(0.7e6, abs=4.0 * np.std(means) / 20)
     # 400 campaigns know a variance to 7 %; that of quantiles is 2/(1 + alike) of that of a mean.
     assert effective_samples(alike, 1000, 100) == pytest.approx(

@@ -38,6 +38,7 @@ def test_forces_balance_along_the_path(name):
     machine = slider.drive.stiffness
     if machine == np.inf:  # the machine prescribes the travel
         np.testing.assert_allclose(path.travel, path.crosshead_travel, rtol=1e-12)
+    assert np.isnan(path.crosshead_travel).all() == (machine == 0.0)
     if machine > 0.0:
         along = path.crosshead_travel[1:] / loads[1:]
         np.testing.assert_allclose(along, along[0], rtol=1e-9)

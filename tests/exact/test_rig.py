@@ -44,17 +44,6 @@ def test_motions_of_the_slider_and_sums_of_forces(name):
     assert on_cells(pressed).sum() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_a_block_alone_moves_without_force():
-    """All points of a free block, by the same columns."""
-    n, height = 48, 0.6
-    matrix = block(Body(height, *ACRYLIC), 1.0 / n, n, push=(0.2, 0.25))[:-1, :-1]
-    x = np.linspace(0.0, 1.0, n + 1)
-    for u, v, u_far in ((1.0, 0.0, 1.0), (0.0, 1.0, 0.0), (0.0, -x, height)):
-        parts = (np.full(n, u), np.broadcast_to(v, n + 1))
-        motion = np.concatenate([*parts, np.full(n, u_far), parts[1]])
-        assert abs(matrix @ motion).max() < 1e-13 * matrix.diagonal().max()
-
-
 @pytest.mark.parametrize("pressing", ["soft", "plate"])
 def test_energy_and_betti(pressing):
     """(2) and (3) of the rig against the energy of both bodies at random slip and opening."""
@@ -108,14 +97,13 @@ def test_equal_blocks_on_rollers():
 # -- closed forms of contact mechanics -----------------------------------------------------------
 
 NU = 0.3
-HALF_PLANE, RIGID = (1.0, 3.0 - 4.0 * NU), (1e7, 3.0 - 4.0 * NU)
-E_STAR = 2.0 / (1.0 - NU)  # E/(1 - nu^2) of the base with G = 1
+HALF_PLANE = (1.0, 3.0 - 4.0 * NU)
 
 
 def punch(n: int) -> Rig:
     """A rigid slider of unit length, which does not rotate, on a base twelve times as long."""
     sides = {"behind": 12.0, "ahead": 12.0, "pressing": "plate", "push": None}
-    return contact_rig(1.0, n, Body(1.0, *RIGID), Body(12.0, *HALF_PLANE), **sides)
+    return contact_rig(1.0, n, Body(1.0, 1e7, 3.0 - 4.0 * NU), Body(12.0, *HALF_PLANE), **sides)
 
 
 def sliding(rig: Rig, mu: float) -> np.ndarray:
@@ -155,7 +143,8 @@ def test_hertz():
     on_slip = np.linalg.pinv(rig.K[:n, :n], rcond=1e-10)  # uniform slip changes nothing
     K = rig.K[n:, n:] - rig.K[n:, :n] @ on_slip @ rig.K[:n, n:]
     T = rig.T_p[n:] - rig.K[n:, :n] @ on_slip @ rig.T_p[:n]
-    N, gap = np.pi * E_STAR * half**2 / (4.0 * R), x**2 / (2.0 * R)
+    E_star = 2.0 / (1.0 - NU)  # E/(1 - nu^2) of the base with G = 1
+    N, gap = np.pi * E_star * half**2 / (4.0 * R), x**2 / (2.0 * R)
     closed = abs(x) < 0.2
     for _ in range(30):
         w, opened = -gap, ~closed

@@ -2,14 +2,14 @@
 
 import dataclasses
 import itertools
-from functools import partial
+import json
 
 import numpy as np
 import pytest
 from brute_force import BruteForce, along
 from refusals import warning_texts
 from scipy.linalg import eigvalsh
-from setups import EXACT, LOCAL, exact_onset, examples, without
+from setups import EXACT, exact_onset, examples, without
 from specimens import crooked, rough
 
 import stiction as st
@@ -18,16 +18,11 @@ from stiction.elasticity.protocol import DenseEntries
 from stiction.methods.equilibrium.dense.cholesky import SlipState, make_workspace
 from stiction.methods.equilibrium.dense.search import DenseSearch
 from stiction.methods.equilibrium.dense.stable_path import follow_stable_path
-from stiction.methods.equilibrium.solver import sample_of
 from stiction.methods.equilibrium.state import PathStatus
 from stiction.methods.equilibrium.strength import make_sample, pieces_of
 
 INF = float("inf")
 DRIVES = examples("drives of specimens")
-
-
-def first(problem, strength):
-    return exact_onset(problem, strength).first_instability.values
 
 
 def follow(problem, strength):
@@ -54,23 +49,13 @@ def follow(problem, strength):
     return brute, states
 
 
-def assert_gradient(problem, strength):
-    """By difference quotients along random directions; the path is straight, round-off is 1e-6."""
-    change = np.random.default_rng(3).normal(size=strength.shape) * 20.0
-    found = exact_onset(problem, strength, sensitivity=True)
-    expected = 0.5 * (first(problem, strength + change) - first(problem, strength - change))
-    along = (found.sensitivity.values * change).sum(axis=1)
-    np.testing.assert_allclose(along, expected, rtol=1e-6, atol=1e-6 * 20.0)
-
-
 @pytest.mark.parametrize(
     ("name", "mode"),
     [*zip(DRIVES, itertools.cycle(("II", "III")), strict=False), ("platen", "III")],
 )
-def test_path_against_brute_force_and_its_gradient(name, mode):
+def test_path_against_brute_force(name, mode):
     problem = crooked(nodes=56, weakening_rate=0.12e12, drive=DRIVES[name], mode=mode)
     follow(problem, rough(problem, 3))
-    assert_gradient(problem, rough(problem, 7, 2))
 
 
 def test_a_stiff_machine_on_a_short_specimen_slides_stably():
@@ -108,8 +93,6 @@ def test_nodes_stop_rest_and_slip_again(name):
     problem = dataclasses.replace(problem, friction=LAWS[name])
     strength = rough(problem, 3)
     brute, states = follow(problem, strength)
-    if problem.friction.residual_ratio is None:  # else residual strength changes with it
-        assert_gradient(problem, strength)
     assert min(brute.stops, brute.stops_in_jumps, states.jumps.sum(), states.rests) > 0
     assert brute.stops_at_corners > 0 or name != "two pieces, steeper"
     assert states.again > 0 or name == "two pieces"
@@ -153,13 +136,6 @@ def test_a_path_that_is_given_up_at_once_knows_the_largest_stress():
     assert end.peak == pytest.approx(1.4 - 0.5 * slip.mean(), rel=1e-14)
 
 
-def test_windows_become_the_onset_where_nothing_interacts():
-    problem = crooked(nodes=256, residual=0.0, load=st.Load())
-    smooth = 1e6 + 3e5 * (problem.interface.x / 0.083 - 0.3) ** 2
-    bound = st.onset(problem, smooth, method=LOCAL, progress=False).first_instability
-    assert first(problem, smooth) == pytest.approx(bound.values, rel=3e-3)
-
-
 @pytest.mark.parametrize("rate", [0.6e12, 0.035e12, 0.034e12, 0.032e12, 0.03e12])
 def test_shortest_runs_are_just_unstable_from_one_end_to_the_other(rate):
     """By trying every first node; of wide runs, as many as a run has thirty-seconds."""
@@ -175,46 +151,6 @@ def test_shortest_runs_are_just_unstable_from_one_end_to_the_other(rate):
     width = max(end - begin for begin, end in ends.items())
     assert width > (64 if rate < 1e11 else 3)
     assert np.diff([*runs]).max() <= max(1, width // 32)
-
-
-@pytest.mark.parametrize(("wavy", "close"), [(0.0, 0.01), (0.4, 0.07)])
-def test_the_multiplier_of_the_weakest_window_proves_its_bound(wavy, close):
-    """Rates that vary have the windows of the lowest one, which are less close."""
-    weakening_rate = 0.19e12 * (1.0 + wavy * np.sin(7.0 * np.linspace(0.0, 1.0, 96)))
-    problem = crooked(weakening_rate=weakening_rate, residual=0.0)
-    strength = rough(problem, 11, 8)
-    exact = first(problem, strength)
-    search, rows = DenseSearch(problem), problem.sample(strength)
-    above = []
-    for i, stress in enumerate(exact):
-        sample = sample_of(rows, search.pieces, i)
-        bound, multiplier = search.bound(sample)
-        assert multiplier.min() >= 0.0
-        assert multiplier @ sample.profile == pytest.approx(1.0)
-        assert multiplier @ sample.excess == pytest.approx(bound)
-        pushed = problem.blocks.stiffness @ multiplier - sample.weakening_rate * multiplier
-        assert pushed.max() < 1e-12 * np.abs(pushed).max()
-        above.append(bound / (stress - problem.load.initial_stress.mean()) - 1.0)
-    assert min(above) > -1e-12
-    assert np.median(above) < close
-
-
-def test_positive_entries_of_the_stiffness_are_doubted():
-    """Of flat blocks behind a rigid machine in mode II; not those that are within its error."""
-    for mode, drive, doubted in (
-        ("II", st.Platen(stiffness=INF), True),
-        ("II", st.Platen(), False),
-        ("II", st.Pusher(height=0.002, width=0.001), False),
-        ("III", st.Platen(stiffness=INF), False),
-    ):
-        flat = 0.0085 if isinstance(drive, st.Pusher) else 0.012
-        problem = crooked(height=flat, drive=drive, mode=mode)
-        off = problem.blocks.stiffness - np.diag(np.diag(problem.blocks.stiffness))
-        assert off.max() > 0.0 or not isinstance(drive, st.Pusher)
-        solve, rows = st.Equilibrium().prepare(problem), problem.sample(rough(problem, 3))
-        for _ in range(2):  # of what is prepared once, too
-            texts = warning_texts(partial(solve, rows))
-            assert sum("off its diagonal, up to 2e-07" in text for text in texts) == doubted
 
 
 def test_a_drive_that_dies_away_is_not_reversed():
@@ -249,32 +185,13 @@ def test_the_peak_is_said_to_be_residual_and_gaps_are_shares_of_the_first_instab
     assert any(f"up to {share:.2g} of the load apart" in text for text in texts)
 
 
-def test_forces_and_travel():
-    """The machine's line through every event."""
-    k = 2.5e7
-    problem = crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=k), load=st.Load())
-    strength = rough(problem, 4)
-    path = st.equilibrium_path(problem, strength, [1e5, 3e5])
-    assert len(path.event) > 2
-    # At rest of the machine's far end, force falls along its stiffness.
-    np.testing.assert_allclose(
-        path.event_force_drop, k * path.event_travel_step, rtol=1e-6, atol=1e-9
-    )
-    for other, gives in ((INF, 0.0), (0.0, np.nan)):
-        drive = st.Pusher(height=0.004, width=0.003, stiffness=other)
-        path = st.equilibrium_path(crooked(drive=drive, load=st.Load()), strength, [1e5])
-        np.testing.assert_array_equal(path.crosshead_travel - path.travel, [gives])
-
-
 def test_pressure():
     """Coefficients times p(x), in every place that it enters."""
     pressed = dataclasses.replace(
         crooked(load=st.Load(normal_pressure=2e6)),
         specimen=st.Blocks(height=0.031, pressing="glued"),
     )
-    p, spectrum = pressed.normal_pressure, st.PowerLawSpectrum(correlation_length=4e-3)
-    assert p.mean() == pytest.approx(2e6)
-    assert p[0] < 0.95 * p[48]
+    spectrum = st.PowerLawSpectrum(correlation_length=4e-3)
     marginal, of_what = st.Lognormal(mean=0.5, cv=0.1), {"quantity": "friction_coefficient"}
     pressures = st.Beta(alpha=1.3, beta=1.95, low=1.5e6, high=2.4e6)
     drawn = st.RandomInterface(
@@ -282,19 +199,18 @@ def test_pressure():
         normal_pressure=st.RandomField(pressures, spectrum),
     )
     bare = without(pressed, "load.normal_pressure")
-    found = st.monte_carlo(
-        bare, drawn, method=EXACT, samples=3, keep=("strength", "normal_pressure")
-    )
+    given = {"method": EXACT, "samples": 3, "keep": ("strength", "normal_pressure")}
+    found = st.monte_carlo(bare, drawn, progress=False, **given)
     field = drawn.profiles(pressed.interface, samples=3, seed=0)
-    p = field["normal_pressure"] * p / 2e6
+    p = field["normal_pressure"] * pressed.normal_pressure / 2e6
+    assert p[0, 0] < 0.95 * p[0, 48]
     np.testing.assert_allclose(found.normal_pressure, p)
     np.testing.assert_allclose(found.strength, field["strength"] * p)
-    np.testing.assert_allclose(
-        found.friction_coefficient, found.critical_stress / p.mean(axis=1), rtol=1e-12
-    )
+    coefficient = found.critical_stress / p.mean(axis=1)
+    np.testing.assert_allclose(found.friction_coefficient, coefficient, rtol=1e-12)
 
 
-def test_a_swept_rigid_machine_is_stored(tmp_path):
+def test_a_swept_rigid_machine_is_stored():
     """Infinity has no number in JSON: it is written as text, and read again."""
     problem = crooked(drive=DRIVES["right pusher, rigid"], nodes=64, load=st.Load())
     endless = dataclasses.replace(problem.specimen, quality_factor=INF)
@@ -304,9 +220,5 @@ def test_a_swept_rigid_machine_is_stored(tmp_path):
         random=st.RandomField(st.Lognormal(mean=1.0e6, cv=0.2), st.PowerLawSpectrum(9e-3)),
         method=EXACT, samples=2, sweep=[{"problem.specimen.drive.stiffness": [0.0, INF]}],
     )  # fmt: skip
-    assert study.to_dict()["problem"]["specimen"]["quality_factor"] == "inf"
-    found = study.run(out=tmp_path / "run", pilot=False)
-    again = st.open_run(tmp_path / "run")
-    assert again.study.problem.specimen == problem.specimen
-    np.testing.assert_array_equal(again.dataset().stiffness, [0.0, INF])
-    np.testing.assert_array_equal(again.dataset().critical_force, found.critical_force)
+    again = json.loads(json.dumps(study.to_dict(), allow_nan=False))
+    assert st.Study.from_dict(again) == study

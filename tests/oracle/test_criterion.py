@@ -86,21 +86,20 @@ def doubts(problem, tau_p):
     return local, exact_onset(problem, tau_p).critical_stress.values, texts
 
 
-@pytest.mark.parametrize("kind", ["line", "rough line", "ends", "plane", "specimen"])
+DOUBTED = {  # problem, scatter, and the correlation length over the nucleation length
+    "line": (make_problem(128, 0.0144, residual_ratio=0.3), 0.3, 0.5),  # 30 nodes in h_n
+    "rough line": (make_problem(512), 0.35, 0.1),
+    # Nodes near ends take over what windows leave out.
+    "ends": (within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH)), 0.3, 0.5),
+    "plane": (make_problem((24, 24), (0.012, 0.012), residual_ratio=0.75), 0.3, 0.5),
+    "specimen": (crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=3e7)), 0.1, 0.5),
+}
+
+
+@pytest.mark.parametrize("kind", DOUBTED)
 def test_onset_says_how_far_the_local_criterion_is_off(kind):
     """Nodes at their residual strength, a short correlation length, ends, and a low pusher."""
-    spread, share = 0.3, 0.5
-    if kind == "line":
-        problem = make_problem(128, 0.0144, residual_ratio=0.3)  # 30 nodes in h_n
-    elif kind == "rough line":
-        problem, spread, share = make_problem(512), 0.35, 0.1
-    elif kind == "ends":  # take over what windows near them leave out
-        problem = within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH))
-    elif kind == "plane":
-        problem = make_problem((24, 24), (0.012, 0.012), residual_ratio=0.75)
-    else:
-        spread = 0.1
-        problem = crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=3e7))
+    problem, spread, share = DOUBTED[kind]
     size = problem.nucleation_length
     tau_p = lognormal(share * size, spread).sample(problem.interface, samples=40, seed=11)
     local, exact, (text,) = doubts(problem, tau_p)

@@ -1,7 +1,5 @@
 """Onsets where nothing is symmetric, against a linear programme and a sum over the patch."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from crooked import LINE, LINE_STRENGTH, PLANE, PLANE_STRENGTH, across_the_seam, uneven
@@ -166,15 +164,3 @@ def test_cracks_across_the_seam_under_an_uneven_load():
         found = griffith_length(LINE, 1.5e5, 8e-3, centre=0.033, arrest=arrest)
         assert found == pytest.approx(lengths[end] - 23e-6, abs=26e-6)
         assert griffith_length(LINE, 1e3, 8e-3, arrest=arrest) == np.inf
-
-
-def test_the_gap_of_both_bounds_has_no_unit_of_load():
-    """Twice the profile halves the load, and nothing else."""
-    friction = dataclasses.replace(PLANE.friction, residual_strength=0.0)
-    gaps = []
-    for factor in (1.0, 2.0):
-        load = dataclasses.replace(PLANE.load, profile=factor * PLANE.load.profile)
-        problem = dataclasses.replace(PLANE, friction=friction, load=load)
-        gaps.append(exact_onset(problem, PLANE_STRENGTH, tolerance=1e-3).certificate_gap.item())
-    assert gaps[1] == pytest.approx(gaps[0], rel=1e-6)
-    assert gaps[0] > 0.0

@@ -46,13 +46,3 @@ def test_correlation_of_a_long_interface_with_its_mean_mode_is_that_of_gstools()
     # Truncation at 10 lambda leaves out 4e-8 of the power.
     found = field.correlation(interface, of="z")[:100]
     np.testing.assert_allclose(found, expected, atol=1e-7)
-
-
-@pytest.mark.parametrize("exponent", [0.65, 0.75, 0.9, 1.0, 2.0, 4.0, 16.0])
-def test_every_exponent_of_a_fit_can_be_sampled(exponent):
-    """The range of fitted exponents, on an interface of 100 correlation lengths."""
-    field = st.RandomField(
-        st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(1e-3, exponent=exponent), True
-    )
-    modes = field.modes(st.Interface(length=0.1, nodes=512))
-    assert np.sum(modes.sigma**2) == pytest.approx(1.0, rel=1e-12)

@@ -15,20 +15,12 @@ LAWS["eight pieces"] = st.PiecewiseWeakening.from_law(
 )
 
 
-def short(law):
-    """Six nucleation lengths of 16 nodes, of a rate of 0.5e12 Pa/m."""
-    return make_problem(96, 0.0185, friction=law)
-
-
-def wide_strength(interface, seed):
-    field = beta_strength(0.004, 0.5e6, 3e6, mean_mode=True)
-    return field.sample(interface, samples=1, seed=seed)[0]
-
-
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_equilibria_along_polygons_against_relaxation(law):
-    problem = short(law)
-    strength = wide_strength(problem.interface, 3)
+    # Six nucleation lengths of 16 nodes, of a rate of 0.5e12 Pa/m.
+    problem = make_problem(96, 0.0185, friction=law)
+    field = beta_strength(0.004, 0.5e6, 3e6, mean_mode=True)
+    strength = field.sample(problem.interface, samples=1, seed=3)[0]
     critical = exact_onset(problem, strength).critical_load.item()
     loads = critical * np.array([0.95, 1.0 - 5e-4])
     path = st.equilibrium_path(problem, strength, loads)

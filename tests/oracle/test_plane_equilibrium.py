@@ -32,8 +32,6 @@ from stiction.methods.equilibrium.transforms.relaxation import stable_equilibriu
 from stiction.methods.equilibrium.transforms.turning_point import close_by_newton
 
 NODES = (24, 24)
-SQUARE = (3.0 * LENGTH, 3.0 * LENGTH)
-WIDE = (5.0 * LENGTH, 5.0 * LENGTH)
 
 
 def noise(correlation, seed, shape=NODES):
@@ -45,7 +43,7 @@ def noise(correlation, seed, shape=NODES):
 )
 def test_bounds_and_multiplier_equal_the_linear_programme(seed, wavenumbers):
     rng, shape = np.random.default_rng(seed), (26, 24)
-    plane = WAVENUMBERS[wavenumbers](SQUARE, moduli(1e9, 0.33))
+    plane = WAVENUMBERS[wavenumbers]((3.0 * LENGTH, 3.0 * LENGTH), moduli(1e9, 0.33))
     strength = 0.66e6 + 1e6 * smooth_noise(rng.choice([2.0, 4.0, 8.0]), rng, shape)
     if seed == 0:  # rough
         strength *= rng.uniform(0.9, 1.1, shape)
@@ -111,7 +109,7 @@ def test_lowest_eigenvector_equals_a_dense_one():
 @pytest.fixture(scope="module")
 def wide():
     """Strength over a wide range, so that ruptures are arrested: a problem and three samples."""
-    problem = make_problem((32, 32), WIDE, residual_strength=3.5e5)
+    problem = make_problem((32, 32), (5.0 * LENGTH, 5.0 * LENGTH), residual_strength=3.5e5)
     return problem, np.array([0.4e6 + 4.6e6 * noise(5.0, s, (32, 32)) for s in (20, 23, 0)])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from crooked import LINE, uneven
 from importance import by_importance
+from recording import stored
 from setups import EXACT, LOCAL, SOLID, beta_strength, ensemble, make_problem, without
 
 import stiction as st
@@ -23,63 +24,37 @@ PROBLEM = st.paper.problem(nodes=256)
 SYSTEM = PROBLEM, st.paper.strength(PROBLEM, 0.5)
 
 
-def by(system, stress, algorithm, cv, *, method=LOCAL, seed=0):
+def by(system, stress, algorithm, cv, method=LOCAL):
     if algorithm == "importance":
-        return by_importance(*system, stress, method, cv, seed=seed)
-    options = {"method": method, "algorithm": algorithm, "target_cv": cv, "seed": seed}
+        return by_importance(*system, stress, method, cv)
+    options = {"method": method, "algorithm": algorithm, "target_cv": cv}
     return st.failure_probability(*system, stress, **options)
 
 
-def assert_agree(one, other):
-    """Within four joint standard errors of their logarithms."""
-    error = math.hypot(one.cv, other.cv)
-    assert abs(math.log(one.probability / other.probability)) < 4.0 * error
+ALGORITHMS = stored("cases")["algorithms"]
+MANY = [pytest.param(*row, marks=pytest.mark.slow) for row in ALGORITHMS["slow"]]
 
 
-# P is about 1e-2 and 1e-4.
 @pytest.mark.parametrize(
-    ("stress", "cvs", "least"),
-    [
-        (0.679e6, (0.07, 0.1, 0.05), 0),
-        pytest.param(0.6656e6, (0.2, 0.07, 0.04), 100_000, marks=pytest.mark.slow),
-    ],
+    ("ratio", "stress", "exact", "one", "other"), ALGORITHMS["quick"] + MANY
 )
-def test_subset_and_importance_against_plain_monte_carlo(stress, cvs, least):
-    algorithms = "plain", "subset", "importance"
-    plain, subset, importance = (
-        by(SYSTEM, stress, algorithm, cv) for algorithm, cv in zip(algorithms, cvs, strict=True)
-    )
-    assert plain.evaluations > least
-    assert_agree(subset, plain)
-    assert_agree(importance, plain)
+def test_algorithms_agree(ratio, stress, exact, one, other):
+    """Within four joint standard errors of logarithms, at P of about 1e-2, 1e-4 (slow) and 1e-6.
 
-
-def test_importance_against_subset_at_one_in_a_million():
-    shifted = by(SYSTEM, 0.6617e6, "importance", 0.05)
-    assert 0.3e-6 < shifted.probability < 3e-6
-    assert shifted.effective_size > 100
-    assert_agree(by(SYSTEM, 0.6617e6, "subset", 0.15), shifted)
-
-
-def test_two_levels_and_importance_agree_on_equilibrium():
-    two = by(SYSTEM, 0.6617e6, "two_level", 0.2, method=EXACT)
-    assert_agree(two, by(SYSTEM, 0.6617e6, "importance", 0.07, method=EXACT))
+    By equilibrium also at xi_0/h_n = 0.25, where interaction lowers the typical onset most.
+    """
+    system, method = (PROBLEM, st.paper.strength(PROBLEM, ratio)), EXACT if exact else LOCAL
+    first, second = (by(system, stress, *how, method) for how in (one, other))
+    apart = math.log(first.probability / second.probability)
+    assert abs(apart) < 4.0 * math.hypot(first.cv, second.cv)
     # The exact limit state is asked for a few hundred samples a run, not a few thousand a level.
-    assert two.evaluations < 0.2 * two.first_stage_evaluations
-
-
-def test_two_levels_where_patches_interact():
-    """At xi_0/h_n = 0.25 interaction lowers the typical onset most; subset takes no short cut."""
-    system = PROBLEM, st.paper.strength(PROBLEM, 0.25)
-    two = by(system, 0.684e6, "two_level", 0.2, method=EXACT)
-    whole = by(system, 0.684e6, "subset", 0.3, method=EXACT)
-    assert whole.probability < 1e-3
-    assert_agree(two, whole)
+    if one[0] == "two_level" and other[0] == "importance":
+        assert first.evaluations < 0.2 * first.first_stage_evaluations
 
 
 def test_design_stress_has_the_probability_asked_for():
     answer = st.design_stress(*SYSTEM, probability=1e-5, method=EXACT, target_cv=0.2)
-    back = by(SYSTEM, answer.stress, "importance", 0.07, method=EXACT)
+    back = by(SYSTEM, answer.stress, "importance", 0.07, EXACT)
     error = math.hypot(answer.cv, back.cv)
     assert abs(math.log(back.probability / 1e-5)) < 4.0 * error
     low, high = answer.interval["stress"]
