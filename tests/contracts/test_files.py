@@ -17,6 +17,7 @@ from contracts.bodies import BODIES, FIELD, WITH_ENDS, field_of, profiles_of, wo
 
 import stiction as st
 from stiction.cli.pages import _inputs, _slip_tests
+from stiction.methods.dynamics import scec
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 QUIET = {"progress": False}
@@ -36,7 +37,9 @@ def rupture(name: str) -> Any:
 @pytest.mark.parametrize("name", ["line", "line with ends", "plane with ends"])
 def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
     run, place = rupture(name)
-    options = {"origin": place, "normal_stress": -2e6, "benchmark": "a contract"}
+    origin = np.atleast_1d(place) - 0.0013
+    options = {"origin": origin, "normal_stress": -2e6, "benchmark": "a contract"}
+    dims, known = run.arrival_time.dims, {"normal_stress": -2e6}
     for file in st.external.write_scec(run, tmp_path, **options):
         lines = file.read_text().splitlines()
         about = dict(
@@ -45,19 +48,30 @@ def test_a_file_for_scec_holds_what_its_header_says(name, tmp_path):
         numbers = np.array([row.split() for row in lines if row[0] not in "#tj"], dtype=float)
         if "num_time_steps" in about:
             assert int(about["num_time_steps"]) == len(numbers)
-            assert numbers.shape[1] == sum("Column" in line for line in lines)
             assert (np.diff(numbers[:, 0]) > 0.0).all()
-            kept = run.step_time.values - run.step_time.values[-1] + numbers[-1, 0]
-            np.testing.assert_allclose(numbers[1:, 0], kept[1 - len(numbers) :], atol=1e-6)
-            # Slip, slip rate and stress of the station at each step, in m, m/s and MPa.
-            for key, factor in (("slip", 1.0), ("slip_rate", 1.0), ("shear_stress", 1e-6)):
-                kept = factor * np.ravel(run[f"station_{key}"].values)[1 - len(numbers) :]
-                near = np.abs(numbers[1:].T - kept) <= 1e-5 * np.abs(kept) + 1e-12
-                assert near.all(axis=1).any(), key
+            for key in ("slip", "slip_rate", "shear_stress"):
+                known[key] = np.ravel(run[f"station_{key}"].values)[1 - len(numbers) :]
+            known["time"] = run.step_time.values[1 - len(numbers) :] - float(run.onset_time)
+            titles = [line.partition(" = ")[2] for line in lines if "Column" in line]
+            for title, column in zip(titles, numbers[1:].T, strict=True):
+                key = title.partition(" (")[0].removeprefix("horizontal ").replace(" ", "_")
+                expected = known.get(key, 0.0) * (
+                    1e-6 if "MPa" in title else 1.0
+                )  # 0: vertical
+                np.testing.assert_allclose(column, expected, rtol=1e-5, atol=1e-12, err_msg=key)
+            at = [float(number) for number in re.findall(r"(\S+) m ", about["location"])]
+            away = [run[f"station_{dim}"].item() for dim in dims] - origin
+            assert at[: len(dims)] == pytest.approx(away, rel=1e-5)
         else:
-            assert len(numbers) == BODIES[name].interface.size
+            nodes = np.meshgrid(*(run[dim].values for dim in dims), indexing="ij")
+            for column, grid, start in zip(numbers.T, nodes, origin, strict=False):
+                np.testing.assert_allclose(column, grid.ravel() - start, rtol=1e-6, atol=1e-12)
             since = run.arrival_time.values.ravel() - float(run.onset_time)
             np.testing.assert_allclose(numbers[:, -1], np.nan_to_num(since, nan=1e9), rtol=1e-6)
+    far = scec._file_names([[7500.0, 4500.0], [-1200.0, 0.0]], ["a", "b"])
+    assert far == ["faultst075dp045.txt", "faultst-12dp000.txt"]
+    near = scec._file_names([[12.0, 0.0], [8.0, 0.0]], ["a", "b"])
+    assert near == ["faultst000.12dp000.00.txt", "faultst000.08dp000.00.txt"]
     for wrong in ({"normal_stress": 2e6}, {"origin": np.inf}, {"origin": (0.0, 0.0, 0.0)}):
         with pytest.raises(st.InputError, match=r"normal_stress|origin"):
             st.external.write_scec(run, tmp_path, **options | wrong)
