@@ -48,6 +48,7 @@ LINES = {  # what a command says, spaces apart, and how it ends
     ]),
     "report run": (1, ["report: run/report.html", "the report shows 154 of 420 samples"]),
     "export run all.nc --partial": (0, ["154 of 420 samples written to all.nc; the others are"]),
+    "export run some.nc": (1, ["run: 154 of 420 samples exist. Run the study again"]),
     "example new.toml": (0, ["study: new.toml"]),
 }  # fmt: skip
 
@@ -116,6 +117,7 @@ def test_tables_of_a_run_hold_the_statistics_of_its_samples(say):
     said, _ = say("run study.toml"), say("report run")
     page = html.unescape(re.sub(r"(<[^>]+>|\n)+", "|", Path("run/report.html").read_text()))
     assert page.partition("Samples that failed (266)")[2].count(LOST) == 200
+    assert "154 of 420 samples by local criterion.|The run is not complete.|" in page
     result = st.open_run("run").dataset().stack(point=["correlation_length", "width"])
     for key in ("critical_stress", "friction_coefficient", "critical_force"):
         values, count = result[key].transpose("point", "sample").values, np.array(SOLVED)
@@ -173,8 +175,11 @@ def test_each_answer_names_its_point_and_has_its_page(tmp_path, monkeypatch, run
 
 def test_a_result_says_which_samples_failed_and_how_many_were_not_tried(tmp_path, monkeypatch):
     study, quiet = dataclasses.replace(STUDY, sweep=[], samples=12), {"progress": False}
-    study.run(out=tmp_path / "run", part="1/2", pilot=False, **quiet)
-    part = st.open_run(tmp_path / "run").dataset()
+    for number in (2, 1):  # the first part compares some samples with the exact onset
+        study.run(out=tmp_path / f"run{number}", part=f"{number}/2", **quiet)
+        part = st.open_run(tmp_path / f"run{number}").dataset()
+        assert (tmp_path / f"run{number}" / "pilot.json").exists() == (number == 1)
+        assert (part.attrs["title"], part.attrs["seed"]) == ("a sweep", 3)
     assert part.attrs["cut_short"] == "6 of 12 samples are done"
     assert "failed_samples" not in part.attrs
     monkeypatch.setattr(Experiment, "results", losing)
