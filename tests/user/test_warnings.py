@@ -20,8 +20,11 @@ def joint(samples, **options):
     )
     given = {"method": st.Equilibrium(), "samples": samples, "progress": False} | options
     with pytest.warns(st.AccuracyWarning) as caught:
-        st.monte_carlo(problem, beta_strength(1.75e-3), **given)
-    return [str(one.message) for one in caught if "stops before" in str(one.message)]
+        found = st.monte_carlo(problem, beta_strength(1.75e-3), **given)
+    told = [str(one.message) for one in caught if "stops before" in str(one.message)]
+    stopped = np.isnan(found.certificate_gap).sum().item()  # then no bound is known
+    assert all(f" in {stopped} of" in text for text in told)
+    return told
 
 
 def test_one_warning_for_all_batches_threads_and_processes(monkeypatch):
