@@ -136,15 +136,15 @@ def test_a_path_that_is_given_up_at_once_knows_the_largest_stress():
     assert end.peak == pytest.approx(1.4 - 0.5 * slip.mean(), rel=1e-14)
 
 
-@pytest.mark.parametrize("rate", [0.6e12, 0.035e12, 0.034e12, 0.032e12, 0.03e12])
+@pytest.mark.parametrize("rate", [0.9e12, 0.025e12, 0.017e12])
 def test_shortest_runs_are_just_unstable_from_one_end_to_the_other(rate):
     """By trying every first node; of wide runs, as many as a run has thirty-seconds."""
-    matrix, ends, end = crooked(nodes=160).blocks.stiffness, {}, 1
-    for begin in range(160):
+    matrix, ends, end = crooked(nodes=256).blocks.stiffness, {}, 1
+    for begin in range(256):
         end = max(end, begin + 1)
-        while end <= 160 and eigvalsh(matrix[begin:end, begin:end])[0] >= rate:
+        while end <= 256 and eigvalsh(matrix[begin:end, begin:end])[0] >= rate:
             end += 1
-        ends |= {begin: end} if end <= 160 else {}
+        ends |= {begin: end} if end <= 256 else {}
     runs = dict(shortest_runs(matrix, rate))
     assert runs.items() <= ends.items()
     assert [min(runs), max(runs)] == [min(ends), max(ends)]
