@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import xarray as xr
+from recording import stored
 from setups import beta_strength
 
 import stiction as st
@@ -95,18 +96,15 @@ def test_mean_and_deviation_are_those_of_dense_kriging(interface, shift, mean_mo
 
 
 LOGNORMAL, BETA = st.Lognormal(mean=1e6, cv=1.0), FIELD.marginal
-SKEWED = {  # marginal, places, values, noise, values at each place
-    "one": (LOGNORMAL, [0.011], [3e6], 1e6, 1),
-    "three": (LOGNORMAL, [0.011, 0.0137, 0.0171], [3e6, 2e6, 1.4e6], 1e6, 1),
-    "at a bound": (BETA, [0.011, 0.0131], [0.65e6, 0.67e6], 20e3, 1),
-    "many with a great error": (st.Lognormal(mean=1e6, cv=0.25), [0.011], [0.9e6], 2.5e6, 300),
-}
+SKEWED = stored("cases")["skewed posteriors"]
+"""Marginal, places, values, noise, and the number of values at each place."""
 
 
 @pytest.mark.parametrize("case", SKEWED)
 def test_the_regression_has_the_moments_of_skewed_posteriors(case):
     """The moments of z are those of the prior's draws, weighted by the exact likelihood."""
-    marginal, x, values, noise, times = SKEWED[case]
+    (kind, given), x, values, noise, times = SKEWED[case]
+    marginal = getattr(st, kind)(**given)
     field = st.RandomField(marginal, st.PowerLawSpectrum(7e-3), mean_mode=True)
     given = given_on(np.repeat(x, times), np.repeat(values, times), noise, field)
     phi, known = field.modes(LINE).basis(np.array([x])), conditioning(given, LINE)

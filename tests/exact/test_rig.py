@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from recording import stored
 
-from stiction.elasticity.blocks import Pushes, block_response
-from stiction.elasticity.columns import Body, block, eliminated
+from stiction.elasticity.columns import Body, block
 from stiction.elasticity.rig import Rig, contact_rig, loaded, on_cells
 
 LENGTH = 0.14
@@ -74,24 +73,6 @@ def test_a_stop_takes_the_push_of_a_base_on_rollers():
     compliances = [1.0 / rig_of(name, behind=a, ahead=b).C for a, b in ends]
     assert compliances[1] - compliances[0] == pytest.approx(0.2 / (E_plane * 0.05), rel=0.01)
     assert compliances[2] == pytest.approx(compliances[0], rel=0.02)
-
-
-def test_equal_blocks_on_rollers():
-    """`blocks` has closed forms. q converges with the square of the spacing."""
-    errors, push = [], (0.0325, 0.0425)
-    pushes = Pushes(("left",), np.mean(push), push[1] - push[0])
-    for n in (128, 256):
-        matrix, size = block(SLIDER, LENGTH / n, n, push=push), 2 * n + 1
-        # The interface carries no pressure. The far side moves along rollers.
-        used = np.append(np.arange(2 * size) < size + n, True)
-        kept = np.append(np.arange(size + n) < n, True)
-        on_slip = eliminated(matrix[np.ix_(used, used)], kept)
-        known = block_response(LENGTH, n, SLIDER.height, *ACRYLIC, pushes)
-        q = abs(-on_slip[-1, :n] * n - known.shear).max()
-        errors.append([q, abs(-1.0 / on_slip[-1, -1] / known.drive_stiffness - 1.0)])
-    assert np.all(np.array(errors[1]) < [3e-4, 1e-3]), errors
-    # The push ends between lines.
-    assert np.all(np.log2(np.divide(*errors)) > [1.9, 1.5]), errors
 
 
 # -- closed forms of contact mechanics -----------------------------------------------------------
