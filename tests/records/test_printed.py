@@ -160,10 +160,12 @@ def test_each_figure_is_as_recorded(call, request):
     texts = "\n".join(sorted(text.get_text() for text in figure.findobj(plt.Text)))
     for axes in figure.axes:
         looks += [axes.get_xscale(), axes.get_yscale(), *(one.origin for one in axes.images)]
+        labels = ["", *sorted(axes.get_legend_handles_labels()[1])]
         for artist in [*axes.lines, *axes.collections, *axes.patches]:
+            label = artist.get_label() in labels and labels.index(artist.get_label())
             paint = getattr(artist, "get_color", getattr(artist, "get_facecolor", None))()
             number = colours.setdefault(str(to_rgba_array(paint)[:1, :3]), len(colours))
-            looks.append(f"{number}{getattr(artist, 'get_marker', str)()}")
+            looks.append(f"{number}{getattr(artist, 'get_marker', str)()}{label or ''}")
     outputs = tokens(texts) | {"looks": " ".join(key for key, _ in itertools.groupby(looks))}
     outputs["inches"] = digest(figure.get_size_inches())
     outputs["legends"] = [len(legend.get_texts()) for legend in figure.findobj(Legend)]
