@@ -9,7 +9,7 @@ from setups import beta_strength
 from specimens import crooked
 
 import stiction as st
-from stiction.base.errors import collect_warnings, merge_warnings, warn_of_samples, warn_user
+from stiction.base.errors import merge_warnings, warn_user
 
 
 def joint(samples, **options):
@@ -61,23 +61,3 @@ def test_texts_that_differ_in_numbers_are_one_with_their_range():
 
     one = "law1: off by -4 to 2.5 m at 3 to 1,200 nodes"
     assert merging(work) == [one, one, "law2: off by 3 to 7 m at 1 nodes"]
-
-
-def test_samples_are_counted_over_those_without_the_doubt_too():
-    def batch(first, *which):
-        def work(found):
-            with collect_warnings() as own:
-                sizes = 0.25 / (1 + first * np.arange(len(which)))
-                warn_of_samples("off by {worst:.2g} in {samples}", np.array(which), sizes)
-            found += [one.after(first) for one in own]
-
-        return work
-
-    some = (
-        batch(1, True, False, True),
-        batch(9, False, False, False, False),
-        batch(4, False, True),
-    )
-    assert merging(*some) == ["off by 0.25 in 3 of 9 samples (1, 3, 5)"]
-    assert merging(some[1]) == []
-    assert merging(some[2]) == ["off by 0.05 in 1 of 2 samples (5)"]
