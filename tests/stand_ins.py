@@ -16,6 +16,8 @@ class StandIn:
     onset: Callable[[Any, Any], Any]
     type: str = "stand_in"
     first_stage: str | None = None
+    exact_method: str | None = None
+    scaling: str = "none"
     seconds: Any = 1e-4
     label = "stand-in"
     variables = staticmethod(LOCAL.variables)

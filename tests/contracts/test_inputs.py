@@ -228,6 +228,7 @@ ON_PLANES = {
     "sample": lambda given: PLANE.sample({"strength": given}).strength,
     "onset": lambda given: st.onset(PLANE, given, method=LOCAL).critical_stress.values,
     "plot.field": lambda given: st.plot.field(PLANE, given).images[0].get_array(),
+    "nucleation_stress": lambda given: st.theory.nucleation_stress(PLANE, given)[31, 3],
 }
 
 

@@ -184,24 +184,6 @@ def test_no_answer_takes_more_evaluations_than_allowed(algorithm, most, share):
     assert 0 < answer.evaluations <= most
 
 
-REFUSED = {  # values in another unit, at every call that takes peaks
-    "infer": lambda peaks: st.infer(
-        PROBLEM, FIELD, peaks, unit="Pa", method=LOCAL, samples=100, **QUIET),
-    "infer with a prior": lambda peaks: st.infer(
-        PROBLEM, FIELD, peaks, unit="Pa", prior={"correlation_length": (2e-3, 6e-3)}, method=LOCAL,
-        samples=100, **QUIET,
-    ),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", REFUSED)
-@pytest.mark.parametrize("factor", [1e-6, 1e-5, 1e3])
-def test_peaks_in_another_unit_are_refused(name, factor):
-    """Such as MPa, kN or mPa taken for Pa."""
-    peaks = factor * np.array([8.31e5, 7.64e5, 8.02e5, 7.9e5])
-    refuses("peaks ... unit", lambda: REFUSED[name](peaks))
-
-
 def test_the_field_of_a_fit_is_not_taken_for_the_fit():
     """Where the fit says more than its field, a call with the field says so."""
     records = FIELD.sample(PROBLEM.interface, samples=3) * [[1.0], [0.9], [1.1]]
@@ -224,13 +206,6 @@ def test_the_field_of_a_fit_is_not_taken_for_the_fit():
     assert not any("is the field of a fit" in text for text in texts)
 
 
-class OfFields:
-    """A source whose members are fields, not interfaces."""
-
-    def interfaces(self, count, seed=0):
-        return [FIELD] * count
-
-
 JOINT = make_problem(
     64, 0.05, width=0.01, load=st.Load(pressing_force=2500.0), weakening_rate=0.25e12,
     residual_ratio=0.4,
@@ -243,22 +218,6 @@ OF_TESTS = {"method": LOCAL, "progress": False}
 def few_members(monkeypatch):
     """Lists of 300 members, where a thousand are drawn otherwise."""
     monkeypatch.setattr("stiction.random.equally_likely.FIRST_MEMBERS", 300)
-
-
-@pytest.mark.usefixtures("few_members")
-@pytest.mark.parametrize(
-    ("call", "number"), [("failure_probability", 0.9e6), ("design_stress", 0.4)]
-)
-def test_a_source_of_fields_is_taken_as_a_list_of_fields(call, number):
-    """By every call that takes a source; at most 300 samples, all of the same field."""
-    name = call.partition("_")[2]
-    given = {"stress": number}
-    if call == "design_stress":
-        given = {"probability": number, "sensitivities": False}
-    answer = getattr(st, call)(PROBLEM, OfFields(), max_evaluations=300, **given, **GIVEN)
-    low, high = answer.interval[name]
-    assert low < high
-    assert answer.members.size == 300
 
 
 @pytest.fixture(scope="module")

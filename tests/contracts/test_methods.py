@@ -273,26 +273,38 @@ def supported(kind: str, option: str, problem: st.Problem) -> Any:
     return method
 
 
-def smooth(problem: st.Problem) -> st.Problem:
-    """The problem without residual strength and initial stress, under a uniform load."""
-    if isinstance(problem.specimen, st.Slider):
-        return problem
-    return dataclasses.replace(
-        problem, load=st.Load(), friction=st.LinearWeakening(weakening_rate=0.3e12)
-    )
+AXIS, LAW = np.arange(64) / 64.0, st.LinearWeakening(weakening_rate=0.3e12)
+SCALED = {  # laws and loads, most of which keep onsets from scaling
+    "plain": (LAW, st.Load()), "uneven load": (LAW, st.Load(profile=1.0 + AXIS)),
+    "critical slip": (st.LinearWeakening(critical_slip=4e-6), st.Load()),
+    "residual": (st.LinearWeakening(weakening_rate=0.3e12, residual_strength=4e5), st.Load()),
+    "initial": (LAW, st.Load(initial_stress=2e5)),
+    "uneven initial": (LAW, st.Load(initial_stress=2e5 * AXIS)),
+    "both": (LAW, st.Load(profile=1.0 + AXIS, initial_stress=2e5)),
+}  # fmt: skip
+SCALING = [(kind, "line", change) for kind in EXAMPLES for change in [*SCALED][1:]]
 
 
-@every
-def test_its_onsets_scale_with_strength_as_it_says(kind, name):
-    problem, strength = smooth(BODIES[name]), SAMPLES[name]
-    method = example(kind, problem)
-    if not scales_with_strength(problem, as_random_interface(field_of(problem)), method):
+@pytest.mark.parametrize(
+    ("kind", "name", "change"), SCALING + [(*case, "plain") for case in CASES]
+)
+def test_its_onsets_scale_with_strength_as_it_says(kind, name, change):
+    """Where it says so; not if something else varies, which does not scale."""
+    problem, strength, (law, load) = BODIES[name], SAMPLES[name], SCALED[change]
+    if not isinstance(problem.specimen, st.Slider):
+        problem = dataclasses.replace(problem, friction=law, load=load)
+    method, random = example(kind, problem), as_random_interface(field_of(problem))
+    for other in ("residual_strength", "initial_stress"):
+        both = st.RandomInterface(**{"strength": field_of(problem), other: FIELD})
+        assert not scales_with_strength(problem, both, method)
+    if not scales_with_strength(problem, random, method):
         return
     uniform = np.ptp(problem.load_profile) == 0.0
     shift = {"stretch": 0.0, "affine": 1e5 * uniform}[optional_member(method, "scaling")]
     before = onset(name, method, strength, problem)
     after = onset(name, method, shift + 1.25 * strength, problem)
-    for key in ("critical_stress", "critical_load", "first_instability"):
+    stresses, loads = ["critical_stress", "first_instability"], ["critical_load"]
+    for key in stresses + loads * (not np.any(problem.load.initial_stress)):
         np.testing.assert_allclose(
             after[key], shift + 1.25 * before[key], rtol=1e-5, err_msg=key
         )

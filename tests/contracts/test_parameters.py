@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import BODIES, FIELD, attempt
+from refusals import warning_texts
 from stand_ins import StandIn
 
 import stiction as st
@@ -219,15 +221,15 @@ def test_a_pilot_compares_the_samples_of_its_run():
     assert told["pilot_scatter"] == pytest.approx(relative.std(ddof=1), rel=1e-9)
 
 
-@pytest.mark.parametrize("call", ["failure_probability", "design_stress"])
-def test_no_call_takes_more_evaluations_than_it_may(call):
-    assert ask(call, max_evaluations=150, target_cv=0.05).evaluations <= 150
+NO_AREA = dataclasses.replace(LINE.interface, width=None)
+BARE = dataclasses.replace(LINE, interface=NO_AREA, load=st.Load())
 
 
 def test_a_design_that_is_cut_short_lies_between_its_bound_and_its_lowest_sample():
-    design = ask("design_stress", probability=1e-9, max_evaluations=150)
-    assert design.interval["stress"] == (design.lower_bound, design.stress)
-    assert design.lower_bound < design.stress < example("design_stress").stress
+    """Without an area and a pressure, there is neither a force nor a coefficient."""
+    design = ask("design_stress", problem=BARE, probability=1e-9, max_evaluations=150)
+    assert design.interval == {"stress": (design.lower_bound, design.stress)}
+    assert design.lower_bound < design.stress < ask("design_stress", problem=BARE).stress
 
 
 SOLVED = [0]
@@ -244,27 +246,78 @@ SCATTERED = st.RandomInterface(
 )
 
 
+class Growing:
+    """A source of interfaces that differ so much that calls draw more of them than at first."""
+
+    def interfaces(self, count: int, seed: int = 0) -> list[Any]:
+        means = np.random.default_rng(seed).normal(9e5, 1e4, count)
+        marginals = [st.Lognormal(mean=mean, cv=0.1) for mean in means]
+        return [st.RandomField(marginal, FIELD.spectrum) for marginal in marginals]
+
+
+@pytest.fixture(autouse=True)
+def few_members(monkeypatch):
+    """Lists of 10 members at first."""
+    monkeypatch.setattr("stiction.random.equally_likely.FIRST_MEMBERS", 10)
+
+
 @pytest.mark.parametrize(
     "random",
-    [FIELD, [FIELD, WEAKER], [FIELD, WEAKER] * 51, SCATTERED],
-    ids=["field", "list", "long list", "factor"],
+    [FIELD, [FIELD, WEAKER], [FIELD, WEAKER] * 51, SCATTERED, Growing()],
+    ids=["field", "list", "long list", "factor", "source"],
 )
-@pytest.mark.parametrize("stress", [6.6e5, 5.5e5])
-@pytest.mark.parametrize("algorithm", ["auto", "plain", "subset"])
-@pytest.mark.parametrize(("most", "cv"), [(900, 0.1), (10_000, 0.4)])
-def test_evaluations_are_the_samples_that_were_solved(random, stress, algorithm, most, cv):
-    """Also if an algorithm follows a count. Checks of the method solve less than 100 besides.
+@pytest.mark.parametrize("call", ["auto", "plain", "subset", "design_stress", "failure_curve"])
+@pytest.mark.parametrize(
+    ("most", "cv", "stress", "chance"), [(20_000, 0.1, 7.3e5, 0.1), (10_000, 0.3, 6.8e5, 1e-5)]
+)
+def test_evaluations_are_the_samples_that_were_solved(random, call, most, cv, stress, chance):
+    """Also if an algorithm follows a count, or more interfaces are drawn.
 
-    The ranking of a list solves at most 32 samples of each interface besides.
+    Checks of the method solve less than 100 besides, and the guide ranks the interfaces of a list.
     """
-    ranked = 32 * len(random) if isinstance(random, list) else 0
+    asked = {"failure_curve": {"smallest": chance}}
+    asked["design_stress"] = {"probability": chance, "sensitivities": False}
+    name = call if call in asked else "failure_probability"
+    given = asked.get(call, {"stress": stress, "algorithm": call}) | {"target_cv": cv}
+    guide = "local_criterion" if isinstance(random, list | Growing) else None
+    method = StandIn(counted, first_stage=guide, scaling="affine")
+    given |= {"method": method, "random": random, "problem": BARE, "workers": 1}
     SOLVED[0] = 0
-    answer = st.failure_probability(
-        LINE, random, stress, method=StandIn(counted), algorithm=algorithm, target_cv=cv,
-        max_evaluations=most, workers=1, progress=False,
-    )  # fmt: skip
-    assert 0 <= SOLVED[0] - answer.evaluations < 100 + ranked
+    answer = ask(name, max_evaluations=most, **given)
+    assert 0 <= SOLVED[0] - answer.evaluations < 100
     assert answer.evaluations <= most
+    if name == "failure_probability" and answer.probability:
+        assert (answer.failing_profiles.critical_stress < stress).all()
+
+
+LONG = st.RandomField(st.Lognormal(mean=2e6, cv=0.3), st.PowerLawSpectrum(0.02), True)
+PRESSED = st.RandomInterface(strength=WEAKER, normal_pressure=LONG)
+CHECKED = [  # calls at a probability of 0.08
+    ("critical_stress", {"algorithm": "plain"}), ("critical_stress", {"algorithm": "subset"}),
+    ("critical_stress", {"random": Growing(), "target_cv": 0.1}),
+    ("friction_coefficient", {"random": PRESSED}),
+    ("design_stress", {"probability": 0.08}), ("failure_curve", {"smallest": 0.08}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0])
+@pytest.mark.parametrize(("call", "given"), CHECKED)
+def test_a_check_by_the_exact_method_counts_failures_near_the_stress(call, given, factor):
+    """Half of the checked samples fail by the method. A difference is told once."""
+    asked = {"problem": BARE, "random": WEAKER} | given
+    if call not in BASE:
+        drawn = ask("monte_carlo", samples=300, problem=BARE, random=asked["random"])[call]
+        name = call.removeprefix("critical_")
+        asked |= {"stress": None, name: factor * float(drawn.quantile(0.08))}
+        call = "failure_probability"
+    method = StandIn(lambda rows, stress: factor * stress, exact_method="local_criterion")
+    texts = warning_texts(lambda: ask(call, method=method, workers=1, **asked))
+    found = [re.findall(r"\d[\d.e-]*(?<!\.)", text) for text in texts if "in the tail" in text]
+    assert len(found) == (factor < 1.0)
+    for checked, failed, exactly, there, told in np.array(found, dtype=float):
+        assert abs(failed - 0.5 * checked) <= 2.0 * checked**0.5  # four standard errors
+        assert exactly < failed
+        assert there == pytest.approx(told * max(exactly, 1.0) / failed, rel=0.1)
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.8])

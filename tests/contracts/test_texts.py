@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
-import shutil
+import shutil  # noqa: F401  # changed_runs.json calls it
 import time
+import warnings
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pint
 import pytest
 from contracts.bodies import world
+from recording import stored
 from refusals import refuses, warning_texts
 from setups import LOCAL, beta_strength, make_problem
 from small_study import small_study
@@ -137,25 +141,47 @@ def test_a_run_of_any_profiles_has_a_page(profiles, tmp_path):
     assert "critical" in (tmp_path / "page.html").read_text("utf-8")
 
 
-@pytest.mark.parametrize("lost", ["study.json", "chunks"])
-def test_a_run_goes_on_without_a_part_of_its_folder(lost, tmp_path):
-    out, study = tmp_path / "run", st.Study.from_dict(STUDY)
-    first = study.run(out=out, pilot=False, progress=False)
-    part = out / lost
-    part.unlink() if part.is_file() else shutil.rmtree(part)
-    again = study.run(out=out, pilot=False, progress=False)
-    np.testing.assert_array_equal(again.critical_stress, first.critical_stress)
-    fewer = st.Study.from_dict(STUDY | {"samples": 4})
-    refuses("5 ... 4 ... grow", lambda: fewer.run(out=out, pilot=False, progress=False))
+CHANGES = stored("changed_runs")
+"""Changes of the folder of a run, or another study for it, and words of what is told of it."""
 
 
-def test_a_run_of_another_format_is_refused_by_both_numbers(monkeypatch, tmp_path):
-    known = store.FORMAT
-    monkeypatch.setattr(store, "FORMAT", known + 3)
-    st.Study.from_dict(STUDY).run(out=tmp_path / "run", pilot=False, progress=False)
-    monkeypatch.setattr(store, "FORMAT", known)
-    with pytest.raises(st.RunError, match=f"format {known + 3}, but .* reads {known}"):
-        st.open_run(tmp_path / "run")
+def sealed(**body):
+    digest = store.digest(json.dumps(body, sort_keys=True).encode())
+    return json.dumps(body | {"digest": digest})
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_is_told_of_a_changed_run(change, monkeypatch, tmp_path):
+    """When it is read, and when it goes on: to the same numbers, or it is refused."""
+    monkeypatch.chdir(tmp_path)
+    study, run = st.Study.from_dict(STUDY), Path("run")
+    go_on = partial(st.Study.run, out=run, pilot=False, progress=False)
+    first = go_on(study).critical_stress
+    [chunk] = run.glob("chunks/*")
+    kept = dict(np.load(chunk))
+    rows, known = kept["rows"], json.loads(kept["about"].tobytes())
+
+    def forge(rows=rows, **changes):
+        """Another chunk with a right name."""
+        names = "mark", "versions", "seconds", "failures"
+        about = [changes.get(name, value) for name, value in zip(names, known, strict=True)]
+        np.savez(chunk, about=np.frombuffer(json.dumps(about).encode(), np.uint8), rows=rows)
+        chunk.rename(chunk.with_name(f"{store.digest(chunk.read_bytes())}.npz"))
+
+    other = eval(change, globals() | locals())
+    given, texts = other if isinstance(other, st.Study) else study, []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read, written = lambda: st.open_run(run).status().damaged, partial(go_on, given)
+        for call in (read, lambda: written().critical_stress.equals(first)):
+            try:
+                texts.append(str(call()))
+            except (st.InputError, st.RunError) as error:
+                texts.append(str(error))
+    assert "False" not in texts
+    text = " ".join([*texts, *(str(one.message) for one in caught)])
+    for word in CHANGES[change].split(" ... "):
+        assert word in text, text
 
 
 @pytest.mark.parametrize("cycles", [2, 3])

@@ -87,8 +87,8 @@ def scattering(mean, cv, of_factor):
 
 def test_specimens_of_each_solved_sample_are_those_of_its_draws():
     """Also of other interfaces of the same field: onsets of their draws are as counted."""
-    several = [scattering(1e6, 0.2, cv) for cv in (0.05, 0.1)] + [scattering(9e5, 0.1, 0.08)]
-    random = EquallyLikely(tuple(several))
+    of = (1e6, 0.2, 0.05), (1.2e6, 0.2, 0.1), (9e5, 0.1, 0.08)
+    random = EquallyLikely(tuple(scattering(*each) for each in of))
     state = LimitState(Experiment(LINE, random, LOCAL["method"], seed=4))
     counts = solve_specimens(state, 0, 20)
     assert counts.values.shape == (20, 128)
@@ -99,11 +99,6 @@ def test_specimens_of_each_solved_sample_are_those_of_its_draws():
     draws = counts[picks]
     np.testing.assert_allclose(state(draws), counts.values.ravel()[picks], rtol=1e-9)
     np.testing.assert_array_equal(state.member(draws), counts.members.ravel()[picks])
-    stress = np.quantile(counts.values, 0.1)
-    population, near = counts.tail.repetitions[0].around(stress)
-    assert len(near) == 2 * np.sum(counts.values < stress)
-    lowest = state(population.draws[near[::9]])
-    assert np.mean(lowest < stress) == pytest.approx(0.5, abs=0.02)
 
 
 @pytest.mark.parametrize("probability", [1e-2, 1e-4])

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from refusals import refuses
 from scipy.stats import binomtest, nbinom
 from setups import EXACT, LOCAL, ensemble, local_onset, make_problem, turns
 from stand_ins import StandIn
 
 import stiction as st
 from stiction.base.progress import SILENT
+from stiction.reliability.answer import band_of
 from stiction.reliability.counting import Counted, binomial_interval, count_failures
 from stiction.reliability.solving import few_members
 from stiction.reliability.subset import ancestral_variance, generator
@@ -144,12 +144,16 @@ def test_a_short_list_names_only_interfaces_whose_probability_is_known(known, ca
     assert ("1 of 5 different ones carry 90%" in text) == carried
 
 
-def test_draws_of_a_list_must_have_their_dimension():
-    state = st.external.limit_state(PROBLEM, [STRENGTH, STRENGTH], LOCAL)
-    draws = state.draws(0, 0, 2)
-    refuses("draws: must have shape", lambda: state(np.hstack([draws, draws])))
-    refuses("draws: must have shape", lambda: state.profiles(np.hstack([draws, draws])))
-    refuses("draws: must be finite", lambda: state(draws * np.inf))
+def test_an_end_of_a_band_is_known_if_no_unknown_member_counts():
+    rng = np.random.default_rng(3)
+    for size in range(1, 60):
+        members = np.sort(rng.uniform(0.1, 0.9, size))
+        members[: rng.integers(size + 1)] = math.nan  # between zero and the least that is known
+        members[: rng.integers(size + 1)] = 0.0
+        least, most = (np.nan_to_num(members, nan=value) for value in (1e-9, 0.1))
+        low, high = (np.quantile(of, [0.05, 0.95]) for of in (least, most))
+        known = np.where(low == high, low, math.nan)
+        np.testing.assert_allclose(band_of(rng.permutation(members)), known, rtol=1e-12)
 
 
 def test_binomial_interval_has_its_coverage():

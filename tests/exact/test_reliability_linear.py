@@ -202,6 +202,7 @@ def test_evaluations_over_two_levels_are_the_samples_that_were_solved():
         found = {"exact": run.evaluations, "guide": run.first_stage_evaluations}
         assert found == solved
         assert solved["exact"] <= 333
+        assert (run.failing[1] < -3.3).all()
 
 
 def test_a_poor_first_stage_is_told_by_its_ranks():

@@ -11,7 +11,6 @@ from contracts.bodies import BODIES, FIELD
 from hypothesis import given, settings
 from hypothesis import strategies as hs
 from oracles import symbol_of, times
-from refusals import warning_texts
 from setups import (
     LENGTH,
     LOCAL,
@@ -232,15 +231,6 @@ def test_failure_probability_of_a_plane_is_that_of_counting():
     found = st.failure_probability(plane, field, stress, algorithm="subset", seed=1, **options)
     assert abs(found.probability / counted - 1.0) < 4.0 * np.hypot(own, found.cv)
     assert found.failing_profiles.strength.dims[-2:] == ("x", "y")
-
-
-def test_coarse_directions_are_named():
-    def onset_on(*nodes):
-        local_onset(make_problem(nodes, PLANE.interface.length), np.full(nodes, 1e6))
-
-    (text,) = warning_texts(lambda: onset_on(48, 26))
-    assert "9.6 nodes along x and, in mode III, 4.4 along" in text
-    assert warning_texts(lambda: onset_on(60, 72)) == []
 
 
 @pytest.mark.parametrize("name", ["blocks", "blocks with an extent"])

@@ -164,21 +164,9 @@ def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
     assert again(tmp_path / "run").identical(reference)
 
 
-def test_versions_that_differ_are_said(tmp_path, often, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(batches, "versions", lambda: "stiction 99.0, numpy 1.0, numba 0.1")
-        make_study(samples=40).run(out=tmp_path / "run")
-    with pytest.warns(UserWarning, match=r"begun with stiction 99\.0, numpy .*, not stiction"):
-        make_study().run(out=tmp_path / "run")
+def test_versions_of_a_worker_that_differ_are_said():
     with pytest.raises(WorkerError, match="Install the same versions"):
         make_study(samples=40).run(executor=AtOnce(versions="stiction 99.0"))
-
-
-def test_a_study_that_another_version_wrote_is_refused_as_such(tmp_path):
-    older = make_study().to_dict() | {"method": {"type": "local_criterion", "weights": "exact"}}
-    store.Store.open(tmp_path / "run", older)
-    words = "cannot read its study: method: unknown 'weights'"
-    refuses(words, lambda: st.open_run(tmp_path / "run"), StoreError)
 
 
 # -- samples of any ensemble, Dask -----------------------------------------------------------------
