@@ -10,7 +10,6 @@ from setups import LOCAL, turns
 
 import stiction as st
 from stiction.inference.density import densities_of, log_likelihoods
-from stiction.inference.infer import _grown
 from stiction.inference.likelihood import (
     Simulation,
     effective_samples,
@@ -20,7 +19,7 @@ from stiction.inference.likelihood import (
     simulate,
 )
 from stiction.inference.posterior import grid_of
-from stiction.inference.prior import _tails, find_scaling, make_prior
+from stiction.inference.prior import find_scaling, make_prior
 
 PROBLEM = st.paper.problem(nodes=256)
 H_N = PROBLEM.nucleation_length
@@ -210,29 +209,8 @@ def test_grid_against_a_sum_by_hand():
     assert [pair.information(i) for i in (0, 1)] == pytest.approx([information] * 2, abs=1e-2)
 
 
-@pytest.mark.parametrize("at", [(0, 0), (0, 1), (1, 0), (1, 1)])
-def test_a_box_grows_by_its_width_at_the_ends_that_draws_reach(at):
-    box = np.array([[0.3, 0.5], [0.4, 0.6]])
-    u = np.tile(box.mean(axis=0), (1000, 1))
-    np.testing.assert_array_equal(_grown(box, u), box)
-    u[:5, at[1]] = box[at] + (0.002 if at[0] == 0 else -0.002)
-    wider = box.copy()
-    wider[at] += 0.1 if at[0] else -0.1
-    np.testing.assert_allclose(_grown(box, u), wider, rtol=1e-12)
-
-
 def test_a_prior_that_begins_where_its_density_is_zero():
-    """A length of zero is impossible, and so unlikely that it need not be simulated.
-
-    A finite end with a density belongs to the prior, below or above.
-    """
-    for distribution, ends in (
-        (scipy.stats.expon(), (1, 0)), (scipy.stats.powerlaw(3.0), (0, 1)),
-        (scipy.stats.uniform(), (1, 1)), (scipy.stats.norm(), (0, 0)),
-    ):  # fmt: skip
-        low, high = _tails(distribution)
-        assert ((low == 0.0), (high == 1.0)) == ends
-        assert 0.0 <= low < 0.01 < 0.99 < high <= 1.0
+    """A length of zero is impossible, and so unlikely that it need not be simulated."""
     distribution = scipy.stats.gamma(9.0, scale=H_N / 9.0)  # no density at its infinite end
     prior = make_prior(PROBLEM, STRENGTH, {"correlation_length": distribution})
     low, high = prior.ends[:, 0]

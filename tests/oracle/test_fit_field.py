@@ -9,9 +9,8 @@ from recording import stored
 from setups import examples
 
 import stiction as st
-from stiction.inference.estimate import BestFit, FitSetting, estimate, windowed
+from stiction.inference.estimate import BestFit, FitSetting, estimate
 from stiction.inference.marginal_fit import family_of, mean_log_likelihood, normal_of
-from stiction.inference.records import Record
 from stiction.inference.specimens import FactorPrior, Profiles, grid_of_profiles
 from stiction.inference.whittle import SpectrumFamily
 from stiction.inference.window import RecordWindow
@@ -218,14 +217,6 @@ def test_what_mean_and_trend_take_is_given_back():
         tuple(windows[i % 2] for i in range(16)), family_of("lognormal"), family
     )
     used = [w.without_trend(r[w.measured]) for r, w in zip(rows, setting.windows, strict=True)]
-    records = [
-        Record(np.where(w.measured, r, np.nan), (0.05 / 64 * (1 + i // 8),))
-        for i, (r, w) in enumerate(zip(rows, setting.windows, strict=True))
-    ]
-    for record, window, row, own in zip(records, *windowed(records, 3), used, strict=True):
-        assert window.spacings == record.spacings
-        np.testing.assert_array_equal(window.without_trend(record.values[window.measured]), row)
-        np.testing.assert_array_equal(own, row)
     found = estimate(used, setting)
     sizes = [row.size for row in used]
     total = np.zeros((sum(sizes),) * 2)

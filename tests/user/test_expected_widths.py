@@ -5,8 +5,7 @@ import pytest
 from setups import LOCAL, make_problem
 
 import stiction as st
-from stiction.inference import design
-from stiction.inference.specimens import Onsets, Prediction, Profiles, Tables
+from stiction.inference.specimens import Prediction
 
 PROBLEM = make_problem(64, 0.05, weakening_rate=0.25e12)
 FIELD = st.RandomField(st.Gamma(mean=1e6, cv=0.15), st.PowerLawSpectrum(4e-3), mean_mode=True)
@@ -47,18 +46,6 @@ def test_a_design_is_for_specimens_of_the_problem():
         assert found.design_stress[0] == pytest.approx(by_kind[0.05], rel=1e-3)
         stresses.append(float(found.design_stress[0]))
     assert stresses[0] == pytest.approx(stresses[1], rel=0.02)
-
-
-def test_levels_of_further_profiles_have_the_mean_of_their_truth(monkeypatch):
-    """However much the field scatters within a profile."""
-    monkeypatch.setattr(design, "grid_of_profiles", lambda *known: known)
-    profiles = Profiles((FIELD,), 2e6, np.array([1.9e6]), np.full((1, 1), 0.25), ("lognormal",))
-    onsets = Onsets(np.zeros(1), np.ones((1, 1, 1)), (), 1.0)
-    tables = Tables(profiles, None, (onsets,), 0.0, (np.zeros(0),))
-    truth, rng = np.array([[0.0, 0.0, 0.1, np.log(1.5)]]), np.random.default_rng(3)
-    _, after = design._after(tables, truth, 0, 10_000, rng)
-    assert after.profiles.levels[0] == 1.9e6
-    assert after.profiles.levels[1:].mean() == pytest.approx(3e6, rel=0.02)
 
 
 def test_a_fit_is_taken(monkeypatch):

@@ -129,15 +129,6 @@ def test_slip_loads_over_clamping_forces(written):
     np.testing.assert_allclose(peaks.normal_forces[0], 1e3 * forces, rtol=1e-12)
     assert (peaks.unit, peaks.specimens[0].tolist()) == ("1", [*"1122334455"])
     assert "normal force" in str(peaks)
-    sizes = np.array([20, 10, 20, 20, 10]).repeat(2)  # mm
-    kinds = written([f"{row};{size}" for row, size in zip(rows, sizes, strict=True)],
-                    HEADING + ";length (mm)", surfaces=2)  # fmt: skip
-    assert kinds.lengths == (0.01, 0.02)
-    for kind, size in enumerate((10, 20)):
-        own = sizes == size
-        np.testing.assert_array_equal(kinds.values[kind], peaks.values[0][own])
-        np.testing.assert_array_equal(kinds.normal_forces[kind], peaks.normal_forces[0][own])
-        np.testing.assert_array_equal(kinds.specimens[kind], peaks.specimens[0][own])
     peaks = written(rows, normal=196e3, surfaces=2)
     np.testing.assert_allclose(peaks.values[0], loads / 392.0, rtol=1e-12)
 
