@@ -81,6 +81,8 @@ def test_any_multiplier_bounds_the_onset_where_some_nodes_do_not_weaken():
     assert lifting.min() > 0.0
     assert lifted.min() > 1e-3 * RATE
     np.testing.assert_allclose(lifted, -matrix @ lifting, atol=ROUND_OFF * RATE)
+    alone = np.where(np.arange(168) == 70, 1e-3 * RATE, 0.0).reshape(shape)
+    assert Bracket(symbol, alone, strength, profile).lifting[1].min() > 0.0
     for rough in (1.0, 1e-2, 1e-5):
         bound = bracket.raise_multiplier(
             multiplier * (1.0 + rough * noise(1.0, rng, shape).ravel())
