@@ -58,6 +58,9 @@ def relative_differences(stress: Array, exact: Array) -> Array:
     """Return the differences from exact onsets, divided by the mean of the exact onsets.
 
     A sample is left out if either method finds no onset.
+
+    >>> relative_differences(np.array([3.0, np.nan, 2.0, 1.0]), np.array([2.0, 2.0, np.nan, 2.0]))
+    array([ 0.5, -0.5])
     """
     # The mean, and not each onset, divides: an onset may be close to zero.
     known = np.isfinite(stress) & np.isfinite(exact)

@@ -130,6 +130,11 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
 
     If every place is occupied, the arc is the whole circle, cut
     opposite the peak.
+
+    >>> span(np.array([True, False, False, True, True]), 0)
+    (3, 3)
+    >>> span(np.ones(5, dtype=bool), 1)
+    (-1, 5)
     """
     n = occupied.size
     places = np.flatnonzero(occupied)

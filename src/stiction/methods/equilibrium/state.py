@@ -73,7 +73,17 @@ def at_rest(sample: StaticSample) -> EquilibriumState:
 
 
 def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
-    """Return the multiplier y of an instability, <p, y> = 1."""
+    """Return the multiplier y of an instability, <p, y> = 1.
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> profile = np.array([1.0, 4.0])
+    >>> sample = make_sample(np.array([3.0, 2.0]), np.zeros(2), profile, np.ones(2), LINEAR)
+    >>> at_rest(sample).load
+    0.5
+    >>> unstable = EquilibriumState(0.5, np.zeros(2), direction=np.array([2.0, 0.5]))
+    >>> multiplier_of(sample, unstable).tolist()
+    [0.5, 0.125]
+    """
     if state.multiplier is not None:
         return state.multiplier
     return state.direction / max(inner(state.direction, sample.profile), 1e-300)
