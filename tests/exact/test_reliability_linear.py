@@ -76,6 +76,17 @@ def test_levels_are_tenths_and_chains_move():
         assert ceilings == sorted(ceilings, reverse=True)
 
 
+def test_levels_chosen_from_the_samples_do_not_bias_the_estimate():
+    """Four hundred small runs: ten seeds a level, where a biased rule adds a tenth each."""
+    options = {"samples": 100, "threshold": -3.5}
+    runs = [descend(first, 20, rng=generator(seed, 6), **options) for seed in range(400)]
+    found = np.array([run.probability(-3.5) for run in runs]) / norm.cdf(-3.5)
+    # With the threshold at the highest value that goes on, not the lowest that does not, the mean
+    # is 1.34.
+    assert standard_error(found) < 0.07
+    assert_mean(found, 1.0, errors=4.0)
+
+
 def test_samples_of_the_last_level_have_the_truncated_normal_distribution():
     runs, across = descents()
     excess = []

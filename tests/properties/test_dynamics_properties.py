@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from ruptures import BREAKING_PLANE, dip, run_of, wavy_line
-from setups import QUARTER, examples, make_problem
+from setups import QUARTER, beta_strength, examples, make_problem
 from specimens import crooked, rough
 
 import stiction as st
@@ -205,3 +205,18 @@ def test_the_front_reaches_a_node_that_does_not_weaken_when_it_first_slips():
     round_off = 1e-9 * time[-1]
     assert np.all(arrival >= time[first - 1] - round_off)
     assert np.all(arrival <= time[first] + round_off)
+
+
+def test_an_overstressed_node_slips_from_the_start():
+    """So a run has no equilibrium near the onset to start from."""
+    problem = make_problem(128, 0.06)
+    (strength,) = beta_strength(6e-3).sample(problem.interface, samples=1, seed=3)
+    initial = np.full(128, 1e5)
+    initial[60:62] = 1.02 * strength[60:62]
+    profiles = {"strength": strength, "initial_stress": initial}
+    near, rest = (
+        st.onset(problem, profiles, method=st.Rupture(loading_rate=1e9, start=start))
+        for start in ("equilibrium", "rest")
+    )
+    assert near.first_instability.item() == rest.first_instability.item()
+    assert near.critical_load.item() == rest.critical_load.item()
