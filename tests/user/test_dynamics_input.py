@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
+from recording import stored
 from refusals import refuses
 from ruptures import wavy_line
 from setups import make_problem
@@ -17,6 +18,7 @@ from stiction.base.files import read_arrays
 from stiction.elasticity.memory_kernels import kernel_sum
 from stiction.methods.dynamics import save as save_module
 from stiction.methods.dynamics.save import open_rupture
+from stiction.random.dotted_keys import with_values
 
 METHOD = st.Rupture(loading_rate=1e8)
 PROBLEM, PROFILE = wavy_line()
@@ -100,6 +102,23 @@ def test_what_is_no_run_of_this_kind(tmp_path):
     for damaged in (path.read_bytes(), b"not a checkpoint"):
         path.write_bytes(damaged)
         refuses("not a readable checkpoint", lambda: simulate(save, **onset))
+
+
+OTHERS = stored("other_runs")
+
+
+def test_a_folder_takes_no_other_run(tmp_path):
+    """Whatever differs, but for the number of steps and the distance of frames."""
+    few = {"problem": PROBLEM, "method": dataclasses.replace(METHOD, max_steps=20)}
+    save, words = st.Save(to=tmp_path / "run"), "holds another run"
+    simulate(save, **few)
+    for key, value in OTHERS.items():
+        refuses(words, partial(simulate, save, **with_values(few, {key: value})))
+    for other in ({"fields": ["slip"]}, {"stations": {"a": 0.01}}):
+        refuses(words, partial(simulate, dataclasses.replace(save, **other), **few))
+    refuses(words, partial(simulate, save, profiles=1.001 * PROFILE, **few))
+    more = dataclasses.replace(METHOD, max_steps=30)
+    assert simulate(dataclasses.replace(save, every=7), method=more).sizes["step"] == 30
 
 
 def test_full_disk_leaves_what_was_written_readable(tmp_path, monkeypatch):
