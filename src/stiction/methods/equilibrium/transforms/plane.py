@@ -120,7 +120,11 @@ def doubled(coarse: Array) -> Array:
 
 def halved_strength(fine: Array) -> Array:
     """Halve the grid of strengths, as `halved` does, and average only over
-    nodes with finite strength."""
+    nodes with finite strength.
+
+    >>> halved_strength(np.array([np.inf, 2.0, 3.0, 4.0, 1.0, np.inf]))
+    array([inf,  3.,  2.])
+    """
     finite = np.isfinite(fine)
     if finite.all():
         return halved(fine)

@@ -116,6 +116,12 @@ def residual_tolerance(sample: StaticSample, load: float, accuracy: float) -> fl
 
     Strength above the load, such as the strength of barriers, does not
     count.
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> excess, profile = np.array([2.0, np.inf, 8.0]), np.array([1.0, 1.0, 2.0])
+    >>> sample = make_sample(excess, np.zeros(3), profile, np.ones(3), LINEAR)
+    >>> residual_tolerance(sample, -3.0, 0.5)
+    4.25
     """
     can_break = np.isfinite(sample.excess)
     applied = abs(load) * sample.profile[can_break]
