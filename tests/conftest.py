@@ -14,15 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis
 import pytest
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.dispatcher import Dispatcher
 
 from stiction.cli import commands
-
-try:
-    import fcntl
-except ImportError:  # Windows, where each worker compiles by itself
-    fcntl = None
 
 ROOT = Path(__file__).parents[1]
 
@@ -44,30 +37,6 @@ os.environ["STICTION_CACHE_DIR"] = str(
 )
 
 
-_compile, _awaited = Dispatcher.compile, set()
-
-
-def _compile_once(kernel, signature):
-    """Compile a kernel, unless another worker is compiling it: then wait, and load it."""
-    name = f"{kernel.py_func.__module__} {kernel.py_func.__qualname__} {signature}"
-    with global_compiler_lock:  # before any lock on a file, so that no thread waits for another
-        if name in _awaited:
-            return _compile(kernel, signature)
-        folder = Path(os.environ["NUMBA_CACHE_DIR"]) / "awaited"
-        folder.mkdir(parents=True, exist_ok=True)
-        _awaited.add(name)
-        try:
-            with open(folder / hashlib.sha256(name.encode()).hexdigest(), "w") as file:
-                fcntl.flock(file, fcntl.LOCK_EX)
-                return _compile(kernel, signature)
-        finally:
-            _awaited.remove(name)
-
-
-if fcntl is not None and "PYTEST_XDIST_WORKER" in os.environ:
-    Dispatcher.compile = _compile_once
-
-
 # The same examples on every machine; weekly others are drawn (--hypothesis-profile=default).
 hypothesis.settings.register_profile("same", derandomize=True)
 hypothesis.settings.load_profile("same")
@@ -84,30 +53,6 @@ def fuzz(request):
     """How many trials, and the seed that chooses them."""
     option = request.config.option
     return SimpleNamespace(count=option.fuzz_count, seed=option.fuzz_seed)
-
-
-def _files():
-    """Return the files of the tree that are neither caches nor made by git."""
-    folders = ("src", "tests", "examples", "docs", "validation", "benchmarks", "reproduction")
-    return {
-        str(path.relative_to(ROOT))
-        for folder in folders
-        for path in (ROOT / folder).rglob("*")
-        if path.is_file() and not {"__pycache__", ".hypothesis"} & set(path.parts)
-    }
-
-
-def pytest_configure(config):
-    if not hasattr(config, "workerinput"):
-        config.files_before = _files()
-
-
-def pytest_sessionfinish(session):
-    """No test writes into the tree."""
-    before = getattr(session.config, "files_before", None)
-    if before is not None and (new := sorted(_files() - before)):
-        print(f"\nfailed: tests have written into the tree: {', '.join(new)}")
-        session.exitstatus = 1
 
 
 @pytest.fixture(autouse=True)
@@ -172,3 +117,12 @@ def runs(command):
         return out + errors
 
     return runs
+
+
+@pytest.fixture
+def small_chunks(monkeypatch):
+    """Many chunks of few samples instead of one a second."""
+    from stiction.ensemble import batches, store
+
+    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
+    monkeypatch.setattr(batches, "piece_size", lambda one, span, *rest: min(7, span.samples))

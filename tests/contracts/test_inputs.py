@@ -203,14 +203,18 @@ def test_numbers_with_units(library):
 
 
 def test_a_mean_pressure_of_each_sample_is_distributed_between_glued_blocks():
-    """As an array, as one with labels, and with a unit."""
+    """As an array, as one with labels, and with a unit; of as many samples as nodes."""
     problem = st.Problem(
         solid=st.Solid(youngs_modulus=3e9, poisson_ratio=0.35, density=1180.0, plane="stress"),
         interface=st.Interface(length=0.1, nodes=64),
         friction=st.LinearWeakening(weakening_rate=0.2e12),
         specimen=st.Blocks(height=0.05, pressing="glued"),
     )
-    strength, means = np.full((2, 64), 1e6), np.array([2e6, 3e6])
+    strength, means = np.full((64, 64), 1e6), np.linspace(2e6, 3e6, 64)
+    given = {"strength": strength, "normal_pressure": means}  # without a sample: at the nodes
+    np.testing.assert_array_equal(problem.sample(given).normal_pressure, [means] * 64)
+    alone = problem.sample(given | {"normal_pressure": 2e6}).normal_pressure
+    np.testing.assert_allclose(alone, [2e6 * problem.blocks.pressure] * 64, rtol=1e-14)
     kinds = (
         means[:, None],
         xr.DataArray(means, dims="sample"),

@@ -183,8 +183,8 @@ STATED = {  # the constant of a problem that a factor multiplies
 
 
 @pytest.mark.parametrize("name", FACTORS)
-def test_no_onset_lies_beyond_the_bounds_whatever_has_a_factor(name):
-    """Of samples near the ends of the strength and of the factor."""
+def test_what_has_a_factor_is_multiplied_and_no_onset_lies_beyond_the_bounds(name):
+    """Sample by sample, and of samples near the ends of the strength and of the factor."""
     key, value = STATED.get(name, ("friction.weakening_rate", 0.25e12))
     pressed = name in ("normal_pressure", "pressing_force")
     scale = 1.0 if pressed else 2e6
@@ -195,6 +195,18 @@ def test_no_onset_lies_beyond_the_bounds_whatever_has_a_factor(name):
     problem = with_values({"problem": problem}, {f"problem.{key}": value})["problem"]
     factor = st.Beta(alpha=2.0, beta=2.0, low=0.6, high=1.4)
     random = st.RandomInterface(strength=strength, between={name: factor})
+    drawn = st.monte_carlo(
+        problem, random, method=EXACT, samples=3, seed=SEED, pilot=False, **QUIET
+    ).critical_stress.values
+    rows = strength.sample(INTERFACE, samples=3, seed=SEED)
+    profiles = random.profiles(INTERFACE, samples=3, seed=SEED)
+    factors = [own[:, 0] for label, own in profiles.items() if label[0] == "b"]
+    assert bool(factors) == (name != "strength")  # which the profiles hold times its factor
+    for onset, by, row in zip(drawn, *factors or [[]], rows, strict=bool(factors)):
+        scaled = with_values({"problem": problem}, {f"problem.{key}": by * value})["problem"]
+        given = {"friction_coefficient": row} if pressed else row
+        alone = st.onset(scaled, given, method=EXACT, **QUIET).critical_stress.item()
+        assert onset == pytest.approx(alone, rel=1e-9)
     state = st.external.limit_state(problem, random, EXACT)
     onsets, (low, high) = state(2.5 * state.draws(0, 0, 60)), state.bounds
     assert low * (1.0 - 1e-9) <= onsets.min() < onsets.max() <= high * (1.0 + 1e-9)

@@ -16,10 +16,10 @@ import pytest
 from small_study import lengths, small_study
 
 import stiction as st
-from stiction.ensemble import batches, store
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore"),
+    pytest.mark.usefixtures("small_chunks"),
     pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked"),
 ]
 METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
@@ -37,15 +37,6 @@ def fuzz(fuzz):
 @pytest.fixture(scope="module")
 def reference():
     return STUDY.run(workers=1, pilot=False)
-
-
-@pytest.fixture(autouse=True)
-def small_chunks(monkeypatch):
-    """Chunks of a few samples at once."""
-    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(
-        batches, "piece_size", lambda experiment, span, *rest: min(7, span.samples)
-    )
 
 
 def write(folder):

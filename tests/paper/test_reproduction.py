@@ -24,7 +24,6 @@ from reproduction import numbers_with_errors as estimates
 from reproduction.__main__ import main
 from reproduction.numbers_with_errors import Number
 from reproduction.rules import Verdict
-from reproduction.studies import jobs
 
 ROOT = Path(__file__).parents[2]
 CLAIMS = list(claims.CLAIMS.values())
@@ -40,11 +39,6 @@ def test_each_rule_gives_each_of_its_verdicts(rule, verdict, rows):
     found = eval(rule, globals())
     assert found.text
     assert found([[Number(value, 0.1) for value in row] for row in rows]) is Verdict[verdict]
-
-
-@pytest.mark.parametrize(("value", "verdict"), [(0.6644, HOLDS), (0.667, FAILS)])
-def test_a_printed_number_is_right_to_its_digits(value, verdict):
-    assert rules.printed("0.66")([[Number(value, 0.0)]]) is verdict
 
 
 @pytest.mark.parametrize(("function", "value", "error", "text"), stored("rounded"))
@@ -93,10 +87,12 @@ def test_errors_are_the_scatter_of_repeated_samples(function, exact):
 
 
 def test_so_many_events_at_a_rare_share_are_counted_exactly():
-    p = 0.0019 + 3 * 0.0007
+    """So many ruptures with an event where random strength alone has 19 of 10,000."""
+    p, usual = 0.0019 + 3 * 0.0007, Number(0.0019, 0.0007)
     fewer = (1 - p) ** 8 + 8 * p * (1 - p) ** 7 + 28 * p**2 * (1 - p) ** 6
-    assert chance(3, 8)[0].value == pytest.approx(1.0 - fewer, rel=1e-9)
-    assert chance(0, 8)[0].value == 1.0
+    for events, exact in ((3, 1.0 - fewer), (0, 1.0)):
+        found = estimates.chance_of_so_many(np.arange(8) < events, usual)
+        assert found.value == pytest.approx(exact, rel=1e-9)
 
 
 def test_a_change_of_the_spread_of_pairs_is_that_of_each():
@@ -152,12 +148,6 @@ def test_the_page_holds_findings_figures_and_claims(pipeline):
     assert re.search(r"^ +\d+ s  Onsets by exact equilibrium", said, flags=re.MULTILINE)
 
 
-def chance(events, of):
-    """The chance of so many ruptures with an event where random strength alone has 48 of 10,000
-    without inertia, of which a rupture arrests 4 of 10, too."""
-    return [estimates.chance_of_so_many(np.arange(of) < events, Number(0.0019, 0.0007))]
-
-
 def table_of(out):
     with (out / "claims.csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
@@ -170,16 +160,10 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     assert set(verdicts) == {claim.name for claim in CLAIMS}
     assert len(verdicts) == len(CLAIMS)
     assert set(verdicts.values()) <= {verdict.value for verdict in Verdict}
-    means, spread = {}, collections.defaultdict(list)
+    spread = collections.defaultdict(list)
     for row in rows:
-        number = Number(float(row["value"]), float(row["error"]))
-        if row["claim"] == "lower-friction" and row["judged"] == "True":
-            means[float(row["xi_0/h_n"])] = number.value
         if row["claim"] == "variability" and row["judged"] == "True":
-            spread[row["quantity"]].append(number)
-    assert list(means) == [0.25, 0.5, 1.0, 2.0]
-    assert means[0.25] == pytest.approx(0.772, abs=0.01)
-    assert means[2.0] == pytest.approx(0.692, abs=0.01)
+            spread[row["quantity"]].append(Number(float(row["value"]), float(row["error"])))
     # The rule, the table of the abstract and the statement of the headline trend agree.
     text = " ".join((out / "report.html").read_text(encoding="utf-8").split())
     assert rules.alike(rules.rising())([*spread.values()]).value == verdicts["variability"]
@@ -193,12 +177,7 @@ def test_the_table_of_claims_is_tidy_and_the_main_results_stand(pipeline):
     assert len(lines) == 7
     assert all(line.endswith(".") and re.search(r"\d", line) for line in lines)
     assert not any("±" in line for line in lines)
-    for verdict, names in {
-        HOLDS: ("lower-friction", "neighbours-lower", "nucleation-mean", "short-stress"),
-        TEXT: ("coincide", "interaction-suffices", "overpredicts"),
-        FAILS: ("effective-modulus", "variability"),
-    }.items():
-        assert {verdicts[name] for name in names} == {verdict.value}, names
+    assert stored("verdicts").items() <= verdicts.items()
 
 
 def cells(path, start):
@@ -239,20 +218,8 @@ def test_numbers_in_the_documentation_are_those_that_are_computed(pipeline):
     assert f"{', '.join(quoted[:3])} and {quoted[3]} % too high on average" in methods
 
 
-def test_a_second_call_computes_nothing(pipeline):
-    out, _ = pipeline
-
-    def written():
-        return {path: path.stat().st_mtime_ns for path in (out / "studies").rglob("*.nc")}
-
-    before, run = written(), runner.Runner(out, FEWER, seed=0, workers=2)
-    with run.started(jobs(full=True)):
-        pass
-    assert written() == before
-
-
 def test_an_interrupted_study_repeats_none_of_its_parts(tmp_path):
-    """The third of four parts fails: the second call computes it and the fourth."""
+    """The third of four parts fails. The second call computes it and the fourth, a third none."""
     computed, failing = [], [2]
 
     @runner.kept()
@@ -274,7 +241,7 @@ def test_an_interrupted_study_repeats_none_of_its_parts(tmp_path):
     with pytest.raises(KeyboardInterrupt), contextlib.redirect_stdout(io.StringIO()):
         total()
     failing.clear()
-    assert total() == 14
+    assert [total(), total()] == [14, 14]
     assert sorted(computed) == [0, 1, 2, 3]
     assert not [path for path in (tmp_path / "studies").iterdir() if path.is_dir()]
 

@@ -3,6 +3,8 @@
 The calls stand in mistakes.json, each beside the arguments that its refusal names.
 """
 
+# ruff: noqa: F401
+
 import dataclasses
 import os
 from functools import partial
@@ -29,7 +31,7 @@ from stiction.ensemble.dataset import Gathered
 from stiction.ensemble.experiment import Experiment
 from stiction.inference.peaks import make_peaks
 from stiction.problem.checks import doubt_strengths
-from stiction.problem.sample import own_sample  # noqa: F401  # mistakes.json calls it
+from stiction.problem.sample import own_sample
 
 LINE, PROBLEM = st.Interface(0.1, 256), make_problem()
 SCALELESS = make_problem(weakening_rate=None)
@@ -211,21 +213,14 @@ def planned(designs):
 EVEN = st.RandomField(st.Lognormal(mean=1e6, cv=1e-4), st.PowerLawSpectrum(4e-3))
 SLOW = st.Rupture(loading_rate=9e8)
 SEVEN = 0.7e6 + 1e4 * np.arange(7.0)
-FIVE = [f"marginal.{name}" for name in ("alpha", "beta")] + ["exponent", "power_kept"]
-FIVE = {key: (1.0, 2.0) for key in FIVE} | {"problem.friction.weakening_rate": (4e11, 6e11)}
 MEAN = "marginal.mean"
 PREDICTED = xr.Dataset({"critical_stress": ("sample", 7e5 + 1e4 * np.sin(np.arange(90.0)))})
 ONSET = st.onset(CROOKED, LINE_STRENGTH, method=LOCAL)
 FIELDS = FIELD.sample(LINE, samples=3, seed=1)
-ON_PLANE = KNOWN[:20].expand_dims(y=np.arange(20) * 4e-4).assign_attrs(units="Pa")
 TRAVEL = np.linspace(0.0, 1e-3, 50)
 CURVE = pd.DataFrame({"travel (mm)": TRAVEL * 1e3, "force (N)": 2e5 * TRAVEL})
-SCOPE = vars(setups) | {
-    "BREAKING_PLANE": BREAKING_PLANE,
-    "make_peaks": make_peaks,
-    "u": u,
-    "stats": stats,
-}
 simulator = partial(st.external.simulator, PROBLEM, FIELD, method=LOCAL, samples=3)
-test_each_mistake_is_refused_as_recorded = mistakes(__file__, SCOPE | globals())
-test_a_refusal_or_a_doubt_holds_the_numbers_that_it_names = refusals("told", SCOPE | globals())
+test_each_mistake_is_refused_as_recorded = mistakes(__file__, vars(setups) | globals())
+test_a_refusal_or_a_doubt_holds_the_numbers_that_it_names = refusals(
+    "told", vars(setups) | globals()
+)

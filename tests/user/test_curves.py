@@ -1,9 +1,13 @@
 """Measured curves: peak, precursors and plateau, by hand and back from predicted ones."""
 
+import shutil
+from pathlib import Path
+
 import astropy.units as u
 import numpy as np
 import pandas as pd
 import pytest
+from recording import refusals
 from refusals import refuses
 from setups import beta_strength
 from specimens import crooked
@@ -13,6 +17,7 @@ from stiction.inference.agreement import summary_of
 from stiction.inference.curves import Curves, noise_of, turning_points
 from stiction.inference.peaks import make_peaks
 
+FILES = Path(__file__).parents[1] / "files"
 RNG = np.random.default_rng(0)
 TRAVEL = np.linspace(0.0, 1e-3, 2001)  # m
 
@@ -63,40 +68,38 @@ def test_noise_and_false_drops():
 
 def test_files_of_testing_machines(tmp_path):
     """Tests in a column, apart by empty lines, in a folder, over time, of a table of pandas."""
-    rows = [f"{x * 1e3:.5f};{f / 1e3:.6f}" for x, f in zip(TRAVEL, machine(), strict=True)]
-    head = "Weg (mm);Standardkraft (kN)"
     folder = tmp_path / "tests"
     folder.mkdir()
     refuses("no file", lambda: st.read_curve(folder))
     for name in ("a.csv", "b.txt"):
-        text = "\n".join(["Prüfer;M. Muster", head, *rows])
-        (folder / name).write_text(text.replace(".", ","))
+        shutil.copy(FILES / "curve_din_headings.csv", folder / name)
     (folder / "remarks.md").write_text("ground with 400")
-    (tmp_path / "blocks.csv").write_text("\n".join([head, *rows, "", head, *rows]))
-    numbered = [f"{test};{row}" for test in (7, 9) for row in rows]
-    (tmp_path / "column.csv").write_text("\n".join([f"test;{head}", *numbered]))
-    for source, names in {
-        folder: ["a", "b"],
-        tmp_path / "blocks.csv": ["blocks, test 1", "blocks, test 2"],
-        tmp_path / "column.csv": ["column, test 7", "column, test 9"],
-    }.items():
+    sources = {folder: ["a", "b"]}
+    for file in ("curve_two_tests", "curve_numbered"):
+        sources[FILES / f"{file}.csv"] = [f"{file}, test 1", f"{file}, test 2"]
+    for source, names in sources.items():
         curves = st.read_curve(source)
         assert [curve.name for curve in curves] == names
-        assert all(is_machine(curve, 0.0) for curve in curves)
-    frame = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine()})
-    assert is_machine(st.read_curve(frame, speed=1e-4)[0], 0.0)
+        assert curves.peaks == pytest.approx([65.0, 65.0])
+    assert is_machine(st.read_curve(FRAME, speed=1e-4)[0], 0.0)
+    assert is_machine(st.read_curve(FRAME * [1.0, -1.0], speed=1e-4)[0], 0.0)
     both = pd.DataFrame({"a (s)": TRAVEL * 1e4, "b (mm)": 1e3 * TRAVEL, "load (N)": machine()})
     assert is_machine(st.read_curve(both)[0], 0.0)  # of two columns without a name
-    with pytest.warns(st.AccuracyWarning, match="negative"):
-        assert is_machine(st.read_curve(frame * [1.0, -1.0], speed=1e-4)[0], 0.0)
-    with pytest.warns(st.AccuracyWarning, match="ends at its peak in test"):
-        st.read_curve(frame[:1000], speed=1e-4)
     forces = (k * machine() * u.N for k in (1, 2, 3))
     several = [st.read_curve((TRAVEL, force), travel_unit="m")[0] for force in forces]
     peaks = make_peaks(Curves(tuple(several)))
     assert (peaks.unit, peaks.values[0].tolist()) == ("N", [c.peak for c in several])
 
 
+FRAME = pd.DataFrame({"time (s)": TRAVEL * 1e4, "load (N)": machine()})
+SPIKED = np.where(TRAVEL[700] == TRAVEL, 180.0, machine(noise=0.1))
+
+
+def read(force, **options):
+    return st.read_curve((TRAVEL, force), unit="N", travel_unit="m", **options)[0]
+
+
+test_a_doubtful_curve_is_told = refusals("curves", globals())
 BLOCKS = crooked(
     nodes=128, height=0.05, weakening_rate=0.2e12, residual=0.2e6, load=st.Load(),
     drive=st.Pusher(height=0.01, width=0.004, stiffness=2e7),
@@ -155,21 +158,14 @@ def test_precursors_agree_with_their_own_prediction_and_not_with_another(paths):
     axes = st.plot.monte_carlo(own, measured=curves)
     assert axes.lines[-1].get_xdata() == pytest.approx(curves.peaks)
     assert axes.lines[-1].get_label() == "6 tests"
-    stress = np.array([1.0, 2.0, 3.0]) * u.Pa
-    refuses("are in Pa", lambda: st.plot.monte_carlo(own, measured=stress))
+    refuses("are in Pa", lambda: st.plot.monte_carlo(own, measured=[1.0, 2.0, 3.0] * u.Pa))
 
 
 def test_readings_that_are_no_friction():
-    """A spike is left out; noise moves no peak."""
+    """A spike is left out, and noise moves no peak."""
     noise = np.random.default_rng(0).standard_normal((20, 2001))
 
-    def read(force, **options):
-        return st.read_curve((TRAVEL, force), unit="N", travel_unit="m", **options)[0]
-
-    force = machine(noise=0.1)
-    force[700] = 180.0
-    with pytest.warns(st.AccuracyWarning, match="above both neighbours"):
-        assert is_machine(read(force), 0.1)
+    assert is_machine(read(SPIKED), 0.1)
     flat = 100.0 * np.tanh(TRAVEL / 2e-4)
     found = [read(flat + row) for row in noise]
     # The largest of hundreds of readings lies 3 standard deviations too

@@ -8,48 +8,19 @@ import pytest
 from joint import FIELD, GIVEN, PROBLEM, RANDOM
 from refusals import refuses
 from scipy.stats import norm
-from setups import EXACT, LOCAL, ensemble
+from setups import LOCAL, ensemble
 
 import stiction as st
 from stiction.cli.commands import app
 
 FACTOR = st.Lognormal(mean=1.0, cv=0.1)
 PRESSED = dataclasses.replace(PROBLEM, load=st.Load(pressing_force=5e6 * PROBLEM.area))
-STRENGTH = dataclasses.replace(FIELD, marginal=st.Gamma(mean=1e6, cv=0.15), quantity=None)
-
-SLIP = dataclasses.replace(PROBLEM, friction=st.LinearWeakening(critical_slip=4e-6))
 
 
 def of_mean(mean):
     """The random interface of the joint with another mean."""
     field = dataclasses.replace(FIELD, marginal=st.Gamma(mean=mean, cv=0.15))
     return dataclasses.replace(RANDOM, strength=field)
-
-
-@pytest.mark.parametrize(
-    ("problem", "name", "table", "key", "strength", "method"),
-    [
-        (PROBLEM, "normal_pressure", "load", "normal_pressure", FIELD, LOCAL),
-        (PRESSED, "pressing_force", "load", "pressing_force", FIELD, EXACT),
-        (SLIP, "critical_slip", "friction", "critical_slip", STRENGTH, EXACT),
-        (PROBLEM, "residual_strength", "friction", "residual_ratio", STRENGTH, EXACT),
-    ],
-)
-def test_a_factor_multiplies_a_constant(problem, name, table, key, strength, method):
-    """Sample by sample the onset is that of a problem with the constant times the factor."""
-    random = st.RandomInterface(strength=strength, between={name: FACTOR})
-    onsets = ensemble(problem, random, 12, method=method, seed=3).critical_stress
-    drawn = random.profiles(problem.interface, samples=12, seed=3)
-    (factors,) = (values[:, 0] for label, values in drawn.items() if label[0] == "b")
-    profiles = strength.sample(problem.interface, samples=12, seed=3)
-    part = getattr(problem, table)
-    for onset, factor, profile in zip(onsets.values, factors, profiles, strict=True):
-        changed = dataclasses.replace(part, **{key: getattr(part, key) * factor})
-        given = {"friction_coefficient": profile} if strength.quantity else profile
-        scaled = dataclasses.replace(problem, **{table: changed})
-        exact = st.onset(scaled, given, method=method).critical_stress.item()
-        assert onset == pytest.approx(exact, rel=1e-9)
-    assert np.std(factors) > 0.03
 
 
 def test_the_probability_of_a_coefficient_is_over_the_force_of_each_specimen():
@@ -79,11 +50,7 @@ PRESSURE = "problem.load.normal_pressure"
 
 
 def test_a_design_is_in_proportion_to_the_pressure():
-    """Stated ends count, the others are 10 % off; common draws make the ratios exact."""
-    design = st.design_stress(PROBLEM, RANDOM, probability=1e-2, sensitivities=True, **GIVEN)
-    found = design.sensitivities.sel(source=PRESSURE)
-    assert float(found.stress_at_low) == pytest.approx(0.9 * design.stress, rel=1e-6)
-    assert float(found.force_at_high) == pytest.approx(1.1 * design.force, rel=1e-6)
+    """Stated ends count, and common draws make the ratios exact."""
     given = GIVEN | {"probability": 1e-2, "sensitivities": {PRESSURE: (4e6, 8e6)}}
     wide = st.design_stress(PROBLEM, RANDOM, **given)
     ends = wide.sensitivities.sel(source=PRESSURE)

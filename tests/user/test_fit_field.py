@@ -6,16 +6,13 @@ import warnings
 import numpy as np
 import pytest
 import xarray as xr
+from records.test_mistakes_in_files import COUNT, SPACING, VALUES
 from refusals import refuses
 
 import stiction as st
 from stiction.inference.bootstrap import bootstrapped
 from stiction.inference.records import records_of
 
-FIELD = st.RandomField(
-    st.Lognormal(mean=1e6, cv=0.2), st.ExponentialSpectrum(1e-3), mean_mode=True
-)
-COUNT, SPACING = 400, 2e-4
 X = SPACING * np.arange(COUNT)
 LENGTH = "correlation_length"
 
@@ -25,8 +22,7 @@ def labelled(values, x=X):
     return xr.DataArray(values, dims="x", coords=coords, attrs={"units": "Pa"})
 
 
-RECORD = labelled(FIELD.sample(st.Interface(3 * COUNT * SPACING, 3 * COUNT), seed=5)[0, :COUNT])
-VALUES = RECORD.values
+RECORD = labelled(VALUES)
 
 
 def fitted(record, **options):
@@ -62,16 +58,6 @@ def test_a_trend_that_is_removed_leaves_the_fit_of_the_record_without():
         fitted(labelled(VALUES + added), detrend=3) for added in (trend - trend.mean(), 0.0)
     )
     assert found.parameters == pytest.approx(bare.parameters, rel=1e-6)
-
-
-def test_missing_values_are_left_out_and_counted():
-    values = VALUES.copy()
-    values[100:110] = np.nan
-    fit = fitted(labelled(values))
-    assert fit.missing == (10, 400)
-    assert "10 of 400 points are missing and left out" in str(fit)
-    there = np.isfinite(values)
-    assert fit.parameters == fitted(RECORD[there]).parameters
 
 
 def test_members_keep_their_moments_where_a_bound_of_beta_ends_at_zero():

@@ -6,7 +6,6 @@ The curves in `tests/files` have 36 readings and the peak 65 at the 25th, in the
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 import xarray as xr
 from recording import stored
@@ -15,50 +14,11 @@ from refusals import refuses
 import stiction as st
 from stiction.problem.reading import files
 
-X = np.array([0.0, 1.0, 2.0, 3.5])  # mm
-STRENGTH = np.array([1.0, 1.25, 0.975, 1.03])  # MPa
-ROWS = [f"{x};{v}" for x, v in zip(X, STRENGTH, strict=True)]
-
 
 def read(folder, text, **options):
     path = folder / "file.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
     return st.read_profile(path, **options)
-
-
-def is_read(profile, values=STRENGTH * 1e6, x=X * 1e-3):
-    np.testing.assert_allclose(profile, values, rtol=1e-14)
-    np.testing.assert_allclose(profile.x, x, rtol=1e-14)
-    return True
-
-
-def test_tables_of_pandas_with_their_index(tmp_path):
-    frame = pd.DataFrame({"x (mm)": X, "strength (MPa)": STRENGTH})
-    frame.to_csv(tmp_path / "t.csv")
-    frame.to_excel(tmp_path / "t.xlsx")
-    for name in ("t.csv", "t.xlsx"):
-        assert is_read(st.read_profile(tmp_path / name))
-        np.testing.assert_array_equal(
-            st.read_profile(tmp_path / name, x=0, value=2).x, range(4)
-        )
-    pd.DataFrame({"peak (MPa)": STRENGTH}).to_csv(tmp_path / "p.csv")
-    np.testing.assert_allclose(st.read_peaks(tmp_path / "p.csv").values[0], STRENGTH * 1e6)
-
-
-def test_words_and_numbers_for_missing_values(tmp_path):
-    text = "\n".join(["x (mm);strength (MPa)", *ROWS, "4;***", "5;#N/A", "6;1.#QNAN", "7;Bad"])
-    profile = read(tmp_path, text, missing="Bad")
-    assert np.isnan(profile.values[4:]).all()
-    assert is_read(profile[:4])
-    zero = "\n".join(["x (mm);strength (MPa)", *ROWS, "4;0", "5;-9999"])
-    assert is_read(read(tmp_path, zero, missing=[0, -9999])[:4])
-    heights = zero.replace("strength (MPa)", "height (um)")
-    with pytest.warns(st.AccuracyWarning, match="-9999 occurs in line 7"):
-        assert read(tmp_path, heights, quantity="height")[-1] == pytest.approx(-9999e-6)
-    peaks = tmp_path / "peaks.csv"
-    peaks.write_text("length (mm);peak (N)\n10;71.5\n10;72\n20;-1\n20;69\n10;lost\n20;75\n")
-    found = st.read_peaks(peaks, missing=("lost", -1))
-    assert [list(values) for values in found.values] == [[71.5, 72.0], [69.0, 75.0]]
 
 
 def test_maps_without_headings(tmp_path):

@@ -52,17 +52,6 @@ def test_check_says_what_a_run_says_before_its_first_sample(name, inside, runs):
     assert said("run study.toml --out run --no-pilot")[: len(checked)] == checked
 
 
-def test_a_doubt_of_a_unit_comes_instead_of_advice_that_follows_from_it():
-    """A modulus in MPa: no number of nodes would do."""
-    law, interface = st.LinearWeakening(weakening_rate=0.5e12), st.Interface(0.1, 1024)
-    for modulus, words in ((1e3, "check the units"), (1e8, "interface.nodes: must be")):
-        solid = st.Solid(shear_modulus=modulus, poisson_ratio=0.33, density=1170.0)
-        with pytest.raises(st.InputError) as caught:
-            st.Problem(solid, interface, law)
-        assert words in str(caught.value).lower()
-        assert ("interface.nodes: must be" in str(caught.value)) == (modulus == 1e8)
-
-
 def test_every_help_has_examples_and_no_text_is_cut(runs):
     overview = runs("--help")
     assert "..." not in overview.replace("[ARGS]...", "")

@@ -1,4 +1,4 @@
-"""Results keep what they hold: copies, JSON, processes; and a notebook that is saved."""
+"""Results keep what they hold: copies, JSON, processes."""
 
 import copy
 import json
@@ -12,12 +12,6 @@ import pytest
 
 import stiction as st
 
-CELL = """
-import stiction as st
-problem = st.paper.problem(nodes=1024)
-strength = st.paper.strength(problem, correlation_ratio=1.0)
-result = st.monte_carlo(problem, strength, method=st.Equilibrium(), samples=300, seed=0)
-"""
 PEAKS = [0.69e6, 0.70e6, 0.73e6, 0.68e6, 0.71e6]
 TRAVEL = np.linspace(0.0, 1e-3, 400)
 FORCE = np.where(TRAVEL < 4e-4, 1.23e7 * TRAVEL, 4.1e3)
@@ -82,19 +76,3 @@ def test_a_lambda_in_a_process_pool_is_named():
     refused = pytest.raises(st.InputError, match="executor: .*lambda")
     with ProcessPoolExecutor(1) as pool, refused:
         st.monte_carlo(problem, field, method=method, samples=4, executor=pool, progress=False)
-
-
-@pytest.mark.slow  # kernels are compiled, so that progress is shown
-def test_a_saved_notebook_keeps_one_empty_output_of_progress(monkeypatch, tmp_path):
-    notebooks = pytest.importorskip("nbformat.v4")
-    run = pytest.importorskip("nbconvert.preprocessors").ExecutePreprocessor
-    monkeypatch.delenv("MPLBACKEND", raising=False)
-    for name in ("STICTION_CACHE_DIR", "NUMBA_CACHE_DIR"):
-        monkeypatch.setenv(name, str(tmp_path / name))
-    cells = [CELL, "st.plot.monte_carlo(result);", "result.critical_stress.size"]
-    notebook = notebooks.new_notebook(cells=[notebooks.new_code_cell(cell) for cell in cells])
-    saved, _ = run(timeout=600, kernel_name="python3").preprocess(notebook)
-    progress, figure, number = (cell.outputs for cell in saved.cells)
-    assert [dict(output.get("data", output)) for output in progress] == [{}]
-    assert ["image/png" in output.data for output in figure] == [True]
-    assert [output.data["text/plain"] for output in number] == ["300"]

@@ -1,29 +1,16 @@
 """Profiles and maps of one's own: units, coordinates and gaps decide, wherever one enters."""
 
-import dataclasses
 import warnings
 
-import astropy.units as u
 import numpy as np
 import pytest
 import xarray as xr
 from recording import stored
-from setups import LOCAL, make_problem
+from records.test_mistakes_in_files import LINE, NODES, PLANE, STRENGTH, SYSTEM, X, onset
+from setups import make_problem
 from small_study import small_study
 
 import stiction as st
-
-NODES = 128
-LINE = st.Interface(length=0.1, nodes=NODES)
-PLANE = st.Interface(length=(0.02, 0.01), nodes=(32, 16))
-X = LINE.x
-SYSTEM = make_problem(NODES, weakening_rate=0.15e12)
-# One weak place, at 60 mm.
-STRENGTH = 1e6 - 4e5 * np.exp(-(((X - 0.06) / 4e-3) ** 2)) + 1e6 * X
-
-
-def onset(tau_p):
-    return st.onset(SYSTEM, tau_p, method=LOCAL)
 
 
 def found(tau_p):
@@ -82,20 +69,16 @@ def test_the_names_of_dimensions_decide_where_samples_equal_nodes():
 
 
 def test_everything_beside_the_strength_is_read_alike():
+    """What a sample holds, and what a problem holds; labels of a dataset name what is measured."""
     residual = 1e5 + 1e6 * X
     tau_r = labelled(residual[::-1] * 1e-3, X[::-1] * 1e3, "mm", units="kPa")
     initial = xr.DataArray(0.01, attrs={"units": "MPa"})
-    given = {"strength": STRENGTH, "residual_strength": tau_r, "initial_stress": initial}
-    rows = SYSTEM.sample(given)
-    np.testing.assert_allclose(rows.residual_strength[0], residual, rtol=1e-14)
-    np.testing.assert_allclose(rows.initial_stress, 1e4)
-    load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]), initial_stress=0.1 * u.MPa)
-    law = {"weakening_rate": np.full(NODES, 0.2) * u.MPa / u.um, "residual_strength": tau_r}
-    problem = make_problem(NODES, load=load, **law)
-    assert problem.friction.weakening_rate == pytest.approx(np.full(NODES, 0.2e12))
+    load = st.Load(profile=labelled(1.0 + X[::-1], X[::-1]))
+    problem = make_problem(NODES, load=load, residual_strength=tau_r)
     np.testing.assert_allclose(problem.friction.residual_strength, residual, rtol=1e-14)
     np.testing.assert_array_equal(problem.load.profile, 1.0 + X)
-    assert problem.load.initial_stress == pytest.approx(1e5)
+    rows = SYSTEM.sample({"strength": STRENGTH, "initial_stress": initial})
+    np.testing.assert_allclose(rows.initial_stress, 1e4)
     dataset = labelled().to_dataset(name="tau_p").assign(tau_i=labelled(STRENGTH / 2))
     assert found({"strength": dataset}) == found(STRENGTH)
     assert "unit" not in st.read_profile(labelled(STRENGTH / 1e6, unit="MPa")).attrs
@@ -146,20 +129,3 @@ def test_a_netcdf_file_holds_numbers_of_any_type(kind, tmp_path):
     values = (1 + np.arange(NODES) % 100).astype(kind)
     labelled(values, x_unit="m", units="kPa").rename("strength").to_netcdf(tmp_path / "a.nc")
     np.testing.assert_array_equal(st.read_profile(tmp_path / "a.nc"), 1e3 * values)
-
-
-def test_a_pressure_without_places_is_the_mean_between_glued_plates():
-    """Also where there are as many samples as nodes."""
-    glued = dataclasses.replace(
-        make_problem(64, 0.15, weakening_rate=0.1e12),
-        specimen=st.Blocks(height=0.05, pressing="glued"),
-    )
-    strength = np.linspace(1.0e6, 1.1e6, 64 * 64).reshape(64, 64)
-    of_mean = 2e6 * glued.blocks.pressure
-    for pressure, expected in (
-        (np.full(64, 2e6), np.full(64, 2e6)),
-        (np.full((64, 1), 2e6), of_mean),
-        (2e6, of_mean),
-    ):
-        rows = glued.sample({"strength": strength, "normal_pressure": pressure})
-        np.testing.assert_allclose(rows.normal_pressure, np.tile(expected, (64, 1)))

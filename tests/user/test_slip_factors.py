@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from joint import PROBLEM
-from refusals import refuses
 
 import stiction as st
 from stiction.inference.standards import fractile_factor
@@ -131,22 +130,6 @@ def test_slip_loads_over_clamping_forces(written):
     assert "normal force" in str(peaks)
     peaks = written(rows, normal=196e3, surfaces=2)
     np.testing.assert_allclose(peaks.values[0], loads / 392.0, rtol=1e-12)
-
-
-def test_statistics_without_a_name_are_no_tests(written):
-    """Without a number where others have one, or below an empty line of a table without numbers."""
-    rows, words = lines_of(FACTORS), "the mean or the deviation of the tests above ... in front"
-    bare = [row.partition(";")[2] for row in rows]
-    heading = HEADING.partition(";")[2]
-    loads = np.array([float(row.partition(";")[0]) for row in bare])
-    for value in (loads.mean(), loads.std(ddof=1)):
-        refuses(words, lambda v=value: written([*rows, f";{v:.3f};"], normal=None))
-        last = ["", f"{value:.3f};390.0"]
-        refuses(words, lambda last=last: written([*bare, *last], heading, normal=None))
-    further = ["", f"6;{loads.mean():.3f};390.0"]  # numbered, so a test
-    assert written([*rows, *further], normal=None).values[0].size == 11
-    other = ["", f"{loads.mean() + 0.01:.3f};390.0"]
-    assert written([*bare, *other], heading, normal=None).values[0].size == 11
 
 
 def test_an_agreement_compares_specimens_not_slip_loads(written):

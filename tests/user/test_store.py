@@ -46,13 +46,6 @@ def make_study(samples=60, **changes):
     return st.Study.from_dict(STUDY | {"samples": samples} | changes)
 
 
-@pytest.fixture
-def often(monkeypatch):
-    """Many chunks of twenty samples instead of one a second."""
-    monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(batches, "piece_size", lambda one, span, *rest: min(20, span.samples))
-
-
 @pytest.fixture(scope="module")
 def reference():
     return make_study().run(workers=1)
@@ -68,7 +61,7 @@ def again(folder, executor=None):
 # -- what is stored is what is computed ----------------------------------------------------------
 
 
-def test_growing_computes_only_the_new_samples(tmp_path, often, reference):
+def test_growing_computes_only_the_new_samples(tmp_path, small_chunks, reference):
     make_study(samples=40).run(out=tmp_path / "run")
     counting = AtOnce()
     assert make_study().run(out=tmp_path / "run", executor=counting).identical(reference)
@@ -90,7 +83,7 @@ def test_every_sample_is_in_one_part_and_parts_are_alike(points, samples, of):
     assert max(sizes) - min(sizes) <= max(1, points * samples // (8 * of))
 
 
-def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
+def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, small_chunks):
     options = {"out": tmp_path / "run", "workers": 1, "pilot": False}
     thread = threading.Thread(target=lambda: make_study(120).run(**options), daemon=True)
     thread.start()
@@ -108,7 +101,7 @@ def test_a_reader_beside_a_writer_sees_no_damage(tmp_path, often):
 
 
 @pytest.mark.parametrize("number", [errno.EIO, errno.EACCES])
-def test_what_cannot_be_read_is_not_damaged(tmp_path, often, monkeypatch, number):
+def test_what_cannot_be_read_is_not_damaged(tmp_path, small_chunks, monkeypatch, number):
     run = tmp_path / "run"
     make_study().run(out=run, workers=1)
     before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
@@ -146,7 +139,7 @@ def test_counts_are_whole_numbers_and_samples_beyond_the_last_are_left_out():
         np.testing.assert_array_equal(counts[:2], whole.columns["arrested_events"][:2])
 
 
-def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypatch):
+def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, small_chunks, monkeypatch):
     def results(self, first, count):
         raise FloatingPointError("the slip rate became non-finite")
 
@@ -156,7 +149,7 @@ def test_a_study_that_fails_from_the_start_is_given_up(tmp_path, often, monkeypa
             make_study().run(out=out, workers=1)
 
 
-def test_a_lost_worker_leaves_what_is_done(tmp_path, often, reference):
+def test_a_lost_worker_leaves_what_is_done(tmp_path, small_chunks, reference):
     options = {"out": tmp_path / "run", "executor": AtOnce(lost=3), "workers": 1}
     words = "items ... of point 0 ... is gone"
     refuses(words, lambda: make_study().run(**options), WorkerError)

@@ -55,7 +55,7 @@ def test_folders_of_kernels_are_made_for_their_user_alone(tmp_path):
 
 
 @pytest.mark.parametrize("depth", range(4))
-def test_a_folder_that_others_could_write_is_not_used(tmp_path, depth):
+def test_a_folder_of_others_or_that_they_could_write_is_not_used(tmp_path, depth):
     """Whichever of them it is: who can write to one above can put another in its place."""
     folder = tmp_path / "cache" / "compiled" / "digest"
     kept(folder)
@@ -71,18 +71,10 @@ def test_a_folder_that_others_could_write_is_not_used(tmp_path, depth):
         assert stat.S_IMODE(place.stat().st_mode) == 0o700
     weak.chmod(0o1777)  # others cannot put anything in the place of what is there
     assert bool(kept(folder)[1]) == (depth < 2)
-
-
-@pytest.mark.skipif(getattr(os, "geteuid", lambda: 1)() != 0, reason="only root gives away")
-@pytest.mark.parametrize("depth", range(3))
-def test_a_folder_of_another_user_is_not_used(tmp_path, depth):
-    folder = tmp_path / "cache" / "compiled"
-    kept(folder)
-    (folder / "kernel").write_text("")
-    weak = (folder / "kernel", folder, folder.parent)[depth]
-    os.chown(weak, 12345, 0)
-    _, (warning,) = kept(folder)
-    assert f"{weak} belongs to another user" in warning
+    if os.geteuid() == 0 and depth < 3:  # only root gives away
+        weak.chmod(0o700)
+        os.chown(weak, 12345, 0)
+        assert f"{weak} belongs to another user" in kept(folder)[1][0]
 
 
 WHERE = """
@@ -240,14 +232,6 @@ def virtual(file):
     return file.create_virtual_dataset("strength", layout)
 
 
-def link(kind, *place):
-    def made(file):
-        file.create_group("deep")[f"{kind.__name__}"] = kind(*place)
-        file["strength"] = kind(*place)
-
-    return made
-
-
 def inflating(file):
     """A chunk of eight values that unpacks to 64 MB."""
     made = stored((8,), "f8", chunks=(8,), **GZIP)(file)
@@ -259,8 +243,9 @@ GZIP = {"compression": "gzip"}
 NETCDF_ATTACKS = {
     "external storage": ("another file", stored((8,), "u1", external=[("secret", 0, 8)])),
     "virtual": ("another file", virtual),
-    "external link": ("is a link", link(h5py.ExternalLink, "other.nc", "strength")),
-    "soft link": ("is a link", link(h5py.SoftLink, "/elsewhere")),
+    "external link": (
+        "is a link", lambda f: f.update(strength=h5py.ExternalLink("other.nc", "strength"))),
+    "soft link": ("is a link", lambda f: f.update({"deep/strength": h5py.SoftLink("/a")})),
     "many values": ("more than the limit", stored((2**40,), "f8", chunks=(2**20,), **GZIP)),
     "large chunks": (
         "more than the limit", stored((8,), "f8", maxshape=(None,), chunks=(2**26,), **GZIP)),
