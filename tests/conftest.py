@@ -120,9 +120,10 @@ def runs(command):
 
 
 @pytest.fixture
-def small_chunks(monkeypatch):
-    """Many chunks of few samples instead of one a second."""
+def small_chunks(monkeypatch, request):
+    """Many chunks of few samples, of which a module may say how many, instead of one a second."""
     from stiction.ensemble import batches, store
 
     monkeypatch.setattr(store, "SAVE_SECONDS", 0.0)
-    monkeypatch.setattr(batches, "piece_size", lambda one, span, *rest: min(7, span.samples))
+    most = getattr(request.module, "IN_A_CHUNK", 20)
+    monkeypatch.setattr(batches, "piece_size", lambda one, span, *_: min(most, span.samples))

@@ -22,6 +22,7 @@ pytestmark = [
     pytest.mark.usefixtures("small_chunks"),
     pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked"),
 ]
+IN_A_CHUNK = 7
 METHODS = [{"type": "local_criterion"}, {"type": "equilibrium"}]
 SWEEP = [lengths(8e-3, 12e-3)[0] | {"method": METHODS}]
 STUDY = st.Study.from_dict(small_study(64, samples=40, keep=["strength"], sweep=SWEEP))
