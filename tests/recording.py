@@ -91,6 +91,17 @@ def stored(name: str) -> Any:
     return json.loads((Path(__file__).parent / "records" / f"{name}.json").read_text())
 
 
+def evaluated(name: str, scope: dict[str, Any]) -> Any:
+    """A table of tests/records/contracts.json, of texts that are evaluated in a module."""
+
+    def value(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: value(inner) for key, inner in part.items()}
+        return eval(part, scope)
+
+    return value(stored("contracts")[name])
+
+
 def write(path: Path, records: Mapping[str, Mapping[str, Any]]) -> None:
     """Write records, an output a line."""
     blocks = []

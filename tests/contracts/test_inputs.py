@@ -11,6 +11,7 @@ import pandas as pd
 import pint
 import pytest
 import xarray as xr
+from recording import evaluated
 from refusals import refuses, warning_texts
 from setups import LOCAL, make_problem
 
@@ -32,32 +33,8 @@ KPA = STRENGTH * 1e-3
 LABELS = "to_numpy()"  # the way out
 IN_ORDER, PLACED, GAP = STRENGTH, STRENGTH, HOLES
 
-PROFILES = {  # of a line, and what comes of it: values at the nodes, or words of a refusal
-    "array": (STRENGTH, IN_ORDER),
-    "list": (STRENGTH.tolist(), IN_ORDER),
-    "tuple": (tuple(STRENGTH), IN_ORDER),
-    "masked array": (MASKED, GAP),
-    "list with None": ([None if v != v else v for v in HOLES], GAP),
-    "object array": (HOLES.astype(object), GAP),
-    "Series": (pd.Series(STRENGTH), LABELS),
-    "Series over positions": (pd.Series(STRENGTH[ORDER], index=X[ORDER]), LABELS),
-    "Series with a unit": (pd.Series(KPA, name="strength (kPa)"), LABELS),
-    "DataFrame of rows": (pd.DataFrame([STRENGTH]), LABELS),
-    "DataFrame of columns": (pd.DataFrame(STRENGTH[ORDER], index=X[ORDER]), LABELS),
-    "table": (pd.DataFrame({"x (mm)": X * 1e3, "strength (kPa)": KPA}).loc[ORDER], PLACED),
-    "table with an index": (pd.DataFrame({"x": X, "strength": STRENGTH}).set_index("x"), PLACED),
-    "table of text": (pd.DataFrame({"x": X, "strength": [f"a{v}" for v in X]}), "numbers"),
-    "DataArray": (xr.DataArray(KPA, {"x": X}, ("x",), attrs={"units": "kPa"}), PLACED),
-    "DataArray of pint": (xr.DataArray(KPA * Q.kPa, {"x": X}, "x", attrs={"unit": "kPa"}), PLACED),
-    "pint": (KPA * Q.kPa, IN_ORDER),
-    "astropy": (KPA * u.kPa, IN_ORDER),
-    "list of pint": ([v * Q.kPa for v in KPA], IN_ORDER),
-    "list of astropy": ([v * u.kPa for v in KPA], IN_ORDER),
-    "lengths": (KPA * u.m, "Pa"),
-    "mixed list": ([KPA[0] * u.kPa, *STRENGTH[1:]], "without a unit"),
-    "400 digits": (np.array([10**400] * NODES, dtype=object), "numbers"),
-    "a mask over all": (np.ma.masked_all(NODES), "mask"),
-}  # fmt: skip
+PROFILES = evaluated("profiles of a line", globals())
+"""What a user holds, and what comes of it: values at the nodes, or words of a refusal."""
 
 
 PROBLEM = make_problem(NODES, 0.1)
@@ -147,19 +124,8 @@ def test_each_quantity_is_read_in_si(quantity):
 
 
 PEAKS = np.array([700.0, 720.0, 750.0, 690.0])  # kPa
-TESTS = {
-    "array": PEAKS * 1e3,
-    "list": [*(PEAKS * 1e3)],
-    "Series": pd.Series(PEAKS * 1e3),
-    "shuffled Series": pd.Series(PEAKS * 1e3).sample(frac=1.0, random_state=0).sort_values(),
-    "Series with a unit": pd.Series(PEAKS, name="peak [kPa]"),
-    "table": pd.DataFrame({"test": [*"abcd"], "peak (kPa)": PEAKS}),
-    "DataArray": xr.DataArray(PEAKS, dims="test", attrs={"units": "kPa"}),
-    "pint": PEAKS * Q.kPa,
-    "astropy": PEAKS * u.kPa,
-    "list of pint": [v * Q.kPa for v in PEAKS],
-    "list of astropy": [v * u.kPa for v in PEAKS],
-}
+TESTS = evaluated("peaks of four tests", globals())
+"""What a user holds, as kPa or as Pa."""
 
 
 @pytest.mark.parametrize("kind", TESTS)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import BODIES, FIELD, attempt
+from recording import evaluated
 from refusals import warning_texts
 from stand_ins import StandIn
 
@@ -32,43 +33,10 @@ PEAKS = [5.9e5, 6.2e5, 6.6e5, 7.1e5]
 PRIOR, SECOND = {"marginal.low": (5.6e5, 7.2e5)}, {"marginal.low": (5e5, 7.2e5)}
 DRAWN = {"problem": LINE, "random": FIELD, "method": LOCAL}
 ROWS_OF_ONSETS = st.monte_carlo(**DRAWN, samples=40, pilot=False, progress=False)
-BASE: dict[str, dict[str, Any]] = {  # public call: arguments of a cheap example
-    "onset": {"problem": LINE, "profiles": ROWS, "method": LOCAL},
-    "equilibrium_path": {"problem": LINE, "profiles": ROWS[0], "loads": [3e5, 6e5]},
-    "simulate_rupture": {
-        "problem": LINE, "profiles": ROWS[0], "method": st.Rupture(loading_rate=1e9),
-        "save": st.Save(["slip"]),
-    },
-    "monte_carlo": DRAWN | {"samples": 40, "pilot": False},
-    "failure_probability": DRAWN | {"stress": 6.6e5, "target_cv": 0.4},
-    "design_stress": DRAWN | {"probability": 0.1, "target_cv": 0.4},
-    "failure_curve": DRAWN | {"smallest": 0.1, "target_cv": 0.4},
-    "fit_field": {
-        "profiles": NOISY, "interface": SHORT, "marginal": "lognormal",
-        "spectrum": "exponential", "noise": False, "bootstrap": 20,
-    },
-    "infer": DRAWN | {"peaks": PEAKS, "unit": "Pa", "prior": PRIOR, "samples": 200},
-    "design_of_tests": DRAWN | {
-        "prior": PRIOR, "designs": {"few": 3}, "repetitions": 10, "samples": 100,
-        "load_cell_error": 9.0,
-    },
-    "statistics.agreement": {
-        "prediction": ROWS_OF_ONSETS, "peaks": PEAKS, "unit": "Pa", "load_cell_error": 9.0,
-    },
-    "external.simulator": DRAWN | {"parameters": ("marginal.low",), "samples": 4},
-}  # fmt: skip
-OTHERS: dict[str, Any] = {  # parameter: another value, for all calls or by call
-    "problem": OTHER, "random": WEAKER, "method": EXACT, "samples": 150, "seed": 5,
-    "keep": ["strength"], "pilot": True, "profiles": 0.98 * ROWS, "loads": [3e5, 5.5e5],
-    "stress": 6.4e5, "friction_coefficient": 0.31, "force": 270.0, "target_cv": 0.05,
-    "probability": 0.2, "max_evaluations": 100, "algorithm": "subset", "smallest": 0.02,
-    "sensitivities": True, "save": st.Save(["slip"], every=2), "event": 0,
-    "interface": st.Interface(0.025, 128), "marginal": "gamma", "spectrum": "power_law",
-    "detrend": 1, "noise": 2e4, "anisotropy": 2.0, "between": True, "bootstrap": 30,
-    "quantity": "residual_strength", "peaks": [6e5, 6.3e5, 6.6e5, 7.1e5], "prior": SECOND,
-    "load_cell_error": 3e4, "unit": "kPa", "designs": {"more": 6}, "repetitions": 12,
-    "prediction": 1.02 * ROWS_OF_ONSETS, "replicates": 120, "parameters": ("marginal.high",),
-}  # fmt: skip
+BASE: dict[str, dict[str, Any]] = evaluated("arguments of calls", globals())
+"""Arguments of a cheap example of each public call."""
+OTHERS: dict[str, Any] = evaluated("other arguments", globals())
+"""Another value of a parameter, for all calls, or by call in BY_CALL."""
 BY_CALL: dict[tuple[str, str], Any] = {
     ("equilibrium_path", "method"): st.Rupture(), ("equilibrium_path", "profiles"): 0.98 * ROWS[0],
     ("simulate_rupture", "method"): st.Rupture(loading_rate=3e9),

@@ -11,6 +11,7 @@ import openpyxl
 import pandas as pd
 import pytest
 from contracts.bodies import BODIES, FIELD, attempt
+from recording import evaluated
 from refusals import warning_texts
 
 import stiction as st
@@ -43,33 +44,8 @@ def of_three_digits(table: Any) -> Any:
 TURNED = [*PROFILE[:1], *PROFILE[2:], [4.0, *PROFILE[1][1:]]]
 """The first node at the end of the period."""
 ABOVE = [["7", "8", "9", "1"], ["", "", "", ""]]
-OPTIONS: dict[str, dict[str, Any]] = {  # reader: option: a table in which it counts, a value
-    "read_profile": {
-        "x": (PROFILE, "far (mm)"), "value": (PROFILE, "other (MPa)"),
-        "unit": (headed(PROFILE, "", "", "strength", "other"), "kPa"),
-        "x_unit": (headed(PROFILE, "x", "far", "", ""), "cm"),
-        "quantity": ([row[::2] for row in PROFILE], "initial_stress"),
-        "strength": (HEIGHTS, lambda h: 1e6 + 1e11 * h), "missing": (PROFILE, 1.0625),
-        "decimal": (of_three_digits(PROFILE), ","), "skip": (ABOVE + PROFILE, 2), 
-        "sheet": (PROFILE, "More"),
-        "interface": (TURNED, st.Interface(4e-3, 8)),
-    },
-    "read_curve": {
-        "force": (CURVE, "side (N)"), "travel": (CURVE, "time (s)"),
-        "unit": (headed(CURVE, "", "", "friction", "side"), "kN"),
-        "travel_unit": (headed(CURVE, "time", "travel", "", ""), "cm"),
-        "speed": ([row[::2] for row in CURVE], 1e-3), "noise": (CURVE, 2.0),
-        "split": (CYCLES, "cycles"), "missing": (CURVE, 24.0), 
-        "decimal": (of_three_digits(CURVE), ","),
-        "skip": (ABOVE + CURVE, 2), "sheet": (CURVE, 1),
-    },
-    "read_peaks": {
-        "value": (PEAKS, "other (kN)"),
-        "unit": (headed(PEAKS, "", "peak", "other", ""), "N"), "normal": (PEAKS, "normal (kN)"),
-        "surfaces": (PEAKS, 2), "missing": (PEAKS, 12.5), "decimal": (of_three_digits(PEAKS), ","),
-        "skip": (ABOVE + PEAKS, 2), "sheet": (PEAKS, "More"),
-    },
-}  # fmt: skip
+OPTIONS: dict[str, dict[str, Any]] = evaluated("options of readers", globals())
+"""Of a reader, by option: a table in which it counts, and a value."""
 BASE = {("read_peaks", "surfaces"): {"normal": "normal (kN)"}}
 CASES = [(reader, option) for reader in OPTIONS for option in OPTIONS[reader]]
 

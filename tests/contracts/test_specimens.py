@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from contracts.bodies import COEFFICIENTS, SOLID, World, _rewritten
 from contracts.test_results import alike_but_for_places, assert_alike
+from recording import evaluated
 from setups import examples
 
 import stiction as st
@@ -47,29 +48,8 @@ def slider(drive: Any = None, base: st.Base = BASE, **more: Any) -> st.Problem:
     return body(st.Slider(**of_slider), st.Load(pressing_force=1.1e3))
 
 
-BODIES = {  # a number of each field of Load, Blocks, Slider, Base and of each drive
-    "profile": body(load=dataclasses.replace(PRESSED, profile=1.0 + 0.4 * np.sin(7.0 * X))),
-    "initial stress": body(load=dataclasses.replace(PRESSED, initial_stress=9e4 * X)),
-    "uneven pressure": body(load=st.Load(normal_pressure=2e6 + 4e5 * np.cos(5.0 * X))),
-    "force": body(blocks(st.Platen()), st.Load(pressing_force=1.1e3)),
-    "uneven pressure on blocks": body(
-        blocks(st.Platen()),
-        st.Load(normal_pressure=2e6 + 4e5 * np.cos(5.0 * X), initial_stress=4e4),
-    ),
-    "dead load": body(blocks(st.Platen())),
-    "machine": body(blocks(st.Platen(stiffness=3e7, mass=0.1), quality_factor=9.0)),
-    "rigid machine": body(blocks(st.Platen(stiffness=INF))),
-    "glued": body(blocks(st.Platen(), pressing="glued"), st.Load(pressing_force=1.1e3)),
-    "pusher up to the top": body(blocks(pusher(0.9, 0.2))),
-    "pusher down to the interface": body(blocks(pusher(0.04, 0.08, side="right", stiffness=2e7))),
-    "pusher of a whole side": body(blocks(pusher(0.5, 1.0, mass=0.05, stiffness=2e7))),
-    "two pushers": body(blocks(pusher(0.4, 0.3, side="both", stiffness=INF), pressing="glued")),
-    "slider": slider(),
-    "tilted slider": slider(tilt=0.3),
-    "slider under a plate": slider(pressing="plate"),
-    "slider on rollers": slider(base=dataclasses.replace(BASE, bottom="rollers", solid=SOFTER)),
-    "slider sheared at its top": slider(st.TopShear(stiffness=4e7)),
-}  # fmt: skip
+BODIES = evaluated("loads and specimens", globals())
+"""A number of each field of Load, Blocks, Slider, Base and of each drive."""
 SHAKEN = ("uneven pressure on blocks", "machine", "glued", "pusher down to the interface",
           "pusher of a whole side", "two pushers")  # fmt: skip
 CASES = [(name, "equilibrium") for name in BODIES] + [(name, "rupture") for name in SHAKEN]
