@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import SOLID, attempt
+from recording import evaluated
 
 import stiction as st
 from stiction.problem.sample import REPLACED
@@ -172,14 +173,8 @@ def test_a_property_that_hardly_varies_is_a_constant(name, call):
         np.testing.assert_allclose(found, expected, rtol=CLOSE.get(call, 1e-5))
 
 
-STATED = {  # the constant of a problem that a factor multiplies
-    "residual_strength": ("friction.residual_ratio", 0.3),
-    "initial_stress": ("load.initial_stress", 5e4),
-    "normal_pressure": ("load.normal_pressure", 2e6),
-    "pressing_force": ("load.pressing_force", 1.3e3),
-    "critical_slip": ("friction.critical_slip", 5e-6),
-    "fracture_energy": ("friction.fracture_energy", 4.0),
-}  # fmt: skip
+STATED = evaluated("constants with a factor", globals())
+"""The constant of a problem that a factor multiplies."""
 
 
 @pytest.mark.parametrize("name", FACTORS)
@@ -236,21 +231,8 @@ def test_what_a_result_holds_gives_its_numbers_again():
     assert labelled == plain
 
 
-SHAPED = {  # by the number of the group of strengths that are proportional
-    "plain": (0, FACTORED),
-    "another mean": (0, st.RandomInterface(
-        strength=dataclasses.replace(FIELD, marginal=st.Gamma(mean=7e5, cv=0.2)),
-        between={"pressing_force": st.Weibull(mean=1.0, cv=0.3)})),
-    "no mean mode, another factor": (1, st.RandomInterface(
-        strength=dataclasses.replace(FIELD, mean_mode=False),
-        between={"critical_slip": FACTORED.between["strength"]})),
-    "more modes": (2, dataclasses.replace(
-        FACTORED, strength=dataclasses.replace(FIELD, spectrum=st.ExponentialSpectrum(6e-3)))),
-    "shifted": (3, dataclasses.replace(FACTORED, strength=dataclasses.replace(
-        FIELD, marginal=st.Gamma(mean=1.4e6, cv=1.0 / 7.0, low=4e5)))),
-    "measured": (4, st.RandomInterface(strength=FIELD.given(
-        xr.DataArray([0.9e6, 1.1e6], {"x": [0.01, 0.03]}, "x"), noise=1e4))),
-}  # fmt: skip
+SHAPED = evaluated("members of a list", globals())
+"""Each with the number of the group of strengths that are proportional."""
 
 
 @pytest.mark.parametrize("order", [(), (3, 0, 5, 1, 4, 2)])
