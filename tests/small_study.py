@@ -6,25 +6,18 @@ import copy
 from functools import reduce
 from typing import Any
 
+from recording import stored
+
 
 def small_study(
     nodes: Any = 128, length: Any = 0.1, weakening_rate: float = 0.25e12,
     correlation_length: float = 4e-3, **tables: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """A study in plain form; `tables` replace or add those of this name."""
-    marginal = {"type": "beta", "alpha": 1.5, "beta": 3.0, "low": 0.66e6, "high": 1.66e6}
-    spectrum = {"type": "power_law", "correlation_length": correlation_length}
-    plain = {
-        "problem": {
-            "solid": {"shear_modulus": 1e9, "poisson_ratio": 0.33, "density": 1170.0},
-            "interface": {"length": length, "nodes": nodes},
-            "friction": {"weakening_rate": weakening_rate},
-        },
-        "random": {"strength": {"marginal": marginal, "spectrum": spectrum}},
-        "method": {"type": "local_criterion"},
-        "samples": 30,
-        "seed": 3,
-    }
+    plain = stored("small_study")
+    plain["problem"]["interface"] = {"length": length, "nodes": nodes}
+    plain["problem"]["friction"] = {"weakening_rate": weakening_rate}
+    plain["random"]["strength"]["spectrum"]["correlation_length"] = correlation_length
     return plain | tables
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.stats
 from contracts.test_laws import DENSITIES, STRENGTHS
+from recording import stored
 from scipy.integrate import quad
 from setups import beta_strength
 
@@ -24,6 +25,8 @@ from stiction.random.mapping import (
 
 LINE = st.Interface(length=0.1, nodes=256)
 COARSE = st.Interface(length=0.1, nodes=64)
+MULTIPLES = stored("cases")["multiples of a marginal"]
+"""Marginals as functions of a factor, of which the lognormal one needs no table at all."""
 
 
 def field_of(marginal, correlation_length=2e-3, **options):
@@ -45,15 +48,14 @@ def test_density_on_the_plane_integrates_to_the_line_across(spectrum):
     np.testing.assert_allclose(across / across[0], along / along[0], rtol=1e-7, atol=1e-9)
 
 
+BOUNDED = [marginal.distribution for marginal in [*STRENGTHS.values()][:5]]
+TRIANGLE = scipy.stats.triang(0.3, loc=1.0, scale=2.0)
+SKEWED = scipy.stats.invgauss(0.145)  # whose tails scipy inverts poorly
+
+
 @pytest.mark.filterwarnings("ignore:Error in function:RuntimeWarning")  # scipy, of invgauss
 @pytest.mark.parametrize(
-    "distribution",
-    [
-        *(marginal.distribution for marginal in [*STRENGTHS.values()][:5]),  # of finite ends
-        scipy.stats.triang(0.3, loc=1.0, scale=2.0),
-        scipy.stats.invgauss(0.145),  # whose tails scipy inverts poorly
-    ],
-    ids=lambda d: d.dist.name,
+    "distribution", [*BOUNDED, TRIANGLE, SKEWED], ids=lambda d: d.dist.name
 )
 def test_table_of_the_map_matches_the_quantile(distribution):
     marginal = field_of(distribution, 1.0).marginal
@@ -77,17 +79,13 @@ def test_the_far_end_of_a_beta_marginal_is_its_bound():
     np.testing.assert_allclose(from_normal(marginal, z), 1.2e6, rtol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("nodes", "ends"),
-    [(16, "periodic"), (100, "periodic"), ((16, 10), "periodic"), ((8, 48), "periodic"),
-     (50, "free")],
-)  # fmt: skip
+@pytest.mark.parametrize("nodes", [16, 100, (16, 10), (8, 48), 50])
 @pytest.mark.parametrize("mean_mode", [False, True])
-def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, ends, mean_mode):
+def test_field_is_the_sum_of_all_modes_in_the_ellipse_on_any_grid(nodes, mean_mode):
     """Waves that a grid does not resolve and those of Nyquist. Free ends double the period."""
     plane = isinstance(nodes, tuple)
     lengths = (0.4, 0.3) if plane else (0.4,)
-    if ends == "free":
+    if nodes == 50:
         interface = st.Interface(0.2, nodes, ends="free")
     else:
         interface = st.Interface(lengths if plane else 0.4, nodes)
@@ -298,17 +296,10 @@ def test_truncated_correlation_is_the_sum_of_cosines():
         assert spectrum.correlation(np.array([lag]))[0] == pytest.approx(expected, abs=error)
 
 
-@pytest.mark.parametrize(
-    "family",
-    [
-        lambda c: st.Gamma(mean=1.7e6 * c, cv=0.23, low=0.4e6 * c),
-        lambda c: st.Weibull(mean=1.7e6 * c, cv=0.31, low=0.2e6 * c),
-        lambda c: st.Beta(alpha=1.9, beta=3.3, low=0.4e6 * c, high=2.1e6 * c),
-        lambda c: st.Lognormal(mean=1.3 * c, cv=0.37, low=0.21 * c),  # needs none at all
-    ],
-)
-def test_multiples_share_one_table(family):
+@pytest.mark.parametrize("name", MULTIPLES)
+def test_multiples_share_one_table(name):
     """A long list has as many factors between specimens as members: no table for each."""
+    family = eval(MULTIPLES[name])
     z = np.random.default_rng(3).uniform(-6.5, 6.5, 500)
     from_normal(family(0.97), z)
     built = quantile_table.cache_info().misses

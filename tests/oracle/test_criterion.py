@@ -11,6 +11,7 @@ from contracts.bodies import BODIES, FIELD
 from hypothesis import given, settings
 from hypothesis import strategies as hs
 from oracles import symbol_of, times
+from recording import stored
 from setups import (
     LENGTH,
     LOCAL,
@@ -23,7 +24,7 @@ from setups import (
     local_onset,
     make_problem,
     turns,
-    within,
+    within,  # noqa: F401  # cases.json calls it
     without,
 )
 from specimens import crooked, rough
@@ -85,20 +86,17 @@ def doubts(problem, tau_p):
     return local, exact_onset(problem, tau_p).critical_stress.values, texts
 
 
-DOUBTED = {  # problem, scatter, and the correlation length over the nucleation length
-    "line": (make_problem(128, 0.0144, residual_ratio=0.3), 0.3, 0.5),  # 30 nodes in h_n
-    "rough line": (make_problem(512), 0.35, 0.1),
-    # Nodes near ends take over what windows leave out.
-    "ends": (within(make_problem(64, 4 * LENGTH), (LENGTH, 3 * LENGTH)), 0.3, 0.5),
-    "plane": (make_problem((24, 24), (0.012, 0.012), residual_ratio=0.75), 0.3, 0.5),
-    "specimen": (crooked(drive=st.Pusher(height=0.004, width=0.003, stiffness=3e7)), 0.1, 0.5),
-}
+DOUBTED = stored("cases")["doubted"]
+"""Problem, scatter, and the correlation length over the nucleation length.
+
+The line has 30 nodes in h_n, and nodes near ends take over what windows leave out.
+"""
 
 
 @pytest.mark.parametrize("kind", DOUBTED)
 def test_onset_says_how_far_the_local_criterion_is_off(kind):
     """Nodes at their residual strength, a short correlation length, ends, and a low pusher."""
-    problem, spread, share = DOUBTED[kind]
+    problem, spread, share = eval(DOUBTED[kind])
     size = problem.nucleation_length
     tau_p = lognormal(share * size, spread).sample(problem.interface, samples=40, seed=11)
     local, exact, (text,) = doubts(problem, tau_p)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from checks import assert_same
 from oracles import dense, symbol_of
+from recording import stored
 from setups import LOCAL, QUARTER, beta_strength, exact_onset, make_problem, within
 from specimens import crooked, rough
 
@@ -34,20 +35,14 @@ def least_slip(stiffness, sample, load, inside):
     return slip
 
 
-@pytest.mark.parametrize(
-    ("problem", "extent", "seed"),
-    [
-        (LINE, (0.006, 0.041), 0),
-        (LINE, (X > 0.004) & (X < 0.047) & (np.abs(X - 0.026) > 0.0012), 3),
-        (PAD, (0.15 * PAD.interface.length, 0.8 * PAD.interface.length), 1),
-    ],
-    ids=["part", "hole", "pad"],
-)
-def test_the_part_that_can_break_follows_its_rows_and_columns_of_the_stiffness(
-    problem, extent, seed
-):
+EXTENTS = stored("cases")["extents"]
+"""Problem within an extent, and seed of its strength."""
+
+
+@pytest.mark.parametrize("name", EXTENTS)
+def test_the_part_that_can_break_follows_its_rows_and_columns_of_the_stiffness(name):
     """Before and after the last instability, after which all of it slips, arrested ones or not."""
-    problem = within(problem, extent)
+    problem, seed = eval(EXTENTS[name])
     strength = FIELD.sample(problem.interface, seed=seed)[0]
     if problem.specimen is not None:
         stiffness, strength = problem.blocks.stiffness, rough(problem, seed)
@@ -129,17 +124,14 @@ RATES = np.where(np.arange(64) == 10, 3.6e11, 2e11)
 """A weakening rate whose steepest node has a nucleation length within 5.6 mm, the others not."""
 
 
-@pytest.mark.parametrize(
-    ("problem", "extent"),
-    [
-        (PLANE, st.Ellipse(centre=(0.015, 0.012), semi_axes=(0.0024, 0.0034))),
-        (make_problem(64, 0.04, weakening_rate=RATES, residual_strength=2e5), (0.004, 0.0095)),
-    ],
-    ids=["ellipse", "line"],
-)
-def test_a_small_extent_slides_stably(problem, extent):
+SMALL = stored("cases")["small extents"]
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_a_small_extent_slides_stably(name):
+    problem = eval(SMALL[name])
     strength = beta_strength(4e-3).sample(problem.interface, seed=2)[0]
     with pytest.warns(st.AccuracyWarning, match="slides stably"):
-        found = exact_onset(within(problem, extent), strength)
+        found = exact_onset(problem, strength)
     for name in ("critical_load", "critical_stress", "first_instability", "critical_position"):
         assert np.isnan(found[name]).all(), name

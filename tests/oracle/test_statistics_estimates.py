@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.stats
+from recording import stored
 
 from stiction.statistics import density, quantiles
 
@@ -31,17 +32,10 @@ def assert_mass_one(found):
     assert found.value.sum() * (found.x[1] - found.x[0]) == pytest.approx(1.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("distribution", "bounds"),
-    [
-        (scipy.stats.beta(2.0, 5.0), (0.0, 1.0)),
-        (scipy.stats.norm(), (None, None)),
-        (scipy.stats.expon(), (0.0, None)),
-        (scipy.stats.uniform(), (0.0, 1.0)),
-    ],
-)
-def test_density_of_known_distributions(distribution, bounds):
+@pytest.mark.parametrize(("kind", "shape", "bounds"), stored("cases")["known densities"])
+def test_density_of_known_distributions(kind, shape, bounds):
     """40,000 values: within a few of its own errors nearly everywhere, mass one."""
+    distribution = getattr(scipy.stats, kind)(*shape)
     found = density(
         distribution.rvs(40_000, random_state=np.random.default_rng(3)), bounds=bounds
     )
@@ -55,14 +49,13 @@ def test_density_of_known_distributions(distribution, bounds):
     assert wrong.mean() < 0.02
 
 
-@pytest.mark.parametrize(
-    "sample",
-    [np.repeat([1.0, 2.0, 3.0], 10), np.concatenate([np.arange(20.0), 1e4 + np.arange(20.0)])],
-    ids=["ties", "far apart"],
-)
-def test_density_of_spikes_still_has_mass_one(sample):
+SPIKES = {"ties": 10 * [1.0, 2.0, 3.0], "far apart": [*range(20), *range(10_000, 10_020)]}
+
+
+@pytest.mark.parametrize("name", SPIKES)
+def test_density_of_spikes_still_has_mass_one(name):
     """Also where the kernel is as narrow as a cell."""
-    found = density(sample, bounds=(0.0, None))
+    found = density(np.array(SPIKES[name], dtype=float), bounds=(0.0, None))
     assert found.value.min() >= 0.0
     assert_mass_one(found)
 

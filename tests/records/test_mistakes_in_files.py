@@ -11,7 +11,7 @@ import numpy as np
 import setups
 import small_study as studies
 import xarray as xr
-from recording import inside, mistakes, refusals
+from recording import inside, mistakes, refusals, stored
 from setups import LOCAL, make_problem
 from small_study import altered, small_study
 
@@ -167,19 +167,7 @@ def endless(law, u):
     return 1.0 / (1.0 + u), (1.0 + u) ** -2
 
 
-LAWS = [
-    (hump, lambda f: 1.0 - 0.8 * f / 1.1, np.asarray, 0.1),
-    (flat, lambda f: np.arccos(2.0 * f - 1.0) / np.pi, np.asarray, 0.0),
-    (endless, lambda f: 1.0 / f - 1.0 if f else np.inf, np.log1p),
-    (lambda law, u: (1.0 - u, 1.0 / (1.0 - u)), lambda f: 1.0 - f),
-    (exponential, logarithm, exponential_area, 1.0, "scale"),
-    (lambda law, u: (0.5 * np.exp(-u), 0.5 * np.exp(-u)), logarithm),
-    (exponential, lambda f: f, exponential_area),
-    (exponential, lambda f: 0.9 * logarithm(f), exponential_area),
-    (lambda law, u: (np.exp(-u), 1.002 * np.exp(-u)), logarithm, exponential_area, 1.002),
-]
-
-OWN = [own_law(*law) for law in LAWS]
+OWN = [own_law(*eval(law)) for law in stored("cases")["own laws"]]
 
 
 @model

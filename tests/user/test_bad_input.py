@@ -11,7 +11,7 @@ from setups import EXACT, LOCAL, beta_strength, make_problem
 
 import stiction as st
 from stiction.methods.equilibrium.solver import follow_to_sliding
-from stiction.problem.checks import doubt_sample, doubt_strengths
+from stiction.problem import checks
 
 PROBLEM, FIELD = make_problem(), beta_strength(2e-3)
 ONE = np.full(256, 1e6)
@@ -59,20 +59,14 @@ def test_objects_are_frozen_compare_and_hash_by_value():
 
 
 IN_MPA = make_problem(load=st.Load(initial_stress=0.1))
-DOUBTFUL = {
-    "density in g/cm3": lambda: st.Solid(1e9, 0.33, 1.17),
-    "initial stress in MPa": lambda: doubt_sample(IN_MPA, IN_MPA.sample(ONE)),
-    "a station in km": lambda: st.Save(stations={"a": 1.5e-4}).nodes(st.Interface(0.1, 256)),
-    "a prior that ends too soon": lambda: st.infer(
-        PROBLEM, FIELD, 7e5 + 1e4 * np.arange(7.0), unit="Pa", samples=100,
-        prior={"marginal.low": (0.4e6, 0.64e6)}, method=LOCAL, progress=False),
-}  # fmt: skip
+DOUBTFUL = stored("cases")["doubtful calls"]
 
 
 @pytest.mark.parametrize("doubt", DOUBTFUL)
 def test_a_warning_stands_where_the_caller_is_and_once(doubt):
+    call = compile(DOUBTFUL[doubt], __file__, "eval")
     with pytest.warns((st.UnitWarning, st.AccuracyWarning)) as caught:
-        DOUBTFUL[doubt]()
+        eval(call)
     assert {warning.filename for warning in caught} == {__file__}
     assert len(caught) == len({str(warning.message) for warning in caught})
 
@@ -89,10 +83,10 @@ def test_what_people_study_raises_no_doubt(what):
     with warnings.catch_warnings(action="error", category=st.UnitWarning):
         law, load = st.LinearWeakening(friction), st.Load(initial_stress=1e-4 * strength)
         system = st.Problem(st.Solid(*solid), interface, law, load)
-        doubt_strengths(system, strength)
+        checks.doubt_strengths(system, strength)
     if strength > 1e-4 * solid[0] > 1e4:  # kPa that were given as MPa, on no rubber
         with pytest.warns(st.UnitWarning, match="times the shear modulus"):
-            doubt_strengths(system, 1e3 * strength)
+            checks.doubt_strengths(system, 1e3 * strength)
 
 
 def test_a_model_of_others_may_hold_plain_dataclasses():

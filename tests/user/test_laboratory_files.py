@@ -46,12 +46,7 @@ def test_a_large_table_is_read_as_a_small_one(tmp_path, monkeypatch):
     for text in ("\n".join([head, *lines]), "\n".join([head, *lines]).replace(".", ",")):
         assert len(text) > files.LARGE
         np.testing.assert_array_equal(read(tmp_path, text), values * 1e6)
-    for wrong, words in (
-        ("0.750;1,5", "two decimal marks"),
-        ("0.750;1.5;2", "line"),
-        ("0.750;Bad", "line 752: 'Bad'"),
-        ("0.750;-1", "in line 752"),
-    ):
+    for wrong, words in stored("cases")["wrong lines"].items():
         lines[750] = wrong
         refuses(words, lambda: read(tmp_path, "\n".join([head, *lines])))
     lines[750] = "0.750;1.5;2"  # cells too many between blanks, too

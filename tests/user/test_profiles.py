@@ -25,21 +25,13 @@ def labelled(strength=STRENGTH, x=X, x_unit=None, **attributes):
 
 SHUFFLED = np.random.default_rng(0).permutation(NODES)
 ROLLED = np.roll(np.arange(NODES), 50)  # from the middle of the interface on
-ORDERS = {
-    "descending": labelled(STRENGTH[::-1], X[::-1]),
-    "shuffled": labelled(STRENGTH[SHUFFLED], X[SHUFFLED]),
-    "offset": labelled(STRENGTH[ROLLED], np.where(X[-50] <= X, X - 0.1, X)[ROLLED]),
-    "whole periods further on": labelled(x=X + 0.3),
-    "transposed": labelled().expand_dims("sample", axis=1),
-    "its first node twice": labelled(np.r_[STRENGTH, STRENGTH[0]], np.r_[X, 0.1]),
-}
 
 
 def test_the_coordinate_decides_and_not_the_order(tmp_path):
-    for order, given in ORDERS.items():
-        assert found(given) == found(STRENGTH), order
-        if isinstance(given, xr.DataArray):
-            assert found(given.to_dataset(name="strength")) == found(STRENGTH), order
+    for text in stored("cases")["orders of a coordinate"]:
+        given = eval(text)
+        assert found(given) == found(STRENGTH), text
+        assert found(given.to_dataset(name="strength")) == found(STRENGTH), text
     values = 1e6 + 1e4 * np.arange(32)[:, None] + 1e3 * np.arange(16)
     array = xr.DataArray(values, PLANE.coordinates, ("x", "y"), name="strength")
     for dim, count in array.sizes.items():
@@ -104,12 +96,8 @@ def test_headings_of_laboratories(tmp_path, comma):
 
 
 def test_profiles_in_a_study_file(tmp_path):
-    for name, head, columns in (
-        ("tau_r.csv", "x (mm);tau_r (kPa)", [X[::-1] * 1e3, 1e-3 * (1e5 + 1e6 * X[::-1])]),
-        ("pressure.txt", "# sigma (MPa)", [5.0 + X]),
-        ("load.csv", "x (m);profile", [X[::-1], 1.0 + X[::-1]]),
-    ):
-        table = np.column_stack(columns)
+    for name, (head, columns) in stored("cases")["profiles of a study file"].items():
+        table = np.column_stack(eval(columns))
         np.savetxt(tmp_path / name, table, "%.12g", ";", header=head, comments="")
     study = small_study(method={"type": "equilibrium"})
     study["problem"]["friction"]["residual_strength"] = "tau_r.csv"

@@ -19,6 +19,7 @@ import pytest
 import tomli_w
 import xarray as xr
 from checks import python
+from recording import stored
 from refusals import refuses
 from small_study import altered, small_study
 
@@ -140,24 +141,8 @@ def pickled(path):
         (np.savez if path.suffix == ".npz" else np.save)(file, np.array([Code()]))
 
 
-KINDS = {
-    "code": pickled,
-    "pipe": os.mkfifo,
-    "device": lambda path: path.symlink_to("/dev/zero"),
-    "unending": lambda path: path.symlink_to("/proc/self/environ"),
-    "folder": Path.mkdir,
-    "lost link": lambda path: path.symlink_to("nowhere"),
-    "empty": lambda path: path.write_bytes(b""),
-    "huge": lambda path: os.truncate(path.touch() or path, 2**40),
-    "nested": lambda path: path.write_text("a=" + "[" * 10**6),
-    "digits": lambda path: path.write_text("a=" + "9" * 10**6),
-    "dots": lambda path: path.write_text("a" + ".a" * 10**5 + "=1"),
-    "brackets": lambda path: path.write_text("a " + "(" * 10**6 + "\n1 2\n"),
-    "blanks": lambda path: path.write_text("a (" + " " * 10**6 + "x,y\n1,2\n"),
-    "columns": lambda path: path.write_text("1.0," * 10**6),
-    "quotes": lambda path: path.write_text('x,"' + "y," * 10**6 + "\n1,2\n"),
-    "compressed": lambda path: path.write_bytes(zipped()),
-}
+KINDS = stored("strange_files")["files of every kind"]
+"""How a file of each kind is made at a path."""
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +162,7 @@ def test_no_reader_takes_such_a_file(tmp_path, run, kind):
         shutil.copytree(run, folder)
         path = folder / name
         path.unlink(missing_ok=True)
-        KINDS[kind](path)
+        eval(KINDS[kind])
         try:
             found = read(path)
             said = name == "pilot.json" or found.damaged  # a pilot may be lost
@@ -222,10 +207,6 @@ def hdf5(path, **datasets):
                 made.attrs["units"] = "MPa"
 
 
-def stored(*shape, **options):
-    return lambda file: file.create_dataset("strength", *shape, **options)
-
-
 def virtual(file):
     layout = h5py.VirtualLayout((8,), "u1")
     layout[:] = h5py.VirtualSource("other.nc", "strength", (8,))
@@ -234,24 +215,13 @@ def virtual(file):
 
 def inflating(file):
     """A chunk of eight values that unpacks to 64 MB."""
-    made = stored((8,), "f8", chunks=(8,), **GZIP)(file)
+    made = file.create_dataset("strength", (8,), "f8", chunks=(8,), compression="gzip")
     made.id.write_direct_chunk((0,), zlib.compress(bytes(2**26), 9))
     return made
 
 
-GZIP = {"compression": "gzip"}
-NETCDF_ATTACKS = {
-    "external storage": ("another file", stored((8,), "u1", external=[("secret", 0, 8)])),
-    "virtual": ("another file", virtual),
-    "external link": (
-        "is a link", lambda f: f.update(strength=h5py.ExternalLink("other.nc", "strength"))),
-    "soft link": ("is a link", lambda f: f.update({"deep/strength": h5py.SoftLink("/a")})),
-    "many values": ("more than the limit", stored((2**40,), "f8", chunks=(2**20,), **GZIP)),
-    "large chunks": (
-        "more than the limit", stored((8,), "f8", maxshape=(None,), chunks=(2**26,), **GZIP)),
-    "large values of a small chunk": ("to a wrong size", inflating),
-    "another filter": ("unsupported filter", stored((8,), "f8", compression="lzf")),
-}  # fmt: skip
+NETCDF_ATTACKS = stored("strange_files")["attacks of NetCDF files"]
+"""Words of the refusal, and what makes the variable in an open file."""
 
 
 @pytest.mark.parametrize("attack", NETCDF_ATTACKS)
@@ -261,7 +231,7 @@ def test_a_profile_holds_its_own_numbers(tmp_path, attack, monkeypatch):
     hdf5("other.nc", strength=np.arange(1.0, 9.0))
     assert st.read_profile("other.nc").values.tolist() == [1e6 * i for i in range(1, 9)]
     words, made = NETCDF_ATTACKS[attack]
-    hdf5("p.nc", strength=made)
+    hdf5("p.nc", strength=eval(made))
     refuses(words, lambda: st.read_profile("p.nc"))
 
 

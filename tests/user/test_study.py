@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import scipy.stats
 import tomli_w
+from recording import stored
 from refusals import refuses
 from small_study import altered, small_study
 
@@ -109,14 +110,7 @@ def test_a_correlation_coefficient_is_swept():
 # -- a field that was measured in part -----------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "heading", "unit"),
-    [
-        ("strength", "strength (MPa)", 1e6),
-        ("strength", "mu", 1.0),
-        ("critical_slip", "d_c (um)", 1e-6),
-    ],
-)
+@pytest.mark.parametrize(("name", "heading", "unit"), stored("cases")["measured properties"])
 def test_a_file_holds_the_property_that_was_measured(tmp_path, name, heading, unit):
     """A coefficient where the field is of those; any other property by its own name."""
     table = np.column_stack([[10.0, 20.0], [0.95, 1.05]])
