@@ -122,8 +122,9 @@ def test_moments_of_the_nucleation_stress_are_those_of_the_grid():
     spectrum = st.PowerLawSpectrum(correlation_length=5e-3)
     field = st.RandomField(marginal, spectrum, True, quantity="friction_coefficient")
     c = field.correlation(problem.interface)
-    # 1e6 + 1 keeps ten digits of the one.
-    weights = st.theory.nucleation_stress(problem, 1e6 + np.eye(256))[:, 0] - (1e6 - 1e5) / 2.0
+    # A tip as high as the rest keeps all but one digit of the weights.
+    tips = st.theory.nucleation_stress(problem, 1e6 * (1.0 + np.eye(256)))[:, 0]
+    weights = (tips - (1e6 - 1e5) / 2.0) / 1e6
     matrix = c[(np.arange(256)[:, None] - np.arange(256)[None, :]) % 256]
     found = nucleation_statistics(problem, field)
     variance = (2e6 * field.standard_deviation) ** 2 * (weights @ matrix @ weights)
