@@ -1,7 +1,6 @@
 """The site as built: every link within it leads somewhere. Built by `.ci/run` before the tests."""
 
-import re
-from html import unescape
+from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urldefrag, urlsplit
 
@@ -10,13 +9,20 @@ import pytest
 SITE = Path(__file__).parents[2] / "build" / "docs"
 
 
-def read(path):
-    """Names of places in a page, and its links: whether each is fetched with it, and its target."""
-    text = path.read_text("utf-8")
-    names = re.findall(r'\s(?:id|name)="([^"]+)"', text)
-    pairs = re.findall(r'<(\w+)(?=\s)[^>]*?\s(?:href|src)="([^"]+)"', text)
-    links = [(tag in ("img", "script", "link"), unescape(target)) for tag, target in pairs]
-    return {*map(unescape, names)}, links
+class Page(HTMLParser):
+    def __init__(self, path):
+        super().__init__()
+        self.path, self.names, self.targets, self.fetched = path, set(), [], []
+        self.feed(path.read_text("utf-8"))
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.names |= {values[key] for key in ("id", "name") if values.get(key)}
+        for key in ("href", "src"):
+            if values.get(key):
+                (self.fetched if tag in ("img", "script", "link") else self.targets).append(
+                    values[key]
+                )
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +30,7 @@ def pages():
     if not (SITE / "index.html").exists():
         pytest.skip("the site is not built: python -m sphinx -W --keep-going docs build/docs")
     apart = {"_static", "_modules"}  # the latter is source code, whose links back Sphinx makes
-    return {path: read(path) for path in SITE.rglob("*.html") if not apart & set(path.parts)}
+    return {path: Page(path) for path in SITE.rglob("*.html") if not apart & set(path.parts)}
 
 
 def is_outside(target):
@@ -33,21 +39,21 @@ def is_outside(target):
 
 def test_links_within_the_site(pages):
     broken = []
-    for path, (_, links) in pages.items():
-        for _, target in links:
+    for path, page in pages.items():
+        for target in page.targets + page.fetched:
             if is_outside(target):
                 continue
             file, fragment = urldefrag(target)
             place = (path.parent / unquote(file.partition("?")[0])).resolve() if file else path
             if not place.exists():
                 broken.append(f"{path.relative_to(SITE)}: {target}")
-            elif fragment and place in pages and unquote(fragment) not in pages[place][0]:
+            elif fragment and place in pages and unquote(fragment) not in pages[place].names:
                 broken.append(f"{path.relative_to(SITE)}: {target} (no such place)")
     assert broken == []
 
 
 def test_nothing_is_fetched_from_elsewhere(pages):
-    outside = {t for _, links in pages.values() for own, t in links if own and is_outside(t)}
+    outside = {t for page in pages.values() for t in page.fetched if is_outside(t)}
     assert {target for target in outside if not target.startswith("data:")} == set()
 
 
