@@ -555,7 +555,7 @@ def _plateau(force: Array, threshold: float) -> float:
     after = force[int(np.flatnonzero(force >= peak - threshold)[-1]) + 1 :]
     if after.size == 0 or peak - (level := float(np.median(after))) < threshold:
         return math.nan
-    if after[-1] < 0.5 * level > 0.0:  # the machine unloads
+    if level > 0.0 and after[-1] < 0.5 * level:  # the machine unloads
         after = after[: int(np.flatnonzero(after >= 0.9 * level)[-1]) + 1]
     after = after[int(np.argmax(after <= level + 0.25 * (peak - level))) :]
     return float(after.mean())
