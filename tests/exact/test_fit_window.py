@@ -99,7 +99,7 @@ def test_simulated_records_have_the_expectation():
     assert np.abs(ratio - 1.0).max() < 0.08
 
 
-GAP = np.ones(64, dtype=bool)
+GAP = np.ones(512, dtype=bool)
 GAP[40:49] = False
 CROOKED = RecordWindow((SPACING,), GAP, 2), window_of(48, 1, spacing=1.7e-4)
 """Records of two geometries, with trends."""

@@ -52,9 +52,9 @@ ROOM = {1: 4, 2: 2}
 """Period of the grid on which a correlation is computed, in lengths of
 the record."""
 EDGE = 2.0
-"""Number of modes over which a spectrum fades out at its end. The likelihood
-would move in steps with the correlation length if the end were
-sharper."""
+"""Width over which a spectrum fades out at its end, in steps of the
+coarsest wavenumbers at which it is evaluated. The likelihood would move
+in steps with the correlation length if the end were sharper."""
 LEFT_OUT = 1e-4
 """Fraction of the variance above the end of a spectrum without truncation."""
 FOLDS = 6
@@ -170,7 +170,8 @@ class RecordWindow:
         folds = [min(FOLDS, math.ceil(cutoff / s + 0.5)) for s in sampling]
         end = min(cutoff, *(s * (f + 0.5) for s, f in zip(sampling, folds, strict=True)))
         axes = [s * of_period for s, of_period in zip(sampling, self._of_period, strict=True)]
-        width = EDGE * max(s / n for s, n in zip(sampling, self._period, strict=True))
+        steps = [np.ptp(axis) / (min(axis.size, FEW[dimensions]) - 1) for axis in axes]
+        width = EDGE * max(steps)
         folded = _folded_line if dimensions == 1 else _folded_plane
 
         def density(k: Array) -> Array:
