@@ -106,7 +106,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     problems = given_twice(problem, {*given, *quantities.values()}, "profiles")
     problems += [text for name in given for text in mistakes.get(name, ())]
     problems += [
-        f"{name}: must have 1 or {len(strength)} samples, like the strength, got {len(values)}"
+        f"{name}: must have 1 sample or the {len(strength)} of the strength, got {len(values)}"
         for name, values in rows.items()
         if strength is not None and values.ndim and len(values) not in (1, len(strength))
     ]
@@ -129,7 +129,7 @@ def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> 
     sample = made(problem, rows, accept)
     if (constant := sample.strength <= sample.residual_strength).any():
         warn_accuracy(
-            f"strength is not above residual_strength at {100.0 * constant.mean():.2g} % of"
+            f"strength is not above residual_strength at {100.0 * constant.mean():.3g} % of"
             " the nodes. These do not weaken: their strength is constant"
         )
     check_resolution(problem, sample.steepest_weakening_rate)

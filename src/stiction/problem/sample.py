@@ -441,7 +441,7 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
         W = np.where(constant, slowest, W)
     if initial.min() < 0.0 and (reversed_at := initial < -strength).any():
         warn_accuracy(
-            f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.2g} %"
+            f"initial_stress is below minus the strength at {100.0 * reversed_at.mean():.3g} %"
             " of the nodes. Reverse slip is not modelled, so these nodes are held"
         )
     load_profile = np.array(np.broadcast_to(problem.load_profile, interface.shape), dtype=float)

@@ -306,7 +306,7 @@ class Conditioning(NamedTuple):
             mean, deviation = self.error
             warn_accuracy(
                 "conditions: the field is approximate where it was measured, with errors up to"
-                f" about {mean:.2g} standard deviations in the mean, and {100.0 * deviation:.2g} %"
+                f" about {mean:.2g} standard deviations in the mean, and {100.0 * deviation:.3g} %"
                 " in the standard deviation. Average neighbouring values, and give their noise"
             )
 

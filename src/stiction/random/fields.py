@@ -188,7 +188,7 @@ class RandomField(Listed):
             enough = " x ".join(map(str, modes.nodes_for(MAX_UNRESOLVED)))
             warn_accuracy(
                 f"the grid of {nodes} nodes is coarser than the spectrum: values at the nodes are"
-                f" exact, but {100.0 * lost:.2g} % of the variance is not resolved. Check lengths"
+                f" exact, but {100.0 * lost:.3g} % of the variance is not resolved. Check lengths"
                 f" (m), and give interface.nodes >= {enough} or power_kept={1.0 - short:.3g}"
             )
         if self.mean_mode:
@@ -198,7 +198,7 @@ class RandomField(Listed):
         share = float(with_mean.sigma[0] ** 2)
         if share > MAX_MEAN_SHARE:
             warn_accuracy(
-                f"the field has no mean mode, which would hold {100.0 * share:.2g} % of the"
+                f"the field has no mean mode, which would hold {100.0 * share:.3g} % of the"
                 " variance on so short an interface. RandomField(mean_mode=True) lets the mean vary"
             )
 

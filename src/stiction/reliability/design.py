@@ -122,7 +122,8 @@ def design_stress(
         this is done if `random` is a fit or a posterior. A mapping from
         dotted keys in the problem to ranges, such as
         ``{"problem.friction.residual_ratio": (0.6, 0.8)}``, replaces the usual 10 %
-        on either side.
+        on either side. Sources without a prediction by a formula solve 300 samples for
+        each end of a range. They come on top of `max_evaluations`.
     problem, random, seed, max_evaluations, workers, progress
         As in `failure_probability`.
 

@@ -139,7 +139,8 @@ def failure_probability(
     max_evaluations : int, optional
         Largest number of samples to solve. The default takes about a
         quarter of an hour on one core, but is at most 2,000,000
-        samples. For ruptures it is 1,000.
+        samples. For ruptures it is 1,000. Up to 32 samples of each interface of a
+        list, which sort the list, come on top.
 
     Returns
     -------

@@ -166,8 +166,7 @@ class Save(Listed):
 
     @pydantic.model_validator(mode="after")
     def _known(self) -> Save:
-        if unknown := [name for name in self.fields if name not in FIELDS]:
-            raise InputError([unknown_name("fields", name, FIELDS) for name in unknown])
+        _check_fields(self.fields)
         return self
 
     def nodes(self, interface: Interface) -> NDArray[np.int64]:
@@ -401,13 +400,13 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
     Raises
     ------
     InputError
-        If the folder holds no rupture.
+        If the folder holds no rupture, or a field has an unknown name.
     """
     import xarray as xr
 
-    parts, place = [], Path(folder)
-    for path in sorted(place.glob(_FRAME_FILES)):
-        parts.append(_read(path, [] if fields is None else FIELDS.keys() - {*fields}))
+    place, dropped = Path(folder), FIELDS.keys() - {*(FIELDS if fields is None else fields)}
+    _check_fields(fields or ())
+    parts = [_read(path, dropped) for path in sorted(place.glob(_FRAME_FILES))]
     if not parts:
         raise InputError(f"folder: {str(folder)!r} holds no frames of a rupture")
 
@@ -426,6 +425,12 @@ def open_rupture(folder: FilePath, *, fields: Names | None = None) -> xr.Dataset
         framed = framed.merge(whole, compat="override")
         framed.attrs = whole.attrs
     return framed
+
+
+def _check_fields(names: Collection[str]) -> None:
+    """Refuse names that are not fields."""
+    if unknown := [name for name in names if name not in FIELDS]:
+        raise InputError([unknown_name("fields", name, FIELDS) for name in unknown])
 
 
 def _read(path: Path, unwanted: Collection[str] = ()) -> xr.Dataset:
