@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from contracts.bodies import BODIES, FIELD, attempt
+from public import names_of
 from recording import evaluated
 from refusals import warning_texts
 from stand_ins import StandIn
@@ -49,6 +50,7 @@ REPLACES = {"friction_coefficient": "stress", "force": "stress"}
 """Parameters that are given in place of another one."""
 SILENT = {("design_of_tests", "probability"), ("design_stress", "confidence")}
 """Used for a fit or a posterior, and for counted specimens only, as their docstrings say."""
+CALLABLE = [line.split("(")[0][3:] for line in names_of(st, "st.") if "(" in line]
 ELSEWHERE = {
     "external.limit_state", "external.event_table", "external.write_scec",
     "theory.griffith_length", "theory.nucleation_statistics", "theory.nucleation_stress",
@@ -94,14 +96,9 @@ def numbers(result: Any) -> str:
 
 
 def test_every_public_call_has_an_example_and_every_parameter_another_value():
-    modules = {"": st} | {
-        f"{name}.": getattr(st, name) for name in ("statistics", "external", "theory")
-    }
+    elsewhere = ("plot.", "paper.", "extensions.")  # contracts of their own
     calls = {
-        prefix + name
-        for prefix, module in modules.items()
-        for name in module.__all__
-        if inspect.isfunction(getattr(module, name))
+        c for c in CALLABLE if inspect.isfunction(call_of(c)) and not c.startswith(elsewhere)
     }
     assert calls == BASE.keys() | READERS | ELSEWHERE
     names = {name for _, name in PARAMETERS}
@@ -123,6 +120,14 @@ def test_each_parameter_counts_or_is_refused_by_its_name(call, name):
         assert name in refusal
     else:
         assert numbers(result) != numbers(example(call)), f"{name} has no effect"
+
+
+@pytest.mark.parametrize("call", [c for c in CALLABLE if not c.startswith("extensions.")])
+def test_objects_of_no_kind_are_refused_by_the_names_of_their_parameters(call):
+    names = [*inspect.signature(call_of(call)).parameters]
+    _, refusal = attempt(lambda: call_of(call)(**dict.fromkeys(names, object())))
+    unnamed = [name for name in names if not re.search(rf"\b{name}: ", refusal)]
+    assert unnamed == evaluated("parameters that are looked at after others", {}).get(call, [])
 
 
 @pytest.mark.parametrize("call", BASE)

@@ -255,7 +255,8 @@ def event_table(result: xr.Dataset) -> pd.DataFrame:
     >>> list(st.external.event_table(result).columns[:3])
     ['sample (1)', 'event (1)', 'event_load (Pa)']
     """
-    names = [str(name) for name, values in result.data_vars.items() if "event" in values.dims]
+    variables = getattr(result, "data_vars", {})
+    names = [str(name) for name, values in variables.items() if "event" in values.dims]
     if not names:
         raise InputError(
             "result: has no events. Set events= of the method, as in st.Equilibrium(events=20), or"

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from stiction.base.errors import InputError
+from stiction.base.model import FilePath, Real, Text, checked
 
 STATION_UNITS = {"slip": 1.0, "slip_rate": 1.0, "shear_stress": 1e6}
 """Variables of a station, and their units in a file in SI."""
@@ -23,8 +24,9 @@ stations on a grid apart."""
 COLUMN_NAMES = "t h-slip h-slip-rate h-shear-stress v-slip v-slip-rate v-shear-stress n-stress"
 
 
+@checked
 def write_scec(
-    run: Any, folder: Any, *, origin: Any, normal_stress: float, benchmark: str
+    run: Any, folder: FilePath, *, origin: Any, normal_stress: Real, benchmark: Text
 ) -> list[Path]:
     """Write stations and rupture times of a run in the SCEC format (Harris et al., 2009).
 
@@ -78,7 +80,7 @@ def write_scec(
     'cplot.txt'
     """
     needed = [*STATION_UNITS, *(f"station_{name}" for name in STATION_UNITS)]
-    if lacking := [name for name in needed if name not in run]:
+    if lacking := [name for name in needed if name not in getattr(run, "data_vars", ())]:
         raise InputError(
             f"run: lacks {', '.join(lacking)}. Call st.simulate_rupture with save=st.Save("
             f"{list(STATION_UNITS)}, stations=...)"
