@@ -82,6 +82,18 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
     and Rice, 2003). Here v(cos t) = sum_k a_k sin(k t), with the
     Galerkin matrices A = diag(pi k/4) and B_jk = (I(j-k) - I(j+k))/2,
     I(m) = 2/(1-m^2) for even m, 0 for odd.
+
+    A single sine gives A/B = (pi/4)/(4/3). Of three sines the second is left
+    out, and the others solve (A - lambda B) a = 0. The limit is 0.578887.
+
+    >>> print(f"{eigenvalue_and_vector(1)[0] * 16.0 / np.pi:.6f} {eigenvalue_and_vector()[0]:.6f}")
+    3.000000 0.578887
+    >>> value, a = eigenvalue_and_vector(3)
+    >>> rows = value * (4 / 3 - 4 / 15 * a[2]), value * (36 / 35 * a[2] - 4 / 15) / a[2]
+    >>> np.round(rows, 6).tolist() == np.round([np.pi / 4, 3 * np.pi / 4], 6).tolist()
+    True
+    >>> a[:2].tolist(), a.flags.writeable
+    ([1.0, 0.0], False)
     """
     k = np.arange(1, terms + 1)
 
@@ -100,7 +112,17 @@ def eigenvalue_and_vector(terms: int = N_SINES) -> tuple[float, Array]:
 
 
 def weight(s: Array) -> Array:
-    """Return the weight g(s) of the local criterion, zero for |s| > 1."""
+    """Return the weight g(s) of the local criterion, zero for |s| > 1.
+
+    The integral over the patch is 1.
+
+    >>> t = np.pi * (np.arange(60) + 0.5) / 60
+    >>> print(f"{np.pi * np.mean(weight(np.cos(t)) * np.sin(t)):.9f}")
+    1.000000000
+    >>> ends = weight(np.array([-1.2, -1.0, -0.3, 0.3, 0.9, 1.5]))
+    >>> ends[[0, 1, 5]].round(9).tolist(), bool(ends[2] >= ends[3] - 1e-9 > ends[4] > 0.2)
+    ([0.0, 0.0, 0.0], True)
+    """
     inside = np.abs(s) <= 1.0
     t = np.arccos(np.where(inside, s, 0.0))
     sine = eigenvalue_and_vector()[1] * (2.0 / np.pi)
@@ -115,6 +137,17 @@ def multiplier(z: Array) -> Array:
     The transform is the integral of g(cos t) cos(z cos t) sin t over
     [0, pi]. With more than (z + N_SINES)/2 points, the midpoint rule is
     exact to round-off.
+
+    The sum over many points of the patch agrees. A constant does not change.
+
+    >>> s = (np.arange(4000) + 0.5) / 2000 - 1.0
+    >>> waves = multiplier(np.linspace(0.0, 80.0, 30001))  # more than are computed at once
+    >>> for number in (0, 1125, 30000):  # z = 0, 3 and 80
+    ...     integral = weight(s) @ np.cos(number / 375.0 * s) / 2000
+    ...     print(f"{waves[number]:.4f} {abs(waves[number] - integral):.4f}")
+    1.0000 0.0000
+    0.2799 0.0000
+    -0.0010 0.0000
     """
     points = int(0.25 * np.max(z)) + N_SINES  # on [0, pi/2]; the other half is the same
     t = (np.arange(points) + 0.5) * (0.5 * np.pi / points)
@@ -140,6 +173,19 @@ def grid_weights(half_width: float) -> Array:
     the largest weight in the fit, because they carry nearly all
     of tau_n. At |k| h_n/2 = 3 the error of the transform is 1e-4
     with 9 nodes in h_n, 5e-6 with 16 and 1e-9 with 35.
+
+    These nodes have 1 as the sum of their weights. A wave with |k| h_n/2 = 3
+    is multiplied as by g. Far from the ends the weights are samples of g.
+
+    >>> w, z = grid_weights(4.6), np.array([3.0])
+    >>> print(f"{w[0] + 2.0 * w[1:].sum():.6f} {w.min() >= 0.0} {len(w)}")
+    1.000000 True 7
+    >>> wave = w[0] + 2.0 * (w[1:] @ np.cos(3.0 / 4.6 * np.arange(1, 7)))
+    >>> print(f"{wave:.4f} {multiplier(z)[0]:.4f}")
+    0.2799 0.2799
+    >>> nodes = np.arange(16)
+    >>> np.allclose(30.0 * grid_weights(30.0)[nodes], weight(nodes / 30.0), rtol=1e-6)
+    True
     """
     last = int(np.ceil(half_width)) + 1
     inner = max(last + 1 - N_FITTED_NODES, 0)
@@ -159,7 +205,15 @@ def grid_weights(half_width: float) -> Array:
 
 
 def around(w: Array, nodes: int) -> Array:
-    """Return weights w_0, w_1, ... on both sides of node 0 on a periodic line, as (nodes,)."""
+    """Return weights w_0, w_1, ... on both sides of node 0 on a periodic line, as (nodes,).
+
+    On four nodes, node 2 is both the second and the second before node 0.
+
+    >>> around(np.array([5.0, 3.0, 1.0]), 4).tolist()
+    [5.0, 3.0, 2.0, 3.0]
+    >>> around(np.array([5.0, 3.0, 1.0]), 6).tolist()
+    [5.0, 3.0, 1.0, 0.0, 1.0, 3.0]
+    """
     both = np.zeros(nodes)
     offsets = np.arange(w.size)
     np.add.at(both, offsets % nodes, w)
@@ -190,7 +244,12 @@ class Window(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Sum of the weights, 1 to round-off."""
+        """Sum of the weights, 1 to round-off.
+
+        >>> y = np.array([0.5, 0.3, 0.1, 0.0])
+        >>> round(Window(1.0, (0.2,), 0.2, 1.0, y, np.fft.rfft(y)).total, 9)
+        0.9
+        """
         return float(self.spectrum.flat[0].real)
 
 
@@ -203,6 +262,26 @@ def windows_of(
     of the aspect 1/sqrt(1 - nu), because the critical length in mode II
     is 1/(1 - nu) times the critical length in mode III. Every window
     must fit on the interface.
+
+    A plane has a window for each aspect. Half the rate makes the window of a
+    line twice as long.
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> length, rate = problem.nucleation_length, problem.friction.weakening_rate
+    >>> ((window,), (double,)) = windows_of(problem, rate), windows_of(problem, 0.5 * rate)
+    >>> round(window.extents[0] / length, 6), round(double.area / length, 6), window.aspect
+    (1.0, 2.0, 1.0)
+    >>> near = int(0.5 * length / problem.interface.spacing)  # nodes on either side
+    >>> [bool(window.weight[i] > 1e-3) for i in (0, near, -near, near + 2)]
+    [True, True, True, False]
+    >>> plane = st.Problem(
+    ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.19, density=1000.0),
+    ...     interface=st.Interface((0.1, 0.1), (40, 40)),
+    ...     friction=st.LinearWeakening(weakening_rate=1e11),
+    ... )
+    >>> [round(y.aspect, 6) for y in windows_of(plane, 1e11, (0.9, 1.8))]  # over sqrt(0.81) = 0.9
+    [1.0, 2.0]
     """
     interface, solid = problem.interface, problem.solid
     length = problem.nucleation_lengths(W)[0]
@@ -230,7 +309,17 @@ def windows_of(
 
 
 def places_of(interface: Interface, window: Window) -> Any:
-    """Return a mask (*shape) of the nodes at which a window lies within the interface's extent."""
+    """Return a mask (*shape) of the nodes at which a window lies within the interface's extent.
+
+    The window reaches from its centre to three nodes after it.
+
+    >>> y = np.array([0.5, 0.3, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0])
+    >>> window = Window(1.0, (0.4,), 0.4, 1.0, y, np.fft.rfft(y))
+    >>> places_of(Interface(0.8, 8, extent=(0.1, 0.5)), window).nonzero()[0].tolist()
+    [1, 2]
+    >>> places_of(Interface(0.8, 8), window)
+    True
+    """
     if not interface.is_held:
         return True
     beyond = interface.transform(1.0 * ~interface.breakable)
@@ -239,7 +328,21 @@ def places_of(interface: Interface, window: Window) -> Any:
 
 
 def _within_extent(interface: Interface, windows: list[Window]) -> list[Window]:
-    """Return the windows that fit within the extent. Raise an error if no window fits."""
+    """Return the windows that fit within the extent. Raise an error if no window fits.
+
+    Windows over three and five nodes from their centre: the second is too
+    wide for four nodes.
+
+    >>> y = [1.0 * (np.arange(8) < count) for count in (3, 5)]
+    >>> three, five = (Window(1.0, (0.1 * w.sum(),), 0.0, 1.0, w, np.fft.rfft(w)) for w in y)
+    >>> line = Interface(0.8, 8, extent=(0.2, 0.5))
+    >>> [fitting.extents for fitting in _within_extent(line, [five, three])] == [three.extents]
+    True
+    >>> _within_extent(line, [five])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: interface.extent: is too small for a critical patch (0.5 m). Widen the extent, or use st.Equilibrium()
+    """
     if fitting := [y for y in windows if np.any(places_of(interface, y))]:
         return fitting
     extents = " x ".join(f"{length:.4g}" for length in windows[0].extents)
@@ -254,6 +357,12 @@ def _line_weights(half_width: float, nodes: int) -> tuple[Array, Array]:
     """Return the weights around node 0, and their transform.
 
     `half_width` is h_n/2 in nodes.
+
+    >>> weights, spectrum = _line_weights(2.3, 16)
+    >>> weights[:4].tolist() == grid_weights(2.3)[:4].tolist(), bool(weights[2] == weights[-2] > 0.0)
+    (True, True)
+    >>> np.allclose(spectrum, np.fft.rfft(weights)), weights.flags.writeable
+    (True, False)
     """
     weights = around(grid_weights(half_width), nodes)
     spectrum = np.fft.rfft(weights).real
@@ -269,6 +378,23 @@ def ellipse_window(
     """Return the smallest unstable ellipse with an aspect, or `None` if it meets its images.
 
     See steps 1 to 3 at the top of the file.
+
+    For nu = 0 the critical disc has the radius 2.0061 G/(2 W). In this
+    example this is 0.01 m. Twice the aspect halves the extent along y. A disc
+    that would need more than the plane does not fit.
+
+    >>> G, half_spaces = 1e9, HalfSpaces((0.08, 0.08), (1e9, 1e9))
+    >>> W = 2.0061 * G / 0.02
+    >>> disc = ellipse_window(half_spaces, (64, 64), W, 1.0)
+    >>> print(f"{disc.extents[0]:.3f} {disc.area / (np.pi * 0.01**2):.1f} {disc.total:.6f}")
+    0.020 1.0 1.000000
+    >>> print(f"{disc.weight[2, 0] / disc.weight[0, -2]:.6f} {disc.weight[9, 0]:g}")
+    1.000000 0
+    >>> long = ellipse_window(half_spaces, (64, 64), W, 2.0)
+    >>> print(long.extents[0] / long.extents[1], disc.eigenvalue <= W, long.eigenvalue <= W)
+    2.0 True True
+    >>> ellipse_window(half_spaces, (64, 64), 0.02 * W, 1.0) is None
+    True
     """
     spacings = np.divide(half_spaces.lengths, shape)
     column = np.fft.irfft2(half_spaces.symbol(shape), shape)
@@ -314,6 +440,23 @@ def _smallest_unstable(
     `column` holds the stress (Pa) at each node of
     the box due to unit slip at node (0, 0). Ellipses
     up to `stable_square` are known to be stable.
+
+    The eigenvalues of the matrices for all ellipses show which is the
+    smallest with an eigenvalue below W.
+
+    >>> column = np.fft.irfft2(HalfSpaces((16.0, 16.0), (1.0, 0.8)).symbol((16, 16)), (16, 16))
+    >>> x, at = np.fft.fftfreq(16, 1.0 / 16), np.array([*np.ndindex(16, 16)])
+    >>> distance = x[:, None] ** 2 + (1.3 * x[None, :]) ** 2
+    >>> K, radii = column[tuple((at[:, None] - at).T % 16)], np.unique(distance)
+    >>> inside = [distance.ravel() <= r for r in radii]
+    >>> lowest = np.array([np.linalg.eigvalsh(K[np.ix_(S, S)])[0] for S in inside[:40]])
+    >>> W = 0.4
+    >>> square = radii[np.argmax(lowest <= W)]
+    >>> ellipse = _smallest_unstable(column, distance, W, 0.0, 36.0)
+    >>> print(f"{ellipse.square / square:.6f} {ellipse.eigenvalue / lowest[lowest <= W][0]:.6f}")
+    1.000000 1.000000
+    >>> _smallest_unstable(column, distance, W, 0.0, 0.99 * square) is None
+    True
     """
     symbol = np.fft.rfft2(column).real
     operator = make_operator(symbol, W, column.shape)._replace(
