@@ -93,6 +93,32 @@ def griffith_length(
     >>> problem = st.paper.problem(nodes=512)
     >>> st.theory.griffith_length(problem, 1e6, 0.5) > st.theory.griffith_length(problem, 2e6, 0.5)
     True
+
+    A uniform stress drop D gives G = D² L tan(pi a/L)/(2 G*), and a crack
+    never stops. If the load falls away from x = 0.05 m, it stops, and its
+    release rate equals the fracture energy at both lengths.
+
+    >>> import dataclasses, numpy as np
+    >>> L, loads = problem.interface.measure, np.array([1e6, 2e6])
+    >>> tangent = 0.5 * problem.effective_modulus * 4.0 / (loads**2 * L)
+    >>> length = griffith_length(problem, loads, 1.0)
+    >>> np.allclose(length, 2.0 * L / np.pi * np.arctan(tangent), rtol=1e-6)
+    True
+    >>> griffith_length(problem, 1e6, 1.0, arrest=True)
+    inf
+    >>> away = np.abs(problem.interface.x - 0.05)
+    >>> load = st.Load(profile=np.exp(-away / 0.003), initial_stress=-1e5)
+    >>> falling = dataclasses.replace(problem, load=load)
+    >>> ends = [
+    ...     griffith_length(falling, 2e6, 1.0, centre=0.051, arrest=arrest)
+    ...     for arrest in (False, True)
+    ... ]
+    >>> rates = [
+    ...     release_rates(falling, 2e6, np.array([end * (1.0 + d) for d in (-1e-6, 1e-6)]), 0.051)
+    ...     for end in ends
+    ... ]
+    >>> [(rate.min(axis=1) > 1.0).tolist() for rate in rates], ends[0] < ends[1]
+    ([[False, True], [True, False]], True)
     """
     if load.ndim > 1 or not np.all(np.isfinite(load)):
         raise InputError(f"load: must be finite, a number or a list, got {describe(load)}")
@@ -122,7 +148,20 @@ def griffith_length(
 
 
 def release_rates(problem: Problem, load: Any, lengths: Array, centre: float) -> Array:
-    """Return G = K|K|/(2 G*) at both tips of cracks, J/m², with the shape (..., lengths, 2)."""
+    """Return G = K|K|/(2 G*) at both tips of cracks, J/m², with the shape (..., lengths, 2).
+
+    Uniform drops of 3 and -1 MPa remain at loads of 4 and 0 MPa: K² =
+    D² L tan(pi a/L), and G has the sign of K.
+
+    >>> import dataclasses, stiction as st
+    >>> problem = st.paper.problem(nodes=144)
+    >>> friction = st.LinearWeakening(weakening_rate=5e11, residual_strength=1e6)
+    >>> problem = dataclasses.replace(problem, friction=friction)
+    >>> rates = release_rates(problem, np.array([4e6, 0.0])[:, None, None], np.array([0.02]), 0.03)
+    >>> unit = 1e12 * 0.1 * np.tan(np.pi * 0.01 / 0.1) / (2.0 * problem.effective_modulus)
+    >>> (rates / unit).round(6).tolist()
+    [[[9.0, 9.0]], [[-1.0, -1.0]]]
+    """
     # The factors without load and by a unit load serve every load.
     resting, unit = _intensity_factors(problem, _stress_drops(problem), lengths, centre)
     factor: Array = resting + load * unit
@@ -130,7 +169,18 @@ def release_rates(problem: Problem, load: Any, lengths: Array, centre: float) ->
 
 
 def _stress_drops(problem: Problem) -> Array:
-    """Return stress drops (2, nodes) at the nodes, Pa: without a load, and by a unit load."""
+    """Return stress drops (2, nodes) at the nodes, Pa: without a load, and by a unit load.
+
+    >>> import stiction as st
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
+    ...     interface=st.Interface(0.1, 8),
+    ...     friction=st.LinearWeakening(critical_slip=1e-5, residual_strength=5.0),
+    ...     load=st.Load(profile=np.linspace(0.5, 1.5, 8), initial_stress=2.0),
+    ... )
+    >>> _stress_drops(problem)[:, [0, 7]].tolist()
+    [[-3.0, -3.0], [0.5, 1.5]]
+    """
     if problem.interface.is_plane:
         raise InputError("problem: must have a line interface")
     refuse_specimen(problem, "the theory of cracks between half-spaces", "Use st.Equilibrium()")
@@ -146,7 +196,26 @@ def _stress_drops(problem: Problem) -> Array:
 
 
 def _intensity_factors(problem: Problem, drops: Array, lengths: Array, centre: float) -> Array:
-    """Step 1: return K (drops, m, 2), Pa m^(1/2), at both tips of cracks with given lengths."""
+    """Step 1: return K (drops, m, 2), Pa m^(1/2), at both tips of cracks with given lengths.
+
+    A uniform drop of 2 Pa gives 2 (L tan(pi a/L))^(1/2). A short crack at
+    0.95 m lies between node 7, without a drop, and node 0 with a drop of 5
+    Pa. There D is 3 Pa and grows by 40 Pa/m, so that K over (pi a)^(1/2) is 3
+    -+ 40 a/2.
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> line, drops = SimpleNamespace(interface=st.Interface(1.0, 8)), np.full((2, 8), 2.0)
+    >>> drops[1] = np.eye(8)[0] * 5.0
+    >>> lengths = np.array([2e-4, 0.5])
+    >>> K = _intensity_factors(line, drops, lengths, 0.95)
+    >>> (K[0] / np.sqrt(np.tan(0.5 * np.pi * lengths))[:, None]).round(6).tolist()
+    [[2.0, 2.0], [2.0, 2.0]]
+    >>> (K[1, 0] / np.sqrt(np.pi * 1e-4)).round(5).tolist()
+    [2.998, 3.002]
+    >>> _intensity_factors(line, drops, np.full(2100, 0.5), 0.95).shape  # more than fit at once
+    (2, 2100, 2)
+    """
     interface, period = problem.interface, problem.interface.measure
     points = max(MIN_POINTS, interface.size)
     cosine = np.cos((np.arange(points) + 0.5) * np.pi / points)

@@ -138,14 +138,37 @@ class LocalCriterion(Listed):
     samples_at_point: ClassVar[int] = 2000
 
     def seconds_per_sample(self, problem: Problem) -> float:
-        """Return the approximate time for a sample on a core, s."""
+        """Return the approximate time for a sample on a core, s.
+
+        >>> import stiction as st
+        >>> seconds = st.LocalCriterion().seconds_per_sample(st.paper.problem(nodes=1000))
+        >>> print(f"{seconds:.3g}")  # 0.03 + 0.03 ms
+        6e-05
+        """
         # The numbers are measured. The time on planes is mostly
         # transforms over several ellipses.
         fixed, per_node = (5e-4, 8e-8) if problem.interface.is_plane else (3e-5, 3e-8)
         return fixed + per_node * problem.interface.size
 
     def supports(self, problem: Problem) -> list[str]:
-        """Return the reasons why the method cannot solve a problem, or an empty list."""
+        """Return the reasons why the method cannot solve a problem, or an empty list.
+
+        >>> import dataclasses, numpy as np, stiction as st
+        >>> problem, corners = st.paper.problem(nodes=512), {"weakening_rate": 2e11}
+        >>> laws = [
+        ...     st.PiecewiseWeakening(slip=[0.2, 1.0], strength=[1.0, 0.0], **corners),
+        ...     st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.8, 0.0], **corners),
+        ...     st.PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.2, 0.0], **corners),
+        ...     st.LinearWeakening(weakening_rate=np.linspace(1e11, 2e11, 512)),
+        ... ]
+        >>> for law in laws:
+        ...     reasons = st.LocalCriterion().supports(dataclasses.replace(problem, friction=law))
+        ...     print([reason[:46] for reason in reasons])
+        ['friction.strength: begins with a plateau, on w']
+        ['friction: this law falls up to 4 times as stee']
+        []
+        ['friction.weakening_rate: varies along the inte']
+        """
         friction, reasons = problem.friction, []
         if isinstance(problem.specimen, Slider):
             return [
@@ -178,13 +201,39 @@ class LocalCriterion(Listed):
         because load <g, p> <= <g, tau_p - tau_i> at each position.
         Averaged over all positions between half-spaces, this is load
         <p> <= <tau_p - tau_i>. An interface that ends has no bounds.
+
+        >>> from types import SimpleNamespace
+        >>> cases = [(False, None, False), (True, None, False), (False, 1, False), (False, 1, True)]
+        >>> for held, specimen, machine in cases:
+        ...     problem = SimpleNamespace(specimen=specimen, has_machine=machine)
+        ...     problem.interface = SimpleNamespace(is_held=held)
+        ...     print(LocalCriterion().bounded_by_strength(problem, "first_instability"))
+        (True, True)
+        (False, False)
+        (True, False)
+        (False, False)
         """
         # Nodes beyond an end take over stress, but do not count in means.
         everywhere = not problem.interface.is_held
         return everywhere and not problem.has_machine, everywhere and problem.specimen is None
 
     def unfit_as_guide(self, problem: Problem, varying: set[str]) -> str | None:
-        """Return a reason if the length of patches differs between samples, or `None`."""
+        """Return a reason if the length of patches differs between samples, or `None`.
+
+        >>> import dataclasses, stiction as st
+        >>> problem, unfit = st.paper.problem(nodes=512), LocalCriterion().unfit_as_guide
+        >>> unfit(problem, {"strength"}) is None
+        True
+        >>> unfit(problem, {"strength", "critical_slip"})
+        'the weakening rate is not uniform'
+        >>> laws = [st.ExponentialWeakening(weakening_rate=5e11)]
+        >>> laws += [st.LinearWeakening(critical_slip=1e-6)]
+        >>> [unfit(dataclasses.replace(problem, friction=law), set()) for law in laws]
+        ['strength does not fall linearly with slip', 'the weakening rate is not uniform']
+        >>> long = dataclasses.replace(problem, friction=st.LinearWeakening(weakening_rate=1e10))
+        >>> unfit(long, set())
+        'a critical patch does not fit on the interface'
+        """
         W = problem.friction.uniform_weakening_rate
         if isinstance(problem.specimen, Slider):
             return "the pressure under a slider changes with the push"
@@ -206,6 +255,18 @@ class LocalCriterion(Listed):
 
         The quick test applies to lines between half-spaces without
         ends. In other cases the result is True.
+
+        A uniform strength of 1 MPa slides at 1 MPa.
+
+        >>> import dataclasses, stiction as st
+        >>> problem, method = st.paper.problem(nodes=144), LocalCriterion()
+        >>> interface = st.Interface(0.1, 144, extent=(0.01, 0.07))
+        >>> held = dataclasses.replace(problem, interface=interface)
+        >>> samples = [one.sample(np.full(144, 1e6)) for one in (problem, held)]
+        >>> [method.may_differ(problem, samples[0], np.array([stress])) for stress in (1e6, 1.03e6)]
+        [False, True]
+        >>> method.may_differ(held, samples[1], np.array([1e6]))
+        True
         """
         # The quick test needs the signs of K and a law with one piece.
         interface = problem.interface
@@ -215,7 +276,21 @@ class LocalCriterion(Listed):
         return rms_difference(problem, sample, stress) > MAX_RMS_DIFFERENCE
 
     def variables(self, problem: Problem) -> dict[str, Variable]:
-        """Return the variables in the solver's results."""
+        """Return the variables in the solver's results.
+
+        >>> from types import SimpleNamespace
+        >>> import stiction as st
+        >>> line, plane = st.Interface(0.1, 8), st.Interface((0.1, 0.1), (8, 8))
+        >>> for interface, specimen in ((line, None), (line, 1), (plane, None)):
+        ...     problem = SimpleNamespace(interface=interface, specimen=specimen)
+        ...     known = LocalCriterion().variables(problem)
+        ...     print([name for name in known if name not in onset_variables(interface)])
+        []
+        ['critical_patch_length']
+        ['critical_aspect', 'critical_patch_extent', 'critical_patch_area']
+        >>> known["critical_patch_extent"].dims, known["critical_aspect"].dims
+        (('sample', 'direction'), ('sample',))
+        """
         variables = onset_variables(problem.interface)
         if problem.interface.is_plane:
             extent = position(problem.interface, OF_PLANES["critical_patch_extent"])
@@ -299,6 +374,16 @@ def _values(sample: Sample, load: Array, relieved: Array, place: Array) -> dict[
     """Return the variables of all methods.
 
     `relieved` is the load less the relief by slip, Pa.
+
+    >>> from types import SimpleNamespace
+    >>> sample = SimpleNamespace(mean_stress=lambda load: 2.0 * load + 1.0)
+    >>> values = _values(sample, np.array([5.0]), np.array([3.0]), np.array([0.25]))
+    >>> for name, value in values.items():
+    ...     print(name, value.tolist())
+    critical_load [5.0]
+    critical_stress [7.0]
+    first_instability [7.0]
+    critical_position [0.25]
     """
     # Arrested events are not known, so the first instability is the onset.
     stress = sample.mean_stress(relieved)
@@ -313,6 +398,19 @@ def _relief_of_patch(problem: Problem, W: float, run: slice, drive: Array) -> fl
     multiple of the unstable mode. An additional equation fixes the
     multiple: the slips at the two ends add up to zero. In reality, slip
     does not vanish at a free end, and releases more stress.
+
+    With the slips 2, 5 and -2 on the patch, (K - W) slip is -2, 0 and -10.
+    The force 3 at both ends, times W, completes the drive. The relief counts
+    2 and 5 only.
+
+    >>> from types import SimpleNamespace
+    >>> K = np.array([[9, 1, 1, 1.0], [1, 5, -2, 1], [1, -2, 4, 1], [1, 1, 1, 6]])
+    >>> relief = lambda slip: float(np.array([100.0, 10.0, 1.0, 0.1]) @ slip)
+    >>> problem = SimpleNamespace(blocks=SimpleNamespace(stiffness=K), relief=relief)
+    >>> slip, ends = np.array([2.0, 5.0, -2.0]), np.array([1.0, 0.0, 1.0])
+    >>> drive = np.append(99.0, (K[1:, 1:] - 0.5 * np.eye(3)) @ slip + 0.5 * 3.0 * ends)
+    >>> round(_relief_of_patch(problem, 0.5, slice(1, 4), drive), 9)
+    25.0
     """
     matrix = np.zeros((run.stop - run.start + 1,) * 2)
     matrix[:-1, :-1] = problem.blocks.stiffness[run, run] - W * np.eye(len(matrix) - 1)
@@ -389,7 +487,19 @@ def nucleation_stress(problem: Problem, tau_p: Any) -> Array:
 
 
 def check_law(problem: Problem) -> None:
-    """Raise an `InputError` for an unsupported problem, and warn about a nonlinear law."""
+    """Raise an `InputError` for an unsupported problem, and warn about a nonlinear law.
+
+    >>> import dataclasses, stiction as st
+    >>> from stiction.base.errors import collect_warnings
+    >>> problem = st.paper.problem(nodes=512)
+    >>> law = st.ExponentialWeakening(weakening_rate=5e11)
+    >>> for checked_problem in (problem, dataclasses.replace(problem, friction=law)):
+    ...     with collect_warnings() as warned:
+    ...         check_law(checked_problem)
+    ...     print(len(warned))
+    0
+    1
+    """
     if refused := refusals(problem, LocalCriterion()):
         raise InputError(refused)
     if not problem.friction.linear:
@@ -401,18 +511,55 @@ def check_law(problem: Problem) -> None:
 
 
 def _warn_if_coarse(problem: Problem, sample: Sample) -> None:
-    """Warn if the moving average covers too few nodes."""
+    """Warn if the moving average covers too few nodes.
+
+    A line is warned about below 12 nodes, and a plane below 8 nodes.
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> from stiction.base.errors import collect_warnings
+    >>> problem, plane = st.paper.problem(nodes=256), SimpleNamespace(is_plane=True)
+    >>> for nodes in (7.9, 8.1, 11.9, 12.1):
+    ...     length = nodes * problem.interface.spacing
+    ...     rate = problem.friction.weakening_rate * problem.nucleation_length / length
+    ...     sample = SimpleNamespace(steepest_weakening_rate=rate)
+    ...     with collect_warnings() as warned:
+    ...         _warn_if_coarse(problem, sample)
+    ...     print(nodes, len(warned))
+    7.9 1
+    8.1 1
+    11.9 1
+    12.1 0
+    """
     nodes, cost = COARSE_PLANE if problem.interface.is_plane else COARSE_LINE
     warn_if_coarse(problem, sample.steepest_weakening_rate, nodes, cost)
 
 
 def excess_of(sample: Sample) -> Array:
-    """Return tau_p - tau_i, Pa."""
+    """Return tau_p - tau_i, Pa.
+
+    >>> from types import SimpleNamespace
+    >>> strength, initial = np.array([[5.0, 4.0]]), np.array([[1.0, 2.5]])
+    >>> sample = SimpleNamespace(strength=strength, initial_stress=initial)
+    >>> excess_of(sample).tolist()
+    [[4.0, 1.5]]
+    """
     return np.ascontiguousarray(sample.strength - sample.initial_stress)
 
 
 def _weakening_rates(sample: Sample) -> Iterator[tuple[float, NDArray[np.int64]]]:
-    """Yield each weakening rate (Pa/m) with the numbers of its samples."""
+    """Yield each weakening rate (Pa/m) with the numbers of its samples.
+
+    >>> from types import SimpleNamespace
+    >>> rates = np.array([[3.0, 3.0], [2.0, 2.0], [3.0, 3.0]])
+    >>> sample = SimpleNamespace(uniform_weakening=True, samples=3, weakening_rate=rates)
+    >>> [(rate, rows.tolist()) for rate, rows in _weakening_rates(sample)]
+    [(2.0, [1]), (3.0, [0, 2])]
+    >>> next(_weakening_rates(SimpleNamespace(uniform_weakening=False)))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: weakening_rate: varies along the interface, so the ...
+    """
     if not sample.uniform_weakening:
         raise InputError(
             "weakening_rate: varies along the interface, so the nucleation length of the local"
