@@ -72,6 +72,26 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
     """Return the variables of events.
 
     `inertia` adds the variables that a rupture provides.
+
+    On a plane, energies and moments are totals, and an area and an extent
+    replace the length:
+
+    >>> line, plane = Interface(0.8, 8), Interface((0.8, 2.0), (8, 10))
+    >>> on_line, on_plane = event_variables(line), event_variables(plane)
+    >>> on_line["event_moment"].units, on_plane["event_moment"].units
+    ('N', 'N m')
+    >>> sorted(on_line.keys() - on_plane), sorted(on_plane.keys() - on_line)
+    (['event_length'], ['event_area', 'event_extent', 'event_magnitude'])
+    >>> [name for name, variable in on_plane.items() if len(variable.dims) == 2]
+    ['event_position', 'event_hypocentre', 'event_extent', 'event_start', 'event_end']
+
+    Inertia adds variables, and in specimens drives travel:
+
+    >>> sorted(event_variables(line, True).keys() - on_line)
+    ['event_duration', 'event_radiated_energy', 'event_settled', 'event_time']
+    >>> free = Interface(0.8, 8, ends="free")
+    >>> [len(event_variables(free, inertia).keys() - on_line) for inertia in (False, True)]
+    [4, 5]
     """
 
     # On a plane, positions have two components, and an area replaces
@@ -114,7 +134,11 @@ def event_variables(interface: Interface, inertia: bool = False) -> dict[str, Va
 
 
 def of_samples(variables: dict[str, Variable]) -> dict[str, Variable]:
-    """Return the variables of events in many samples."""
+    """Return the variables of events in many samples.
+
+    >>> of_samples({"event_load": Variable("Pa", "load", ("event",))})["event_load"].dims
+    ('sample', 'event')
+    """
     return {
         name: replace(variable, dims=("sample", *variable.dims))
         for name, variable in variables.items()
@@ -145,6 +169,12 @@ def event_table(
 
     With `most`, the arrays hold the first `most` events. If there are
     fewer, they are padded with NaN.
+
+    Without events there is one row of NaN, or as many rows as `most` demands:
+
+    >>> variables = {"event_load": Variable("Pa", "load", ("event",))}
+    >>> event_table(None, None, 0, [], variables), event_table(None, None, 0, [], variables, 2)
+    ({'event_load': array([nan])}, {'event_load': array([nan, nan])})
     """
     # Methods that lack a variable do not ask for it, so `_measures` may
     # return more.
@@ -159,6 +189,15 @@ def tabulate(
 
     Without `most` there is at least one row: a dimension of length zero
     would leave no row in the table of a path.
+
+    >>> a, b = Variable("m", "", ("event",)), Variable("m", "", ("event", "direction"))
+    >>> table = tabulate([{"a": 3.0, "b": (1.0, 2.0), "c": 7.0}], {"a": a, "b": b}, 2)
+    >>> table["a"].tolist(), table["b"].tolist()
+    ([3.0, nan], [[1.0, 2.0], [nan, nan]])
+    >>> tabulate([{"a": 3.0}, {"a": 4.0}], {"a": a})["a"].tolist()
+    [3.0, 4.0]
+    >>> tabulate([], {"b": b})["b"].shape, tabulate([], {"b": b}, 0)["b"].shape
+    ((1, 2), (0, 2))
     """
     table, count = {}, len(measured)
     size = max(count, 1) if most is None else most
@@ -172,9 +211,37 @@ def tabulate(
 
 
 def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> dict[str, Any]:
-    """Return the measures of the patch, from added slip (*shape), m, and drop of shear stress, Pa.
-
+    >>> table = event_table(None, None, 0, [], variables)
+    >>> padded = event_table(None, None, 0, [], variables, 2)
+    >>> table["event_load"].tolist(), padded["event_load"].tolist()
+    ([nan], [nan, nan])
     `before` is the state before the event.
+
+    The nodes are 0.1 m apart. Node 6 slipped too little to belong to the
+    patch, which lies across the border of a circle:
+
+    >>> from types import SimpleNamespace
+    >>> solid = SimpleNamespace(shear_modulus=5.0)
+    >>> problem = SimpleNamespace(interface=Interface(0.8, 8), solid=solid)
+    >>> before = SimpleNamespace(direction=np.array([0, 0.2, 0, 0, 0, 0, 0, 0.1]))
+    >>> added, drop = np.array([4.0, 1, 0, 0, 0, 0, 0.003, 3.0]), np.arange(1.0, 9.0)
+    >>> found = patch_measures(problem, before, added, drop)
+    >>> names = "position", "length", "start", "end", "hypocentre", "mean_slip"
+    >>> print(*(np.round(found[f"event_{name}"], 6) for name in names))
+    [0.775] 0.3 [0.65] [0.15] [0.1] 2.666667
+    >>> names = "largest_slip", "area_stress_drop", "slip_stress_drop", "moment", "magnitude"
+    >>> print(*(round(float(found[f"event_{name}"]), 3) for name in names))
+    4.0 3.667 3.751 4.002 -5.665
+    >>> before.direction = np.zeros(8)
+    >>> patch_measures(problem, before, added, drop)["event_hypocentre"]
+    (nan,)
+
+    At a free end, places do not repeat:
+
+    >>> problem.interface = Interface(0.8, 8, ends="free")
+    >>> found = patch_measures(problem, before, added[::-1], drop)
+    >>> np.round([*found["event_start"], *found["event_end"]], 6).tolist()
+    [0.6, 0.8]
     """
     direction = before.direction
     # 1. and 2. Patch and moment.
@@ -203,7 +270,58 @@ def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> 
 
 
 def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) -> dict[str, Any]:
-    """Return the variables of one event."""
+    """Return the variables of one event.
+
+    A slip of 0.1 m grows by 0.2 (1 + cos x) m, which releases 2 cos x Pa.
+    Before the event, the stress is 0.5 + 3 x 2 Pa, 1 Pa above the residual
+    strength. The sum over (1 - cos x) x 0.2 (1 + cos x) x 0.1 m is 0.08 J/m:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.problem.friction import LinearWeakening
+    >>> problem = SimpleNamespace(
+    ...     interface=Interface(0.8, 8), friction=LinearWeakening(3.0), specimen=None,
+    ...     solid=SimpleNamespace(shear_modulus=5.0), relief=lambda slip: 0.0,
+    ...     released_stress=lambda slip: 10.0 * (slip - slip.mean()),
+    ... )
+    >>> initial, residual, strength = np.outer([0.5, 5.5, 6.4], np.ones(8))
+    >>> strength[4] = np.inf
+    >>> rows = SimpleNamespace(
+    ...     initial_stress=[None, initial], load_profile=np.full(8, 2.0), mean=np.mean,
+    ...     residual_strength=[None, residual], strength=[None, strength],
+    ...     weakening_rate=[None, np.full(8, 3.0)],
+    ... )
+    >>> slip = np.full(8, 0.1)
+    >>> added = 0.2 * (1.0 + np.cos(np.arange(8) * np.pi / 4))
+    >>> event = ArrestedEvent(*(EquilibriumState(3.0, d, added) for d in (slip, slip + added)))
+    >>> found = _measures(problem, rows, 1, event)
+    >>> names = "stress", "area_stress_drop", "slip_stress_drop", "energy_stress_drop"
+    >>> print(*(round(float(found[f"event_{name}"]), 6) for name in names))
+    6.5 0.285714 1.0 1.0
+
+    Beyond d_c = 0.9/3 m, the whole energy, 0.9^2/6 = 0.135 J/m², is
+    dissipated. Five nodes dissipate 0.06 J/m² more than before, and two
+    nodes 0.03 J/m². Waves radiate further 0.05 J/m:
+
+    >>> round(found["event_fracture_energy"], 6)
+    0.036
+    >>> waves = event._replace(known={"event_radiated_energy": 0.05})
+    >>> found = _measures(problem, rows, 1, waves)
+    >>> round(float(found["event_energy_stress_drop"]), 6), found["event_radiated_energy"]
+    (1.075, 0.05)
+
+    In a machine, slip lowers the stress by 2 Pa/m times mean slip times profile:
+
+    >>> problem.relief = lambda slip: 2.0 * slip.mean()
+    >>> travel = lambda force, slip: force / 8.0 + slip.mean()
+    >>> relief = lambda slip: 3.0 * slip.mean()
+    >>> problem.blocks = SimpleNamespace(mean_relief=relief, travel=travel)
+    >>> drive = SimpleNamespace(stiffness=4.0)
+    >>> problem.specimen = SimpleNamespace(drive=drive, thickness=0.5)
+    >>> found = _measures(problem, rows, 1, event)
+    >>> names = "stress", "stress_drop", "travel", "crosshead_travel", "travel_step"
+    >>> print(*(round(float(found[f"event_{name}"]), 6) for name in names))
+    6.1 0.8 0.37 0.69 0.14
+    """
     (before, after, known), interface, law = event, problem.interface, problem.friction
     means = (rows.initial_stress[row], rows.load_profile)
     initial, profile = (float(rows.mean(values)) for values in means)
@@ -251,7 +369,11 @@ def _measures(problem: Problem, rows: Sample, row: int, event: ArrestedEvent) ->
 
 
 def place_of(interface: Interface, node: int) -> list[float]:
-    """Return a node's position along each direction, m. The interface is flattened."""
+    """Return a node's position along each direction, m. The interface is flattened.
+
+    >>> np.round(place_of(Interface((0.8, 2.0), (8, 10)), 13), 6).tolist()
+    [0.1, 0.6]
+    """
     entry = np.unravel_index(node, interface.shape)
     return [float(at[i]) for at, i in zip(interface.coordinates.values(), entry, strict=True)]
 
@@ -260,12 +382,28 @@ def moment_of(problem: Problem, slip: Array) -> float:
     """Return the moment (N) of a slip in m, or the moment rate (N/s) of a slip rate in m/s.
 
     On a plane, the units are N m and N m/s.
+
+    >>> from types import SimpleNamespace
+    >>> solid, plane = SimpleNamespace(shear_modulus=5.0), Interface((0.8, 2.0), (8, 10))
+    >>> problem = SimpleNamespace(solid=solid, interface=plane)
+    >>> round(moment_of(problem, np.array([3.0, 4.0])), 6)  # 5 Pa x 7 m x 0.1 m x 0.2 m
+    0.7
     """
     return problem.solid.shear_modulus * float(slip.sum()) * problem.interface.cell
 
 
 def travel_of(problem: Problem, load: float, slip: Array) -> float:
-    """Return the total travel, m, of the two drives of a specimen since the unloaded state."""
+    """Return the total travel, m, of the two drives of a specimen since the unloaded state.
+
+    Slip lowers the load from 5 to 2 Pa, which act on 0.5 m:
+
+    >>> from types import SimpleNamespace
+    >>> travel = lambda force, slip: force / 8.0 + slip[0]
+    >>> blocks = SimpleNamespace(mean_relief=lambda slip: 2.0 * slip.mean(), travel=travel)
+    >>> problem = SimpleNamespace(blocks=blocks, interface=Interface(0.5, 8))
+    >>> travel_of(problem, 5.0, np.array([1.0, 2.0]))
+    1.125
+    """
     force = (load - float(problem.blocks.mean_relief(slip))) * problem.interface.measure
     return float(problem.blocks.travel(force, slip))
 
@@ -274,6 +412,21 @@ def elongation_of(problem: Problem, stress: float) -> float:
     """Return the elongation of the machine (m) at a mean stress of the whole interface (Pa).
 
     The elongation is NaN under a dead load.
+
+    6 Pa act on 0.5 m x 0.25 m, against 4 N/m:
+
+    >>> from types import SimpleNamespace
+    >>> drive = SimpleNamespace(stiffness=4.0)
+    >>> specimen = SimpleNamespace(drive=drive, thickness=0.25)
+    >>> problem = SimpleNamespace(specimen=specimen, interface=Interface(0.5, 8))
+    >>> elongation_of(problem, 6.0)
+    0.1875
+    >>> specimen.thickness = None
+    >>> elongation_of(problem, 6.0)
+    0.0
+    >>> drive.stiffness = 0.0
+    >>> elongation_of(problem, 6.0)
+    nan
     """
     assert problem.specimen is not None
     machine, depth = problem.specimen.drive.stiffness, problem.specimen.thickness

@@ -46,7 +46,14 @@ class Patch(NamedTuple):
 
 
 def count_patches(slip: Array) -> int:
-    """Count the runs of slipping nodes on a circle."""
+    """Count the runs of slipping nodes on a circle.
+
+    Across the border, two slipping nodes are one patch:
+
+    >>> fields = [1.0, 0.0, 2.0, 0.0], [0.5, 2.0], [0.0, 0.0], [0.0, 3.0, 3.0, 0.0, 1.0]
+    >>> [count_patches(np.array(slip)) for slip in fields]
+    [2, 1, 0, 2]
+    """
     # A run starts where a node slips and its left neighbour does not.
     above = slip > 0.0
     starts = int(np.count_nonzero(above[1:] > above[:-1])) + int(above[0] > above[-1])
@@ -60,6 +67,22 @@ def main_patch(field: Array) -> tuple[int, int, float]:
     A run is a sequence of positive entries. No
     entry of the field is negative. If all entries
     are positive, the run is centred at the peak.
+
+    A run may lie across the border. Its centroid is then counted past node 5, or again from 0:
+
+    >>> main_patch(np.array([1.0, 0.0, 0.0, 2.0, 0.0, 3.0]))
+    (5, 2, 5.25)
+    >>> first, length, centre = main_patch(np.array([4.0, 2.0, 0.0, 3.0, 0.0, 1.0]))
+    >>> first, length, round(centre, 6)
+    (5, 3, 0.142857)
+    >>> main_patch(np.array([0.0, 1.0, 5.0, 2.0, 0.0, 4.0]))
+    (1, 3, 2.125)
+
+    If all entries are positive, the run begins half a circle after the peak:
+
+    >>> first, length, centre = main_patch(np.array([1.0, 2.0, 5.0, 3.0]))
+    >>> first, length, round(centre, 6)
+    (1, 4, 2.272727)
     """
     n, peak = field.shape[0], 0
     for i in range(n):
@@ -92,12 +115,33 @@ def main_patch(field: Array) -> tuple[int, int, float]:
 
 
 def with_ends(field: Array, interface: Any) -> Array:
-    """If the interface has ends, append a zero to a field, so that the ends do not meet."""
+    """If the interface has ends, append a zero to a field, so that the ends do not meet.
+
+    >>> from stiction.problem.interface import Interface
+    >>> field = np.array([2.0, 0, 0, 0, 0, 0, 0, 3.0])
+    >>> interfaces = Interface(0.8, 8), Interface(0.8, 8, ends="free")
+    >>> [with_ends(field, interface)[6:].tolist() for interface in interfaces]
+    [[0.0, 3.0], [0.0, 3.0, 0.0]]
+    """
     return np.append(field, 0.0) if interface.is_free else field
 
 
 def line_patch(field: Array, interface: Any) -> Patch:
-    """Return the patch on a line that contains the largest entry of a field."""
+    """Return the patch on a line that contains the largest entry of a field.
+
+    The nodes are 25 mm apart, and the first node of an interface with ends lies 12.5 mm from
+    its beginning. Without ends, the patch continues at node 7:
+
+    >>> from stiction.problem.interface import Interface
+    >>> line, free = Interface(0.2, 8), Interface(0.2, 8, ends="free")
+    >>> field = np.array([3.0, 1.0, 0, 0, 0, 0, 0, 1.0])
+    >>> for interface in (line, free):
+    ...     patch = line_patch(field, interface)
+    ...     values = [*patch.centre, *patch.extents, patch.area, *patch.starts]
+    ...     print(np.round(values, 6).tolist())
+    [0.0, 0.075, 0.075, 0.1625]
+    [0.01875, 0.05, 0.05, 0.0]
+    """
     spacing = interface.spacing
     first, length, centre = main_patch(with_ends(field, interface))
     centre += interface.first
@@ -107,7 +151,18 @@ def line_patch(field: Array, interface: Any) -> Patch:
 
 
 def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
-    """Return each node's patch number (from 1; 0 at rest), and the patch count."""
+    """Return each node's patch number (from 1; 0 at rest), and the patch count.
+
+    The corners meet across both borders. Cells that only touch at a corner are not connected:
+
+    >>> mask = np.array([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [1, 0, 0, 0]], dtype=bool)
+    >>> patches, count = labelled_patches(mask)
+    >>> patches.tolist(), count
+    ([[1, 0, 0, 1], [0, 2, 0, 0], [0, 0, 3, 0], [1, 0, 0, 0]], 3)
+    >>> labelled_patches(np.zeros((2, 3), dtype=bool))
+    (array([[0, 0, 0],
+           [0, 0, 0]]), 0)
+    """
     pieces, count = label(mask)
     if count == 0:
         return pieces.astype(np.int64), 0
@@ -126,7 +181,8 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 
 
 def span(occupied: Mask, peak: int) -> tuple[int, int]:
-    """Return the beginning and the length of the shortest arc that contains all occupied places.
+    Cells that only touch at a corner are not connected. The corners of the mask
+    meet across both borders:
 
     If every place is occupied, the arc is the whole circle, cut
     opposite the peak.
@@ -147,7 +203,18 @@ def span(occupied: Mask, peak: int) -> tuple[int, int]:
 
 
 def patch_of(mask: Mask, weight: Array, spacings: tuple[float, ...]) -> Patch:
-    """Return the patch marked by a mask on a plane, centred at the centroid of the weight."""
+    """Return the patch marked by a mask on a plane, centred at the centroid of the weight.
+
+    Rows are 0.5 m apart and columns 0.1 m. The patch lies across the border between rows:
+
+    >>> mask = np.zeros((4, 6), dtype=bool)
+    >>> mask[0, 1:4] = mask[3, 3] = True
+    >>> weight = np.where(mask, 1.0, 9.0)
+    >>> weight[0, 1] = 5.0
+    >>> patch = patch_of(mask, weight, (0.5, 0.1))
+    >>> np.round([*patch.centre, *patch.extents, patch.area, *patch.starts], 6).tolist()
+    [1.9375, 0.1625, 1.0, 0.3, 0.2, 1.25, 0.05]
+    """
     peak = np.unravel_index(int(np.argmax(np.where(mask, weight, -np.inf))), mask.shape)
     centre, extents, starts = [], [], []
     for axis in (0, 1):
@@ -169,6 +236,19 @@ def largest_patch(weight: Array, interface: Any, share: float) -> tuple[Mask, Pa
 
     The weight is not negative, and positive somewhere. Nodes belong to
     a patch if their weight exceeds a fraction of the largest weight.
+
+    Nodes with exactly half of the largest weight do not belong to the patch:
+
+    >>> from stiction.problem.interface import Interface
+    >>> weight = np.array([2.0, 4.0, 3.0, 2.1, 0.0, 3.9, 2.0, 0.0])
+    >>> inside, patch = largest_patch(weight, Interface(0.8, 8), 0.5)
+    >>> np.flatnonzero(inside).tolist(), np.round([*patch.starts, patch.area], 6).tolist()
+    ([1, 2, 3], [0.05, 0.3])
+    >>> field = np.zeros((8, 10))
+    >>> field[2, 3:5], field[2, 5:7], field[6] = (2.0, 7.0), (3.0, 4.0), 6.0
+    >>> inside, patch = largest_patch(field, Interface((0.8, 2.0), (8, 10)), 0.5)
+    >>> np.argwhere(inside).tolist(), np.round(patch.extents, 6).tolist()
+    ([[2, 4]], [0.1, 0.2])
     """
     above = weight > share * weight.max()
     if weight.ndim == 1:  # a line
@@ -190,6 +270,23 @@ def critical_patch(multiplier: Array, interface: Any) -> Patch:
     which y exceeds a tenth of its largest value. Slipping
     nodes with a smaller y do not count, because with a
     rough strength they extend across the whole plane.
+
+    On a plane, y = 0.6 exceeds a tenth of 5 but 0.4 does not. On a line any positive y counts:
+
+    >>> from stiction.problem.interface import Interface
+    >>> line, plane = Interface(0.8, 8), Interface((0.8, 2.0), (8, 10))
+    >>> y = np.array([0.0, 0.4, 5.0, 0.6, 0.0, 0.0, 0.6, 0.0])
+    >>> round(critical_patch(y, line).area, 6)
+    0.3
+    >>> field = np.zeros((8, 10))
+    >>> field[:, 4] = y
+    >>> patch = critical_patch(field.reshape(-1), plane)
+    >>> np.round([*patch.extents, *patch.starts, patch.area], 6).tolist()
+    [0.2, 0.2, 0.15, 0.7, 0.04]
+    >>> critical_patch(np.zeros(8), line)
+    Patch(centre=(nan,), extents=(nan,), area=nan, starts=(nan,))
+    >>> critical_patch(np.zeros(80), plane).starts
+    (nan, nan)
     """
     if not multiplier.any():
         nowhere = (np.nan,) * len(interface.shape)
@@ -202,7 +299,17 @@ def critical_patch(multiplier: Array, interface: Any) -> Patch:
 
 
 def patches_of(slip: Array, interface: Any) -> int:
-    """Return the number of slipping patches."""
+    """Return the number of slipping patches.
+
+    Slip at both ends is one patch on a circle, and two patches between ends:
+
+    >>> from stiction.problem.interface import Interface
+    >>> slip = np.array([1.0, 0, 0, 2, 2, 0, 0, 1])
+    >>> [patches_of(slip, Interface(0.8, 8, ends=ends)) for ends in (None, "free")]
+    [2, 3]
+    >>> patches_of(np.tile(slip, 10), Interface((2.0, 0.8), (10, 8)))
+    2
+    """
     if interface.is_plane:
         return labelled_patches(slip.reshape(interface.shape) > 0.0)[1]
     return count_patches(with_ends(slip, interface))

@@ -61,12 +61,29 @@ class EquilibriumState:
 
     @property
     def highest(self) -> float:
-        """Largest load that the interface carried on the way to this state, Pa."""
+        """Largest load that the interface carried on the way to this state, Pa.
+
+        >>> from dataclasses import replace
+        >>> state = EquilibriumState(3.0, np.zeros(2), np.zeros(2))
+        >>> state.highest
+        3.0
+        >>> replace(state, peak=4.0).highest, replace(state, peak=0.0).highest
+        (4.0, 0.0)
+        """
         return self.load if self.peak is None else self.peak
 
 
 def at_rest(sample: StaticSample) -> EquilibriumState:
-    """Return the state in which the first node is about to slip."""
+    """Return the state in which the first node is about to slip.
+
+    The nodes begin to slip at 4, 1.5 and 2 Pa:
+
+    >>> from stiction.methods.equilibrium.strength import LINEAR, make_sample
+    >>> rows = np.array([[4.0, 3.0, 6.0], [1.0, 2.0, 0.0], [1.0, 2.0, 3.0], [5.0, 6.0, 7.0]])
+    >>> state = at_rest(make_sample(*rows, LINEAR))
+    >>> state.load, state.slip.tolist(), state.status.name, state.Kd.tolist()
+    (1.5, [0.0, 0.0, 0.0], 'STABLE', [0.0, 0.0, 0.0])
+    """
     load = float((sample.excess / sample.profile).min())
     slip, direction, Kd = np.zeros((3, sample.excess.size))
     return EquilibriumState(load, slip, direction, Kd, PathStatus.STABLE)
@@ -83,6 +100,12 @@ def multiplier_of(sample: StaticSample, state: EquilibriumState) -> Array:
     >>> unstable = EquilibriumState(0.5, np.zeros(2), direction=np.array([2.0, 0.5]))
     >>> multiplier_of(sample, unstable).tolist()
     [0.5, 0.125]
+
+    If y is known exactly, y is returned:
+
+    >>> unstable.multiplier = np.array([0.3, 0.2])
+    >>> multiplier_of(sample, unstable).tolist()
+    [0.3, 0.2]
     """
     if state.multiplier is not None:
         return state.multiplier
