@@ -211,10 +211,8 @@ def tabulate(
 
 
 def patch_measures(problem: Problem, before: Any, added: Array, drop: Array) -> dict[str, Any]:
-    >>> table = event_table(None, None, 0, [], variables)
-    >>> padded = event_table(None, None, 0, [], variables, 2)
-    >>> table["event_load"].tolist(), padded["event_load"].tolist()
-    ([nan], [nan, nan])
+    """Return the measures of the patch, from added slip (*shape), m, and drop of shear stress, Pa.
+
     `before` is the state before the event.
 
     The nodes are 0.1 m apart. Node 6 slipped too little to belong to the

@@ -181,8 +181,7 @@ def labelled_patches(mask: Mask) -> tuple[NDArray[np.int64], int]:
 
 
 def span(occupied: Mask, peak: int) -> tuple[int, int]:
-    Cells that only touch at a corner are not connected. The corners of the mask
-    meet across both borders:
+    """Return the beginning and the length of the shortest arc that contains all occupied places.
 
     If every place is occupied, the arc is the whole circle, cut
     opposite the peak.
