@@ -64,6 +64,34 @@ N = 2, mu_r N = 1, W = 1. The cell starts at D = 2 with the pivot 3 - 1
 and slips at the rate 1/3 from then on. With W = 4 the pivot is -1: the
 cell jumps at D = 2, passes its corner at d = 1/4 with the overstress
 1/4, and rests at d = 1/3.
+
+>>> from stiction.methods.equilibrium.slider import Friction, make_contact
+>>> K, T, rest = np.diag([3.0, 1, 1]), np.array([1.0, 0, 0]), np.array([-2.0, -1, -1])
+>>> slow, fast = (Friction(*np.array([[1.0], [0.5], [W]])) for W in (1.0, 4.0))
+>>> state = make_contact(K, T, slow, rest.copy(), np.zeros(3))
+>>> for load in (1.5, 3.0, 4.0, 7.0):
+...     print(Status(follow(state, load)).name, round(float(state.moved[0]), 6))
+AT_TARGET 0.0
+AT_TARGET 0.5
+AT_TARGET 1.0
+AT_TARGET 2.0
+>>> state = make_contact(K, T, fast, rest.copy(), np.zeros(3))
+>>> for _ in range(3):
+...     print(Status(follow(state, 5.0)).name, state.loads[LOAD], state.moved[:1].round(6))
+UNSTABLE 2.0 [0.]
+ARRESTED 2.0 [0.333333]
+AT_TARGET 5.0 [1.333333]
+
+With W = 3.5 and a machine of 1 Pa, the pivot is 0.5. The cell slips by
+2/7 m while the load rises by 1/7 N/m, and the force falls. At D = 2.2,
+slip is 2/7 + (2.2 - 15/7)/4 = 0.3 m:
+
+>>> soft = slow._replace(weakening=np.array([3.5]))
+>>> state = make_contact(K, T, soft, rest, np.zeros(3), 1.0)
+>>> Status(follow(state, 2.2)).name, round(float(state.moved[0]), 6)
+('AT_TARGET', 0.3)
+>>> state.loads.round(6).tolist()
+[2.2, 1.9, 2.0]
 """
 
 from enum import IntEnum
@@ -165,14 +193,25 @@ LOAD, FORCE, PEAK = range(3)
 
 @jit_inside
 def normal(edges: Array, n: int, a: int) -> float:
-    """Return (Q P)_a from values (m,), of which the last n + 1 belong to edges."""
+    """Return (Q P)_a from values (m,), of which the last n + 1 belong to edges.
+
+    Each cell carries half the force on an edge, but the whole force at the ends:
+
+    >>> values = np.array([9.0, 9.0, 9.0, 1.0, 2.0, 6.0, 16.0])
+    >>> [float(normal.py_func(values, 3, a)) for a in range(3)]
+    [2.0, 4.0, 19.0]
+    """
     first = edges[n + a] * (1.0 if a == 0 else 0.5)
     return first + edges[n + a + 1] * (1.0 if a == n - 1 else 0.5)
 
 
 @jit_inside
 def _largest(values: Array) -> float:
-    """Return the largest absolute value."""
+    """Return the largest absolute value.
+
+    >>> float(_largest.py_func(np.array([2.0, -5.0, 3.0]))), _largest.py_func(np.zeros(0))
+    (5.0, 0.0)
+    """
     largest = 0.0
     for value in values:
         largest = max(largest, abs(value))
@@ -181,7 +220,17 @@ def _largest(values: Array) -> float:
 
 @jit_inside
 def _multiply_inverse(state: Contact, k: int) -> None:
-    """Write M_SS^-1 b (in S) to `right`, for b (k,) in `left`."""
+    """Write M_SS^-1 b (in S) to `right`, for b (k,) in `left`.
+
+    >>> from types import SimpleNamespace
+    >>> inverse, left = np.arange(49.0).reshape(7, 7) % 5, np.arange(1.0, 8.0)
+    >>> for k in (3, 6):
+    ...     state = SimpleNamespace(left=left, right=np.full(7, -1.0), inverse=inverse)
+    ...     _multiply_inverse.py_func(state, k)
+    ...     print((state.right[:k] - inverse[:k, :k] @ left[:k]).tolist(), state.right[k])
+    [0.0, 0.0, 0.0] -1.0
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0] -1.0
+    """
     left = state.left
     for t in range(k):
         row, a, b, c, d = state.inverse[t], 0.0, 0.0, 0.0, 0.0
@@ -296,7 +345,19 @@ def _find_rates(state: Contact) -> None:
 
 @jit_inside
 def _nearer(kink: Kink, gap: float, speed: float, least: float, node: int, kind: int) -> Kink:
-    """Return the earlier of a kink and the place at which a gap closes at a speed."""
+    """Return the earlier of a kink and the place at which a gap closes at a speed.
+
+    A gap of 3 closes at the speed 2 after 1.5. A negative gap closes at once, and a speed
+    at the least speed does not count:
+
+    >>> kink = Kink(2.0, 5, Kind.TARGET)
+    >>> _nearer.py_func(kink, 3.0, 2.0, 0.5, 7, Kind.CORNER)
+    Kink(step=1.5, node=7, kind=<Kind.CORNER: 4>)
+    >>> _nearer.py_func(kink, -3.0, 2.0, 0.5, 7, Kind.STOP)
+    Kink(step=0.0, node=7, kind=<Kind.STOP: 6>)
+    >>> [_nearer.py_func(kink, gap, speed, 0.5, 7, 1).node for gap, speed in ((4, 2), (1, 0.5))]
+    [5, 5]
+    """
     if speed > least and max(gap, 0.0) < kink.step * speed:
         return Kink(max(gap, 0.0) / speed, node, kind)
     return kink
@@ -338,6 +399,39 @@ def follow(state: Contact, target: float) -> int:
     """Follow the path to a load (N/m), an instability or an arrest.
 
     Return the `Status`.
+
+    Two sliders with three cells jump once, come to rest, stop cells, close edges and
+    pass corners. At every stop, (1) gives the overstress, (2) holds, and no cell has
+    missed its corner. In the second slider, S has to be bordered again:
+
+    >>> from stiction.elasticity.rig import on_cells
+    >>> from stiction.methods.equilibrium.slider import Friction, make_contact
+    >>> def check(K_upper, T, P, W):
+    ...     K, T, P, worst = np.zeros((7, 7)), np.array(T), np.array(P), 0.0
+    ...     K[np.triu_indices(7)] = K_upper
+    ...     K = K + np.triu(K, 1).T
+    ...     law = Friction(np.array([0.75, 1, 0.5]), np.array([0.25, 0.5, 0.25]), np.array(W))
+    ...     rest, stops = np.append(-law.peak * on_cells(P), -P), []
+    ...     state = make_contact(K, T, law, rest, np.zeros(7))
+    ...     while state.loads[LOAD] < 8.0 and len(stops) < 40:
+    ...         stops.append(follow(state, (np.floor(4.0 * state.loads[LOAD]) + 1.0) / 4.0))
+    ...         o = state.loads[LOAD] * T - K @ state.moved - np.append(np.zeros(3), P)
+    ...         N, falls = on_cells(-o[3:]), state.weakening * state.moved[:3]
+    ...         o[:3] += falls - (law.residual + state.difference) * N
+    ...         missed, calm = falls - state.difference * N, state.motion < Motion.UNSTABLE
+    ...         in_S = state.motion == Motion.STABLE
+    ...         worst = max(worst, *abs(o - state.overstress), *o[calm], *abs(o[in_S]))
+    ...         worst = max(worst, *missed, *-state.moved)
+    ...     again = int(state.counts[N_BORDERED_AGAIN])
+    ...     print(bool(worst < 1e-11), stops.index(Status.UNSTABLE), len(stops), again)
+    >>> check([10, 1, -2, -1, -2, 1, -2, 6, 0, -1, 0, 1, 0, 6, 2, -1, 0, -1,
+    ...        7, -1, 1, -1, 5, 0, -1, 5, 0, 6],
+    ...       [1.0, 2, 1, 2, 2, 2, 0], [2.0, 1, 3, 2], [7.0, 0, 6])
+    True 3 34 0
+    >>> check([6, 1, 0, 0, 1, 1, -1, 8, -1, -2, 0, -2, -1, 6, -2, 0, 0, -2,
+    ...        11, -1, -2, -2, 5, -2, 0, 11, 1, 9],
+    ...       [1.0, 1, 3, 0, 1, -1, -1], [4.0, 2, 2, 4], [6.0, 1, 0])
+    True 8 34 1
     """
     counts, loads, overstress, moved = state.counts, state.loads, state.overstress, state.moved
     while counts[N_EVENTS] < MAX_EVENTS_PER_NODE * moved.shape[0]:

@@ -114,6 +114,27 @@ def make_contact(
     Where the strength is mu_r N, `friction.peak` must equal
     `friction.residual`. With a machine, the force falls by `relief` T'x
     (Pa).
+
+    Row 0 of M is K_0 + 0.5 (K_1 + K_2) with the weakening on its diagonal,
+    and the load on the cell is 1 + 0.5 (0.2 + 0.4). Edge 2 is open, so S
+    begins with it and 1/K_22:
+
+    >>> K, T = np.array([[4.0, 1, 2], [1, 3, 0], [2, 0, 5]]), np.array([1.0, 0.2, 0.4])
+    >>> friction = Friction(*np.array([[0.5], [0.25], [1.5]]))
+    >>> state = make_contact(K, T, friction, np.zeros(3), np.array([0.7, 0.0, 0.1]))
+    >>> state.columns.T.tolist(), state.load.round(6).tolist()
+    ([[4.0, 2.5, 4.5], [1.0, 3.0, 0.0], [2.0, 0.0, 5.0]], [1.3, 0.2, 0.4])
+    >>> state.motion.tolist(), state.counts.tolist()
+    ([0, 0, 1], [1, 0, 0, 0])
+    >>> int(state.inside[0]), float(state.inverse[0, 0])
+    (2, 0.2)
+
+    Strength does not fall below its residual. A machine of 10 Pa adds 10 T T':
+
+    >>> flat = Friction(*np.array([[0.5], [0.5], [1.5]]))
+    >>> state = make_contact(K, T, flat, np.zeros(3), np.zeros(3), relief=10.0)
+    >>> state.columns.T.round(6).tolist(), state.relief.tolist(), float(state.weakening[0])
+    ([[18.5, 5.1, 9.7], [3.0, 3.4, 0.8], [6.0, 0.8, 6.6]], [10.0, 2.0, 4.0], 0.0)
     """
     n, m = len(friction.peak), len(moved)
     if relief > 0.0:
@@ -138,7 +159,25 @@ def make_contact(
 
 
 def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
-    """Steps 1 and 2: return a slider under a normal force (N/m)."""
+    """Steps 1 and 2: return a slider under a normal force (N/m).
+
+    Under 2 N/m, the cell carries 2 N/m and can bear 2 N/m of shear. Shear
+    of -0.5 N/m is held. Under -3 N/m the cell slips until 3 - 3 d = 2 - d:
+
+    >>> K, friction = np.diag([3.0, 1, 1]), Friction(*np.array([[1.0], [0.5], [1.0]]))
+    >>> for shear in (-0.25, -1.5):
+    ...     pressed = press(K, np.array([shear, -0.6, -0.4]), friction, 2.0)
+    ...     print(pressed.forces.round(6).tolist(), pressed.moved.round(6).tolist())
+    [-0.5, -1.2, -0.8] [-0.0, 0.0, 0.0]
+    [-1.5, -1.2, -0.8] [-0.5, 0.0, 0.0]
+
+    With W = 2.5 Pa, the cell has its residual strength, 3 - 3 d = 1 N/m, after the pressing:
+
+    >>> steep = friction._replace(weakening=np.array([2.5]))
+    >>> pressed = press(K, np.array([1.5, -0.6, -0.4]), steep, 2.0)
+    >>> pressed.moved.round(6).tolist(), pressed.friction.peak.tolist()
+    ([0.666667, 0.0, 0.0], [0.5])
+    """
     n = len(friction.peak)
     strength = friction.peak * on_cells(-T_p[n:] * force)
     # 1. The sign of slip along the shear.
@@ -172,7 +211,15 @@ def press(K: Array, T_p: Array, friction: Friction, force: float) -> Pressed:
 
 
 def forces_of(state: Contact, friction: Friction) -> Array:
-    """Return the shear force of each cell, and the tension of each edge (m,), N/m."""
+    """Return the shear force of each cell, and the tension of each edge (m,), N/m.
+
+    The cell carries N = 1.5 N/m and is 0.2 N/m below its strength, 1.5 - 2 x 0.25 N/m:
+
+    >>> K, T, friction = np.eye(3), np.zeros(3), Friction(*np.array([[1.0], [0.5], [2.0]]))
+    >>> overstress, moved = np.array([-0.2, -0.5, -1.0]), np.array([0.25, 0.0, 0.0])
+    >>> forces_of(make_contact(K, T, friction, overstress, moved), friction).tolist()
+    [0.8, -0.5, -1.0]
+    """
     n, forces = len(friction.peak), state.overstress.copy()
     coefficient = friction.residual + state.difference
     forces[:n] += coefficient * on_cells(-forces[n:]) - state.weakening * state.moved[:n]
@@ -180,7 +227,19 @@ def forces_of(state: Contact, friction: Friction) -> Array:
 
 
 def begin_push(K: Array, T: Array, start: Pressed, relief: float = 0.0) -> Contact:
-    """Step 3: return the slider before the push, whose slip adds to the slip of the pressing."""
+    """Step 3: return the slider before the push, whose slip adds to the slip of the pressing.
+
+    After a slip of -0.5 m, the strength is 2 - 0.5 N/m, and the shear -1.5 N/m:
+
+    >>> friction = Friction(*np.array([[1.0], [0.5], [1.0]]))
+    >>> start = Pressed(np.array([-1.5, -1.2, -0.8]), np.array([-0.5, 0.0, 0.0]), friction)
+    >>> state = begin_push(np.eye(3), np.ones(3), start)
+    >>> state.overstress.tolist(), state.moved.tolist()
+    ([-3.0, -1.2, -0.8], [0.5, 0.0, 0.0])
+    >>> residual = start._replace(friction=friction._replace(peak=friction.residual))
+    >>> begin_push(np.eye(3), np.ones(3), residual).overstress.tolist()
+    [-2.5, -1.2, -0.8]
+    """
     peak, residual, weakening = start.friction
     moved, overstress, n = np.abs(start.moved), start.forces.copy(), len(peak)
     overstress[:n] -= peak * on_cells(-start.forces[n:])
@@ -218,7 +277,34 @@ class Push(NamedTuple):
 
 
 class SliderPath:
-    """A slider on its path, which never goes back."""
+    """A slider on its path, which never goes back.
+
+    The example by hand in `contact_path`, with a shear of -0.5 N/m from the
+    pressing. Slip jumps at 2.5 N/m, to 1/3 m. Then the cell slides stably:
+
+    >>> K, T, T_p = np.diag([3.0, 1, 1]), np.eye(3)[0], np.array([-0.25, -0.6, -0.4])
+    >>> rig = Rig(K, T, T_p, 2.0)
+    >>> path = SliderPath(rig, 0.0, Friction(*np.array([[1.0], [0.5], [4.0]])), 2.0)
+    >>> push = path.follow()
+    >>> push.first.load, push.peak, push.known, bool(push.topples), len(push.events)
+    (2.5, 2.5, True, False, 1)
+    >>> before, after = push.events[0]
+    >>> before.moved.tolist(), after.moved.round(6).tolist()
+    ([0.0, 0.0, 0.0], [0.333333, 0.0, 0.0])
+    >>> after.forces.round(6).tolist()
+    [1.0, -1.2, -0.8]
+    >>> before.direction.tolist(), before.residual, after.residual, push.last.load
+    ([1.0], False, True, 2.5)
+
+    Slip of the pressing does not count as slip of the push:
+
+    >>> rig = Rig(K, T, np.array([1.5, -0.6, -0.4]), 2.0)
+    >>> path = SliderPath(rig, 0.0, path.friction, 2.0)
+    >>> path.state().moved.tolist(), bool(path.move(3.0) == Status.AT_TARGET)
+    ([0.0, 0.0, 0.0], True)
+    >>> path.state().moved.round(6).tolist(), path.before.round(6).tolist()
+    ([1.0, 0.0, 0.0], [0.666667, 0.0, 0.0])
+    """
 
     def __init__(self, rig: Rig, relief: float, friction: Friction, force: float) -> None:
         start = press(rig.K, rig.T_p, friction, force)
@@ -257,13 +343,65 @@ class SliderPath:
 
 
 def push_variables(interface: Interface) -> dict[str, Variable]:
-    """Return the event variables of a slider."""
+    """Return the event variables of a slider.
+
+    >>> free = Interface(0.8, 8, ends="free")
+    >>> sorted(event_variables(free).keys() - push_variables(free))
+    ['event_energy_stress_drop', 'event_fracture_energy']
+    """
     variables = event_variables(interface).items()
     return {name: known for name, known in variables if name not in WITH_FIXED_PRESSURE}
 
 
 class SliderSolver:
-    """Thread-safe solver for samples of a slider by `Equilibrium` with given options."""
+    """Thread-safe solver for samples of a slider by `Equilibrium` with given options.
+
+    Eight cells that are not coupled carry 1 N/m each. Cell 2 jumps at 2 N/m
+    to (2 - 1)/3 m, and cell 5 at 3.5 N/m to (3.5 - 1)/3 m. The other cells do
+    not weaken and begin to slide at 9 N/m:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.problem.friction import LinearWeakening
+    >>> T_p = np.repeat([0.0, -0.0625, -0.125, -0.0625], [8, 1, 7, 1])
+    >>> rig = Rig(np.diag([3.0] * 17), np.repeat([1.0, 0.0], [8, 9]), T_p, 4.0)
+    >>> problem = SimpleNamespace(
+    ...     friction=LinearWeakening(4.0), rig=rig, interface=Interface(0.8, 8, ends="free"),
+    ...     specimen=SimpleNamespace(
+    ...         machine=0.0, drive=SimpleNamespace(stiffness=5.0), thickness=0.5
+    ...     ),
+    ...     solid=SimpleNamespace(shear_modulus=2.0),
+    ... )
+    >>> options = SimpleNamespace(slip=True, sensitivity=False, events=0)
+    >>> solver, peak = SliderSolver(problem, options), np.full(8, 9.0)
+    >>> peak[[2, 5]] = 2.0, 3.5
+    >>> friction = Friction(peak, np.where(peak < 9.0, 1.0, 9.0), np.full(8, 4.0))
+    >>> solver.path = lambda *place: SliderPath(rig, 0.0, friction, 8.0)
+    >>> values = solver._values(None, 0, solver.path().follow())
+    >>> for name in "critical_load", "critical_stress", "first_instability", "critical_position":
+    ...     print(name, round(values[name], 6))
+    critical_load 11.25
+    critical_stress 11.25
+    first_instability 2.5
+    critical_position 0.25
+    >>> values["arrested_events"], values["slip_patches"], values["residual_reached"]
+    (2, 0, True)
+
+    At 10 N/m it slides. Slip at 2.5 N/m is (2.5 - 1)/3 m at cell 2:
+
+    >>> known = solver.at_loads(None, np.array([1.0, 2.5, 10.0]) / 0.8)
+    >>> known["slip"][:, 2].round(6).tolist(), known["sliding"].tolist()
+    ([0.0, 0.5, nan], [False, False, True])
+    >>> known["arrested_events"].tolist(), known["event_load"].round(6).tolist()
+    ([0, 1, 2], [2.5, 4.375])
+    >>> known["event_travel_step"].round(6).tolist()
+    [0.333333, 0.833333]
+    >>> known["event_position"].round(6).tolist()
+    [0.25, 0.55]
+    >>> known["travel"].round(6).tolist(), known["crosshead_travel"].round(6).tolist()
+    ([0.25, 1.125, nan], [0.35, 1.375, nan])
+    >>> known["stress"][1, :4].round(6).tolist(), known["pressure"][1, :3].round(6).tolist()
+    ([25.0, 25.0, 10.0, 25.0], [10.0, 10.0, 10.0])
+    """
 
     def __init__(self, problem: Problem, options: Any = None) -> None:
         if reasons := refused(problem):
@@ -333,7 +471,28 @@ class SliderSolver:
         return values
 
     def values_at(self, state: PushState) -> dict[str, Any]:
-        """Return the mean stress (Pa), both travels (m), and profiles (m, Pa) at the nodes."""
+        """Return the mean stress (Pa), both travels (m), and profiles (m, Pa) at the nodes.
+
+        Opening is the mean of the edges on both sides of a node:
+
+        >>> from types import SimpleNamespace
+        >>> solver = SliderSolver.__new__(SliderSolver)
+        >>> specimen = SimpleNamespace(drive=SimpleNamespace(stiffness=5.0), thickness=0.5)
+        >>> interface = SimpleNamespace(size=2, spacing=0.1, measure=0.2)
+        >>> solver.problem = SimpleNamespace(interface=interface, specimen=specimen)
+        >>> solver.length, solver.rig = 0.2, Rig(None, np.arange(1.0, 6.0), None, 4.0)
+        >>> moved, forces = np.array([1.0, 2, 0, 0.4, 3]), np.array([5.0, 6, -1, -2, -4])
+        >>> state = PushState(0.0, 3.0, moved, forces, None, False)
+        >>> for name, values in solver.values_at(state).items():
+        ...     print(name, np.round(values, 6).tolist())
+        mean_stress 15.0
+        travel 22.35
+        crosshead_travel 22.65
+        slip [1.0, 2.0]
+        stress [50.0, 60.0]
+        pressure [20.0, 50.0]
+        opening [0.2, 1.7]
+        """
         n, spacing = self.problem.interface.size, self.problem.interface.spacing
         stress, travel = state.force / self.length, state.force / self.rig.C
         travel += float(self.rig.T @ state.moved)
