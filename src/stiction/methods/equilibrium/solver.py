@@ -110,6 +110,10 @@ class SamplePath(NamedTuple):
         """All arrested events.
 
         If the interface ends, also the event in which it slides.
+
+        >>> path = SamplePath(None, None, 1.0, ["a", "b"], True, None)
+        >>> path.all_events, path._replace(sliding="c").all_events
+        (['a', 'b'], ['a', 'b', 'c'])
         """
         return self.events + ([] if self.sliding is None else [self.sliding])
 
@@ -123,6 +127,55 @@ def follow_to_sliding(
     load. Inertia may carry it further. An interface that ends slides as
     soon as every node that can break slips. Pass `to_rest` to follow
     this last event until it stops.
+
+    Lists replace the search. A patch jumps at 3 Pa and comes to rest, and the
+    next instability, at 5 Pa, slides. The stress was largest before 3 Pa:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.equilibrium.state import Jump
+    >>> from stiction.methods.equilibrium.strength import LINEAR
+    >>> some, every = np.array([0.0, 2.0, 0.0]), np.array([1.0, 2.0, 0.0])
+    >>> def state(load, status=PathStatus.UNSTABLE, slip=some, peak=None):
+    ...     return EquilibriumState(load, slip, slip, status=status, peak=peak)
+    >>> def follow(strength, states, outcomes, slip=some, to_rest=False):
+    ...     sample = make_sample(np.array(strength), *np.ones((3, 3)), LINEAR)
+    ...     states, outcomes, asked = iter(states), iter(outcomes), []
+    ...     def jump(sample, before, to_rest):
+    ...         asked.append(to_rest)
+    ...         return Jump(next(outcomes), state(before.load, slip=slip), "time")
+    ...     search = SimpleNamespace(next=lambda *_: next(states), jump=jump)
+    ...     path = follow_to_sliding(search, sample, to_rest)
+    ...     print(path.first.load, path.last.load, path.peak, len(path.events))
+    ...     print(path.known, path.arrival, path.sliding is not None, asked)
+    >>> ends, circle, (slides, arrested) = [3, 3, np.inf], [3, 3, 3], list(Outcome)[:2]
+    >>> follow(circle, [state(3.0, peak=7.0), state(5.0)], [arrested, slides], some, True)
+    3.0 5.0 7.0 1
+    True time False [False, False]
+
+    An instability that was not one does not count, and a jump may not be
+    followed to its end. A path may slide stably, or be given up:
+
+    >>> outcomes = [Outcome.NOT_UNSTABLE, Outcome.UNDECIDED]
+    >>> follow(circle, [state(3.0), state(4.0)], outcomes)
+    4.0 4.0 4.0 0
+    False time False [False, False]
+    >>> follow(circle, [state(3.0, PathStatus.STABLE)], [])
+    3.0 3.0 3.0 0
+    True None False []
+    >>> follow(circle, [state(3.0), state(6.0, PathStatus.GIVEN_UP)], [arrested])
+    3.0 6.0 6.0 1
+    False None False [False]
+
+    If an interface ends, it slides in the event in which every node slips, or
+    else in the last event:
+
+    >>> follow(ends, [state(3.0), state(4.0)], [arrested], every, True)
+    3.0 3.0 3.0 0
+    True time True [True]
+    >>> stable = state(6.0, PathStatus.STABLE)
+    >>> follow(ends, [state(3.0), state(4.0), stable], [arrested, arrested])
+    3.0 4.0 6.0 1
+    True None True [False, False]
     """
     ends, sliding = not np.isfinite(sample.excess).all(), None
     first: EquilibriumState | None = None
@@ -155,7 +208,20 @@ def follow_to_sliding(
 
 
 def refused(problem: Problem) -> list[str]:
-    """Return the reasons why the law of a problem cannot be followed, or an empty list."""
+    """Return the reasons why the law of a problem cannot be followed, or an empty list.
+
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> laws = [
+    ...     st.LinearWeakening(4.0), st.ExponentialWeakening(4.0),
+    ...     st.PiecewiseWeakening(4.0, slip=[0.3, 1.0], strength=[0.4, 0.0]),
+    ... ]
+    >>> for specimen in (None, Slider.__new__(Slider)):
+    ...     problems = (SimpleNamespace(friction=law, specimen=specimen) for law in laws)
+    ...     print([[reason[10:26] for reason in refused(problem)] for problem in problems])
+    [[], ['ExponentialWeake'], []]
+    [[], ['ExponentialWeake'], ['the strength of ']]
+    """
     law = problem.friction
     if not isinstance(law.parameters, Linear | Polygon):
         return [
@@ -172,7 +238,27 @@ def refused(problem: Problem) -> list[str]:
 
 
 def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> StaticSample:
-    """Return one sample or all samples of a batch, in the form that kernels need."""
+    """Return one sample or all samples of a batch, in the form that kernels need.
+
+    Two samples of a plane with 2 x 3 nodes, flattened:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.equilibrium.strength import LINEAR
+    >>> nodes = np.arange(6.0).reshape(2, 3)
+    >>> rows = SimpleNamespace(
+    ...     initial_stress=np.stack([nodes, 2 * nodes]), load_profile=nodes + 1.0,
+    ...     strength=np.stack([nodes + 9.0, nodes + 20.0]),
+    ...     residual_strength=np.stack([nodes, nodes]),
+    ...     weakening_rate=np.stack([nodes + 1.0, nodes + 2.0]),
+    ... )
+    >>> sample = sample_of(rows, LINEAR, 1)
+    >>> sample.excess.tolist(), sample.residual.tolist()
+    ([20.0, 19.0, 18.0, 17.0, 16.0, 15.0], [0.0, -1.0, -2.0, -3.0, -4.0, -5.0])
+    >>> sample.weakening_rate.tolist(), sample.profile.tolist()
+    ([2.0, 3.0, 4.0, 5.0, 6.0, 7.0], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    >>> sample_of(rows, LINEAR).excess.shape
+    (2, 6)
+    """
     initial = rows.initial_stress[row]
     shape = (*initial.shape[: initial.ndim - rows.load_profile.ndim], -1)
     excess = (rows.strength[row] - initial).reshape(shape)
@@ -184,7 +270,15 @@ def sample_of(rows: Sample, pieces: Pieces, row: int | slice = slice(None)) -> S
 
 
 def make_search(problem: Problem, gap: float = 1e-6) -> EquilibriumSearch:
-    """Return the programme that finds equilibria for a problem, or raise an `InputError`."""
+    """Return the programme that finds equilibria for a problem, or raise an `InputError`.
+
+    >>> import stiction as st
+    >>> solid, law = st.Solid(3e9, 0.35, 1180.0), st.LinearWeakening(1e9)
+    >>> for interface in (st.Interface(0.8, 16), st.Interface((0.8, 0.8), (16, 16))):
+    ...     print(type(make_search(st.Problem(solid, interface, law))).__name__)
+    DenseSearch
+    PlaneSearch
+    """
     if reasons := refused(problem):
         raise InputError(reasons)
     return PlaneSearch(problem, gap) if problem.interface.is_plane else DenseSearch(problem)
@@ -245,6 +339,51 @@ class OnsetSolver:
         """Return the variables of one sample.
 
         Stresses are divided by the load profile.
+
+        Node 2 jumps first, and node 5 slides later:
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.equilibrium.strength import LINEAR
+        >>> from stiction.problem.interface import Interface
+        >>> problem = SimpleNamespace(
+        ...     interface=Interface(0.8, 8, ends="free"), specimen=None,
+        ...     relief=lambda slip: 2.0 * float(slip.mean()),
+        ... )
+        >>> rows = SimpleNamespace(strength=[None, np.ones(8)])
+        >>> options = SimpleNamespace(slip=True, sensitivity=False, events=0)
+        >>> sample = make_sample(np.full(8, 3.0), *np.ones((3, 8)), LINEAR)
+        >>> slip, direction = np.array([0, 0.4, 0.8, 0, 0, 0, 0, 0]), np.eye(8)
+        >>> first = EquilibriumState(3.0, slip, direction[2], gap=0.25)
+        >>> last = EquilibriumState(5.0, slip + direction[5] * 2, direction[5])
+        >>> path = SamplePath(first, last, 4.5, [], True, None)
+        >>> solver = OnsetSolver(problem, options, None)
+        >>> values = solver._values(rows, 1, sample, path)
+        >>> for name in sorted(values.keys() - {"slip"}):
+        ...     print(name, np.round(float(values[name]), 6))
+        arrested_events 0.0
+        certificate_gap 0.25
+        critical_load 5.0
+        critical_patch_length 0.1
+        critical_position 0.25
+        critical_stress 4.5
+        first_instability 2.7
+        residual_reached 1.0
+        sliding_position 0.55
+        slip_patches 1.0
+        >>> values["slip"].tolist() == slip.tolist()
+        True
+
+        Without an instability, the values of the instability are NaN, and if
+        the interface ends between half-spaces, the values of sliding as well:
+
+        >>> stable = EquilibriumState(3.0, slip, direction[2], status=PathStatus.STABLE, gap=1.0)
+        >>> path = SamplePath(stable, stable, 4.5, [], True, None)
+        >>> extent = Interface(0.8, 8, extent=(0.1, 0.5))
+        >>> for problem.interface in (problem.interface, extent):
+        ...     values = solver._values(rows, 1, sample, path)
+        ...     print(*(name for name in sorted(values) if np.isnan(np.sum(values[name]))))
+        critical_patch_length critical_position first_instability
+        critical_load critical_patch_length critical_position critical_stress first_instability
         """
         interface, shape = self.problem.interface, rows.strength[row].shape
         first, last = path.first, path.last
@@ -298,6 +437,21 @@ class OnsetSolver:
         """Return the largest mean stress on the way, divided by the mean load profile, Pa.
 
         If the interface ends, only stresses at instabilities count.
+
+        The stresses are 3 - 2 and 4 - 2 Pa at the instabilities if the interface ends:
+
+        >>> from types import SimpleNamespace
+        >>> interface = SimpleNamespace(is_held=False)
+        >>> problem = SimpleNamespace(interface=interface, relief=lambda slip: slip.sum())
+        >>> states = [EquilibriumState(load, np.array([d]), None) for load, d in ((5, 1), (6, 3))]
+        >>> events = [ArrestedEvent(states[0], states[1])]
+        >>> path = SamplePath(states[0], states[1], 7.0, events, True, None)
+        >>> solver = OnsetSolver(problem, None, None)
+        >>> solver._peak(path)
+        7.0
+        >>> interface.is_held = True
+        >>> int(solver._peak(path)), int(solver._peak(path._replace(events=[])))
+        (4, 3)
         """
         if not self.problem.interface.is_held:
             return path.peak
@@ -379,6 +533,25 @@ def _sensitivity(
 
     The derivative is NaN if a law steepens and a node passed a corner
     before the instability.
+
+    Node 1 is on the second piece, whose strength at zero slip is 0.75 tau_p + 0.25 tau_r:
+
+    >>> from types import SimpleNamespace
+    >>> pieces = Pieces(
+    ...     np.array([0.25, 1.0]), np.array([1.0, 0.75, 0.0]), np.array([1.0, 0.5, 0.0]), 1.0, 0.4
+    ... )
+    >>> rows = np.array([[3.0] * 3, [1.0, 1.0, 3.0], [1.0] * 3, [2.0] * 3])
+    >>> sample = make_sample(*rows, pieces)
+    >>> state = EquilibriumState(2.0, np.array([0.1, 0.5, 0.0]), np.zeros(3))
+    >>> search = SimpleNamespace(gradient=lambda sample, state: np.array([0.2, 0.4, 0.6]))
+    >>> _sensitivity(None, search, sample, state).round(6).tolist()
+    [0.2, 0.3, 0.6]
+    >>> steep = sample._replace(pieces=pieces._replace(slopes=np.array([0.5, 1.0, 0.0])))
+    >>> _sensitivity(None, search, steep, state).round(6).tolist()
+    [0.2, 0.3, 0.6]
+    >>> state.certified = False
+    >>> _sensitivity(None, search, steep, state).tolist()
+    [nan, nan, nan]
     """
     pieces = sample.pieces
     if state.stopped:
@@ -400,6 +573,22 @@ def _quotients(
 
     Between events paths are straight, so a
     small step gives the exact derivative.
+
+    The load of the instability is 3 s_0 + 5 s_1 + 7 r_0 + 8 r_1 with the
+    residual strengths r, and its slip relieves 2 s_1. The strength of node 0
+    is constant, so that r_0 rises with s_0:
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.equilibrium.strength import LINEAR
+    >>> rows = np.array([[4.0, 6.0, np.inf], [4.0, 1.0, 0.0], [1, 1, 1], [2, 2, 2]])
+    >>> sample = make_sample(*rows, LINEAR)
+    >>> def instability(sample):
+    ...     load = float(sample.excess[:2] @ [3.0, 5.0] + sample.residual[:2] @ [7.0, 8.0])
+    ...     return EquilibriumState(load, sample.excess[1:2], np.zeros(3))
+    >>> search = SimpleNamespace(next=instability)
+    >>> problem = SimpleNamespace(relief=lambda slip: 2.0 * slip[0])
+    >>> _quotients(problem, search, sample, instability(sample)).round(4).tolist()
+    [10.0, 3.0, 0.0]
     """
     stress_before = first.load - problem.relief(first.slip)
     # At nodes that cannot break, the derivative is zero.
