@@ -110,7 +110,13 @@ Split = Literal["cycles", "strokes", "tables"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Drops(Result):
-    """Drops of the force: travel and force at the beginning, and size of each drop."""
+    """Drops of the force: travel and force at the beginning, and size of each drop.
+
+    Examples
+    --------
+    >>> len(Drops(np.zeros(2), np.ones(2), np.ones(2)))
+    2
+    """
 
     travel: Array
     force: Array
@@ -162,6 +168,18 @@ class Curve(Result):
     peak_error: float = 0.0
 
     def _row(self, name: str) -> Row:
+        """>>> at, none = np.zeros(0), Drops(*np.zeros((3, 0)))
+        >>> two = Drops(*np.array([[1, 2], [7, 8], [0.5, 3]]))
+        >>> curve = Curve("a", at, at, "N", "s", 0.03, 0.2, 9.0, 4.0, two, 6.0, peak_error=0.1)
+        >>> curve._row("peak").remark
+        '+- 0.1 N, at 4 s, 2 precursors from 7 N on, of up to 3 N, plateau 6 N, noise 0.03 N'
+        >>> replace(curve, drops=none, plateau=math.nan)._row("peak").remark
+        '+- 0.1 N, at 4 s, 0 precursors, noise 0.03 N'
+        >>> first = Drops(two.travel[:1], two.force[:1], two.size[:1])
+        >>> row = replace(curve, drops=first)._row("top")
+        >>> (row.name, row.value, row.interval, row.unit), "1 precursor from" in row.remark
+        (('top', 9.0, (), 'N'), True)
+        """
         count, force = len(self.drops), partial(in_words, self.unit)
         place = in_words(self.travel_unit, self.peak_travel)
         texts = [f"+- {force(self.peak_error)}", f"at {place}"]
@@ -174,6 +192,14 @@ class Curve(Result):
         return Row(name, self.peak, (), self.unit, ", ".join(texts))
 
     def _summary(self) -> Summary:
+        """The title is the name of the test.
+
+        >>> at, drops = np.zeros(0), Drops(*np.zeros((3, 0)))
+        >>> print(Curve("a", at, at, "N", "m", 0.0, 0.0, 0.4, 2e-3, drops, 0.3))
+        a
+                value  unit
+          peak  0.4    N     +- 0 N, at 2 mm, 0 precursors, plateau 0.3 N, noise 0 N
+        """
         return Summary(self.name, [self._row("peak")])
 
 
@@ -186,6 +212,14 @@ class Curves(Sequence[Curve], Result):
     tests : tuple of Curve
     read : tuple of Reading
         What was read from each file.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> tests = SimpleNamespace(peak=3.0, unit="N"), SimpleNamespace(peak=2.0, unit="Pa")
+    >>> curves = Curves(tests)
+    >>> len(curves), curves[1].peak, curves.unit, curves.peaks.tolist()
+    (2, 2.0, 'N', [3.0, 2.0])
     """
 
     tests: tuple[Curve, ...]
@@ -209,6 +243,18 @@ class Curves(Sequence[Curve], Result):
 
     def _summary(self) -> Summary:
         # Files with the same columns are shown once.
+        """Readings that differ only in their source or number of values are shown once.
+
+        >>> at, drops = np.zeros(0), Drops(*np.zeros((3, 0)))
+        >>> curve = Curve("a", at, at, "N", "m", 0.0, 0.0, 4.0, 0.0, drops, 3.0)
+        >>> files = ("a", "N", 9), ("b", "kN", 9), ("c", "N", 8)
+        >>> read = tuple(Reading(file, "F", unit, count) for file, unit, count in files)
+        >>> summary = Curves((curve, replace(curve, name="c")), read)._summary()
+        >>> summary.title, [row.name for row in summary.rows]
+        ('Peaks of 2 tests', ['a', 'c'])
+        >>> summary.notes
+        ['a: F in N, 9 values (and 1 similar files)', 'b: F in kN, 9 values']
+        """
         alike: dict[Any, list[Reading]] = {}
         for reading in self.read:
             alike.setdefault(reading._replace(source="", values=0), []).append(reading)
@@ -296,6 +342,12 @@ def read_curve(
     >>> curves = st.read_curve((travel, force), unit="N", travel_unit="m")
     >>> curves[0].peak, len(curves[0].drops), curves[0].plateau
     (80.0, 1, 70.0)
+
+    The speed of the machine turns time into travel.
+
+    >>> curves = st.read_curve((travel, force), unit="N", travel_unit="s", speed=0.5)
+    >>> float(curves[0].travel[-1]), curves[0].travel_unit
+    (0.0005, 'm')
     """
     tests: list[Curve] = []
     read: list[Reading] = []
@@ -341,17 +393,63 @@ class Readings(NamedTuple):
     lines: Array
 
     def part(self, rows: Any, label: str = "") -> Readings:
-        """Return a part of the readings, and add a label to the name."""
+        """Return a part of the readings, and add a label to the name.
+
+        >>> part = Readings("a", "N", "m", *np.arange(9.0).reshape(3, 3)).part([2, 0], " x")
+        >>> part[:3], [array.tolist() for array in part[3:]]
+        (('a x', 'N', 'm'), [[2.0, 0.0], [5.0, 3.0], [8.0, 6.0]])
+        """
         return Readings(self.name + label, *self[1:3], *(array[rows] for array in self[3:]))
 
     def cut(self, begins: Any, word: str) -> list[Readings]:
-        """Return the parts that begin at given readings."""
+        """Return the parts that begin at given readings.
+
+        >>> parts = Readings("a", "N", "m", *np.arange(15.0).reshape(3, 5)).cut([1, 3], "part")
+        >>> [(part.name, part.travel.tolist()) for part in parts]
+        [('a, part 1', [0.0]), ('a, part 2', [1.0, 2.0]), ('a, part 3', [3.0, 4.0])]
+        """
         pieces = np.split(np.arange(self.force.size), begins)
         return [self.part(rows, f", {word} {i}") for i, rows in enumerate(pieces, 1)]
 
 
 def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
-    """Yield the name and table of each file in a folder, or of a single source."""
+    """Yield the name and table of each file in a folder, or of a single source.
+
+    Two arrays, or a table of pandas, have the name 'test'.
+
+    >>> ((name, table),) = _tables(([0, 1, 2], [5, 7, 8]), Options())
+    >>> name, table.source, table.lines.tolist()
+    ('test', 'arrays', [0, 1, 2])
+    >>> [(c.name, c.unit, c.values.tolist(), c.number, c.heading) for c in table.columns]
+    [('travel', '', [0.0, 1.0, 2.0], 0, 'travel'), ('force', '', [5.0, 7.0, 8.0], 1, 'force')]
+    >>> list(_tables(([0, 1], [5, 7, 8]), Options()))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: source: travel and force must have ... [2, 3]
+    >>> list(_tables([1, 2, 3], Options()))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: source: must be a path, a DataFrame or ...
+    >>> import pandas as pd
+    >>> ((name, table),) = _tables(pd.DataFrame({"F (kN)": [3.0, 4.0]}), Options())
+    >>> name, table.columns[0].unit
+    ('test', 'kN')
+    >>> ((_, table),) = _tables((pd.Series([1.0], name="s [mm]"), [3.0]), Options())
+    >>> [(column.name, column.unit) for column in table.columns]
+    [('travel', 'mm'), ('force', '')]
+
+    A folder gives its text files and workbooks in order, without hidden files and copies that
+    an editor keeps.
+
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> for name in ("b.csv", "a.TXT", ".c.csv", "~d.csv", "e.pdf"):
+    ...     _ = (folder / name).write_text("s [mm]; F [N]\\n0; 1\\n1; 2\\n2; 4\\n")
+    >>> for source in (folder, folder / "e.pdf"):
+    ...     [(Path(name).name, table.lines.size) for name, table in _tables(source, Options())]
+    [('a.TXT', 3), ('b.csv', 3)]
+    [('e.pdf', 3)]
+    """
     if isinstance(source, str | Path):
         path, endings = Path(source), (*TEXT, EXCEL)
         files = [path]
@@ -383,7 +481,40 @@ def _tables(source: Any, options: Options) -> Iterator[tuple[str, Table]]:
 
 
 def _travel_of(columns: Sequence[Column], wanted: Wanted) -> Column:
-    """Return the column of travel, or else time, which a stop of the machine would stretch."""
+    """Return the column of travel, or else time, which a stop of the machine would stretch.
+
+    >>> def chosen(*columns, wanted=None):
+    ...     made = [Column(*c, np.zeros(1), i, c[0]) for i, c in enumerate(columns)]
+    ...     return _travel_of(made, wanted).number
+    >>> chosen(("time", "s"), ("travel", "mm")), chosen(("travel", "%"), ("time", "s"))
+    (1, 1)
+
+    The headings 'x' and 'x_value' count only if no other heading is a travel.
+
+    >>> chosen(("x", "mm"), ("travel", "mm")), chosen(("x", "mm"), ("time", "s"))
+    (1, 0)
+    >>> chosen(("x_value", ""), ("travel", "mm")), chosen(("a", "mm"), ("x_value", "s"))
+    (1, 1)
+    >>> chosen(("a", "mm"), ("x_value", "")), chosen(("b", "s"), ("a", "mm"))
+    (1, 1)
+    >>> chosen(("a", "N"), ("b", "s"))
+    1
+    >>> chosen(("travel", "mm"), ("time", "s"), wanted="time"), chosen(("a", "N"), ("a", "mm"))
+    (1, 1)
+    >>> chosen(("travel", "mm"), ("time", "s"), wanted="travel")
+    0
+    >>> chosen(("travel", "mm"), ("position", "mm"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: 2 columns could be the travel or time. ...
+    >>> chosen(("a", "N"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: no column is clearly the travel or time. ...
+    >>> text = Column("travel", "mm", np.zeros(1), 0, text="no numbers")
+    >>> _travel_of([text, Column("time", "s", np.zeros(1), 1)], None).name
+    'time'
+    """
     if wanted is not None:
         return stated_column(columns, "travel", wanted)
     numeric = [column for column in columns if not column.text]
@@ -403,6 +534,32 @@ def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
     """Yield the label of each test in a table, and a mask of its rows.
 
     A lone test has no label.
+
+    >>> def tests(travel, lines, begins=(), **columns):
+    ...     travel, lines = np.array(travel, float), np.array(lines)
+    ...     made = tuple(Column(k, "", np.array(v, float), 0) for k, v in columns.items())
+    ...     readings = Readings("a", "N", "m", travel, travel, lines)
+    ...     pairs = _tests_of(Table(made, "a", lines, begins=begins), readings)
+    ...     return [(label, rows.nonzero()[0].tolist()) for label, rows in pairs]
+
+    A column may number the tests. If one of its numbers is missing, it does not count.
+
+    >>> tests([0, 1, 2, 3], [1, 2, 3, 4], test=[7, 7, 2, 7])
+    [(', test 7', [0, 1, 3]), (', test 2', [2])]
+    >>> tests([0, 1, 2, 3], [1, 2, 3, 4], test=[7, 7, np.nan, 2])
+    [('', [0, 1, 2, 3])]
+    >>> tests([0, 1, 2], [1, 2, 3], test=[7, 7, 2], run=[3, 4, 4])
+    [('', [0, 1, 2])]
+    >>> tests([0, 1, 2], [1, 2, 3], **{"test time": [3, 4, 4]})
+    [('', [0, 1, 2])]
+
+    An empty line separates tests if the travel goes back, and a remark always does. The first
+    of the `begins` is the first table.
+
+    >>> tests([0, 1, 1, 0, 1, 0, 1], [1, 2, 4, 6, 7, 8, 9])
+    [(', test 1', [0, 1, 2]), (', test 2', [3, 4, 5, 6])]
+    >>> tests([-1, 1, 2, 3], [5, 6, 9, 10], begins=(6, 9))
+    [(', test 1', [0, 1]), (', test 2', [2, 3])]
     """
     numbers = [c for c in named(table.columns, TESTS) if role_of(c) == "specimen"]
     if len(numbers) == 1 and np.isfinite(numbers[0].values).all():
@@ -419,7 +576,75 @@ def _tests_of(table: Table, readings: Readings) -> Iterator[tuple[str, Any]]:
 
 
 def _parts(readings: Readings, noise: float | None, split: Split | None) -> list[Readings]:
-    """Return the parts of a record that are one test each."""
+    """Return the parts of a record that are one test each.
+
+    >>> def parts(force, travel=None, unit="m", split=None):
+    ...     at = np.arange(len(force)) * 1.0 if travel is None else np.array(travel, float)
+    ...     readings = Readings("a", "N", unit, at, np.array(force, float), at)
+    ...     return [(p.name, p.force.tolist()) for p in _parts(readings, 0.0, split)]
+    >>> parts([0, 1, np.nan, 2, 3, 4, 5, 6, 5, 5], [0, 1, 2, 3, 4, 5, np.inf, 6, 7, 8])
+    [('a', [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 5.0, 5.0])]
+    >>> parts([0, 1, 2, 30, 3, 4, 5, 6, 7])  # a spike
+    [('a', [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])]
+
+    Forces of the other sign count if they exceed a fifth of the largest force, here 1 N.
+
+    >>> for part in parts([-1, 3, 4, -0.1, 0.2, -0.3, -5, -4, -0.1, 2, 3], split="strokes"):
+    ...     print(part)
+    ('a, stroke 1', [1.0, 3.0, 4.0, 0.1, 0.2])
+    ('a, stroke 2', [0.3, 5.0, 4.0, 0.1])
+    ('a, stroke 3', [2.0, 3.0])
+    >>> parts([1, 3, 4, 0, -0.3, -5, -4, -0.1])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: forces have both signs, as in a ...
+    >>> parts([0.5, 0, -1, -2, -3, -4, -4, -3])
+    [('a', [-0.5, -0.0, 1.0, 2.0, 3.0, 4.0, 4.0, 3.0])]
+    >>> parts([-0.5, 0, 1, 2, 3, 4, 4, 3])
+    [('a', [-0.5, 0.0, 1.0, 2.0, 3.0, 4.0, 4.0, 3.0])]
+    >>> parts([0] * 8)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: all forces are zero
+
+    The sign of the travel changes if it ends at least nine tenths of its range below its start.
+
+    >>> force = np.arange(10.0)
+    >>> for last, unit in ((1, "m"), (1, "s"), (2, "m")):
+    ...     at = np.array([10, 9, 8, 7, 6, 5, 4, 3, 0, last], dtype=float)
+    ...     print(_parts(Readings("a", "N", unit, at, force, at), 0.0, None)[0].travel[-1])
+    -1.0
+    1.0
+    2.0
+    >>> float(_parts(Readings("a", "N", "m", 0.0 * at, force, at), 0.0, None)[0].travel[0])
+    0.0
+
+    Full slides are 6, 3 and 8 N here. A slide of 2.5 N is less than half of the median of the
+    largest three, and the force after the last full slide is left out.
+
+    >>> for part in parts([0, 4, 8, 2, 6, 3, 5, 2.5, 9, 1, 3], split="cycles"):
+    ...     print(part)
+    ('a, cycle 1', [0.0, 4.0, 8.0, 2.0])
+    ('a, cycle 2', [6.0, 3.0])
+    ('a, cycle 3', [5.0, 2.5, 9.0, 1.0])
+    >>> parts(range(8), split="cycles")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: split: the record has no full slide. Leave out split
+
+    A return ends at 0.8 of the peak or above, after a force below 0.7 of the peak.
+
+    >>> len(parts([0, 10, 7, 10, 6, 8, 6.9, 9, 6]))
+    1
+    >>> parts([0, 10, 7, 10, 6, 8, 6.9, 9, 6, 8])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: the force falls ... and returns 3 times, ...
+    >>> parts([8, 6, 8, 6, 8, 6, 8, 10])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: the force falls ... and returns 3 times, ...
+    """
     known = np.isfinite(readings.travel) & np.isfinite(readings.force)
     if not known.all():  # machines miss single readings
         warn_accuracy(f"{readings.name}: {np.sum(~known)} of {known.size} readings are missing")
@@ -467,7 +692,26 @@ def _parts(readings: Readings, noise: float | None, split: Split | None) -> list
 
 
 def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
-    """Return the noise of a reading and the smallest fall that counts (steps 1 and 2)."""
+    """Return the noise of a reading and the smallest fall that counts (steps 1 and 2).
+
+    >>> force = np.array([0, 1, 2, 3, -9, 4, 5, 6.0])
+    >>> _threshold(force, 0.3)[1] == 2.0 * 0.3 * math.sqrt(2.0 * math.log(8))
+    True
+    >>> [f"{value:.3g}" for value in _threshold(force, 0.0)]  # 1e-6 of the largest size
+    ['0', '9e-06']
+    >>> _threshold(force[:7], 0.3)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: holds 7 readings, but at least 8 are needed
+
+    The noise is measured up to the peak, unless the peak comes too early.
+
+    >>> _threshold(np.r_[np.arange(9.0), 3, 5, 2, 6, 1, 7, 0, 7], None)[0]
+    0.0
+    >>> late = np.r_[np.arange(8.0), 3, 5, 2, 6, 1, 7]
+    >>> _threshold(late, None)[0] == noise_of(late) > 0.0
+    True
+    """
     if force.size < MIN_READINGS:
         raise InputError(f"holds {force.size} readings, but at least {MIN_READINGS} are needed")
     top = int(np.argmax(np.abs(force)))
@@ -478,7 +722,32 @@ def _threshold(force: Array, noise: float | None) -> tuple[float, float]:
 
 
 def _without_spikes(readings: Readings, threshold: float) -> Readings:
-    """Leave out single readings that are far above both neighbours, and warn about them."""
+    """Leave out single readings that are far above both neighbours, and warn about them.
+
+    Steps are 1 N. A spike rises above both neighbours by more than the threshold and 3 N.
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> at = np.arange(9.0)
+    >>> readings = Readings("a", "N", "m", at, np.array([1, 2, 9, 3, 4, 5, 6, 7, 8.0]), at + 5)
+    >>> with collect_warnings() as caught:
+    ...     _without_spikes(readings, 2.9).force.tolist()
+    [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    >>> _without_spikes(readings, 3.0).force.size
+    9
+    >>> print(*caught)  # doctest: +ELLIPSIS
+    a: 1 single readings are far above ..., such as 9 N in line 7.0. They are left out
+
+    Several spikes are noise, a rise below a twentieth of the peak is small, and a jump stays.
+
+    >>> def size(*force):
+    ...     return _without_spikes(readings._replace(force=np.array(force)), 0.1).force.size
+    >>> size(0, 9, 0, 1, 2, 9, 3, 3, 4, 4, 5), size(9, 9, 9.4, 9, 9, 9, 9, 9, 9)
+    (11, 9)
+    >>> size(1, 1, 9, 9, 9, 1, 1, 1, 1), size(1, 1, 1, 9, 1, 1, 1, 1, 1)
+    (9, 8)
+    >>> size(8, 8, 8, -1, 8, 8, 8, 8, 8)
+    9
+    """
     force, steps = readings.force, np.diff(readings.force)
     least = threshold + 3.0 * float(np.median(np.abs(steps)))
     rise = np.minimum(steps[:-1], -steps[1:])  # above both neighbours
@@ -494,7 +763,63 @@ def _without_spikes(readings: Readings, threshold: float) -> Readings:
 
 
 def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curve:
-    """Return the curve of one test (steps 1 to 6)."""
+    """Return the curve of one test (steps 1 to 6).
+
+    >>> at, force = np.arange(10.0), np.array([0, 3, 6, 5, 8, 9, 5, 4, 4.2, 4.5])
+    >>> readings = Readings("a", "N", "m", 2.0 * at, force, at + 10)
+    >>> curve = _curve(readings, 0.0, None)
+    >>> curve.name, curve.unit, curve.travel_unit
+    ('a', 'N', 'm')
+    >>> curve.travel is readings.travel, curve.force is force, curve.threshold
+    (True, True, 9e-06)
+    >>> curve.peak, curve.peak_error, curve.peak_travel, f"{curve.plateau:.4f}", curve.noise
+    (9.0, 0.0, 10.0, '4.4250', 0.0)
+    >>> curve.drops.travel.tolist(), curve.drops.force.tolist(), curve.drops.size.tolist()
+    ([4.0], [6.0], [1.0])
+    >>> _curve(readings, 0.0, "cycles").plateau
+    nan
+    >>> _curve(readings, 0.0, "tables").plateau == curve.plateau
+    True
+
+    Travel may go back by a twentieth of its range, here 0.9, and time may not go back.
+
+    >>> def back(by, unit="m", split=None):
+    ...     at = np.r_[2.0 * np.arange(5), 8.0 - by, np.arange(6.0, 10) * 2.0]
+    ...     moved = readings._replace(travel=at, travel_unit=unit)
+    ...     return _curve(moved, 0.0, split).peak_travel
+    >>> back(0.875), back(0.0, "s"), back(1.0, split="strokes")
+    (7.125, 8.0, 7.0)
+    >>> back(1.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: line 15.0: travel or time goes back. Read one cycle ...
+    >>> back(0.125, "s")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: line 15.0: travel or time goes back. Read one cycle ...
+
+    Three equal largest readings in a row may be a saturated load cell, if the force has noise.
+    A force at the start may be a load cell that was not tared.
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> def warned(*force, noise=0.0, split=None):
+    ...     at, force = np.arange(len(force)), np.array(force, float)
+    ...     with collect_warnings() as caught:
+    ...         _curve(Readings("a", "N", "m", at * 1.0, force, at), noise, split)
+    ...     return [str(one).split(". ")[0] for one in caught]
+    >>> warned(0, 0.1, 2, 9, 9, 9, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6, noise=1.0)
+    ['a: the 3 largest readings are equal, 9, though the record has noise']
+    >>> warned(0, 0.1, 2, 9, 9, 9, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6)
+    []
+    >>> warned(0, 0.1, 9, 9, 5, 9, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6, 5, 4, 5, 6, noise=1.0)
+    []
+    >>> warned(0, 0.1, 2, 9, 9, 9, 5, 4, 5, 6, 5, 5, 5, 6, noise=1.0)  # in steps
+    []
+    >>> warned(2, 1.5, 0, 5, 8, 10, 6, 5)
+    ['a: the force begins at 1.5, 15 % of the peak']
+    >>> warned(2, 0.5, 0, 5, 8, 10, 6, 5), warned(2, 1.5, 0, 5, 8, 10, 6, 5, split="cycles")
+    ([], [])
+    """
     name, unit, travel_unit, travel, force, lines = readings
     # 1. and 2.
     noise, threshold = _threshold(force, noise)
@@ -534,7 +859,23 @@ def _curve(readings: Readings, noise: float | None, split: Split | None) -> Curv
 
 
 def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float, float]:
-    """Return the peak, corrected for the bias due to noise, and its standard error (step 4)."""
+    """Return the peak, corrected for the bias due to noise, and its standard error (step 4).
+
+    A parabola of 13 readings has its peak, 9, in the middle. This reading is 0.5 too large.
+    The fit gives it the weight 25/143.
+
+    >>> force = np.r_[-1, 5, -1, 9.0 - 0.25 * np.arange(-6, 7) ** 2, -1, 5]
+    >>> force[9] += 0.5
+    >>> peak, error = _peak(force, 9, 0.3, 9.5)
+    >>> f"{peak - 9.0 - 0.5 * 25 / 143:.6f} {error - 0.3 * math.sqrt(25 / 143):.6f}"
+    '0.000000 0.000000'
+    >>> _peak(force[3:16], 6, 0.3, 9.5) == (peak, error)
+    True
+    >>> _peak(force[3:15], 6, 0.3, 9.5)[0] < 9.2
+    True
+    >>> _peak(force[3:14], 6, 0.3, 9.5), _peak(force, 9, 0.0, 9.5)
+    ((9.5, 0.3), (9.5, 0.0))
+    """
     near = force >= force[top] - threshold
     first = top - int(np.argmin(np.r_[near[: top + 1][::-1], False])) + 1
     last = top + int(np.argmin(np.r_[near[top:], False]))
@@ -550,7 +891,19 @@ def _peak(force: Array, top: int, noise: float, threshold: float) -> tuple[float
 
 
 def _plateau(force: Array, threshold: float) -> float:
-    """Return the mean force of the slide after the peak, NaN without a fall (step 6)."""
+    """Return the mean force of the slide after the peak, NaN without a fall (step 6).
+
+    The last reading within 1 N of the peak is 9 N. The median after it is 4.2 N. Three quarters
+    of the fall end at 5.65 N. The last reading is unloading, because it is below 2.1 N.
+
+    >>> force = np.array([0, 10, 8, 9, 8, 6, 4, 5.2, 3.6, 4.2, 1.0])
+    >>> f"{_plateau(force, 1.0):.4f}"  # the mean of 4, 5.2, 3.6 and 4.2
+    '4.2500'
+    >>> f"{_plateau(np.r_[force[:-1], 2.1], 1.0):.4f}"
+    '3.8200'
+    >>> _plateau(force[:4], 1.0), f"{_plateau(np.array([5, -2, -2, -3.0]), 1.0):.4f}"
+    (nan, '-2.3333')
+    """
     peak = float(force.max())
     after = force[int(np.flatnonzero(force >= peak - threshold)[-1]) + 1 :]
     if after.size == 0 or peak - (level := float(np.median(after))) < threshold:
@@ -562,14 +915,37 @@ def _plateau(force: Array, threshold: float) -> float:
 
 
 def precursors(force: Array, threshold: float) -> tuple[Any, Any]:
-    """Return the readings at which drops before the peak begin and end (step 3)."""
+    """Return the readings at which drops before the peak begin and end (step 3).
+
+    Examples
+    --------
+    >>> starts, ends = precursors(np.array([0, 5, 3, 8, 6, 7.0]), 1.0)
+    >>> starts.tolist(), ends.tolist()
+    ([1], [2])
+    """
     starts, ends = turning_points(force, threshold)
     before = starts < int(np.argmax(force))
     return starts[before], ends[before]
 
 
 def noise_of(force: Array) -> float:
-    """Return the standard deviation of a reading (step 1)."""
+    """Return the standard deviation of a reading (step 1).
+
+    Examples
+    --------
+    Second differences are 1, 4 and 9, and their median is 4.
+
+    >>> noise_of(np.array([0, 1, 1, 5, 0.0])) == 1.4826 * 4.0 / math.sqrt(6.0)
+    True
+    >>> noise_of(np.array([0, 2, 4, 6.0])), noise_of(np.array([3, 3, 3.0]))
+    (0.0, 0.0)
+
+    A load cell that reads in steps of 0.5:
+
+    >>> force = np.array([-4, -4, -4, -4, -2.5, -2.5, -2.5, -2.5, -2, -2, -2])
+    >>> noise_of(force) == 0.5 / math.sqrt(12.0)
+    True
+    """
     # The median of a normal |x| is its deviation over 1.4826.
     second = np.abs(force[:-2] - 2.0 * force[1:-1] + force[2:])
     steps = np.abs(np.diff(force))
@@ -582,7 +958,16 @@ def noise_of(force: Array) -> float:
 
 
 def turning_points(force: Array, threshold: float) -> tuple[Any, Any]:
-    """Return the readings at which drops begin and end (step 3)."""
+    """Return the readings at which drops begin and end (step 3).
+
+    Examples
+    --------
+    A change by the threshold is not a turning point, and the first of equal readings counts.
+
+    >>> starts, ends = turning_points(np.array([0, 5, 4, 6, 3, 4, 2, 2, 7, 7, 5, 1, 2.0]), 1.0)
+    >>> starts.tolist(), ends.tolist()
+    ([3, 8], [6, 11])
+    """
     # `high` and `low` are the extreme readings since the last turning point.
     starts, ends = [], []
     high, low, falling = 0, 0, False
