@@ -109,12 +109,27 @@ class Agreement(Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Doubts, if the peaks contradict the prediction."""
+        """Doubts, if the peaks contradict the prediction.
+
+        >>> peaks = Peaks((None,), (np.ones(3),), "Pa")
+        >>> Agreement(peaks, 1.0, 2.0, {"a": 0.9, "size": 0.05}, (), 1.0).notes
+        ()
+        >>> doubted = Agreement(peaks, 1.0, 2.0, {"a": 0.9, "size": 0.04}, (), 1.0)
+        >>> doubted.notes  # doctest: +ELLIPSIS
+        ('the peaks contradict the prediction, p = 0.04. Check ...',)
+        """
         p = min(self.p_values.values())
         text = f"the peaks contradict the prediction, p = {p:.2g}. Check units, method and surfaces"
         return (text,) if p < DOUBTFUL_P_VALUE else ()
 
     def _summary(self) -> Summary:
+        """>>> peaks = Peaks((None,), (np.ones(3),), "Pa")
+        >>> print(Agreement(peaks, 1.0, 2.0, {"size": 0.25, "number": 0.5}, (), 3.0))
+        3 peaks against the prediction
+                           value
+          p-value, size    0.25
+          p-value, number  0.5
+        """
         rows = [Row(f"p-value, {name}", p) for name, p in self.p_values.items()]
         return Summary(f"{title_of(self.peaks)} against the prediction", rows)
 
@@ -221,6 +236,39 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
     Predicted drops follow from the force before and after each event.
     Drops below the largest threshold of the tests do not count, because
     a load cell could not distinguish them from noise.
+
+    Sample 0 has drops from 5 to 2 and from 8 to 7.5, and the second one is below the larger
+    threshold. Sample 1 has one event, and sample 2 has no peak.
+
+    >>> from types import SimpleNamespace
+    >>> data = xr.Dataset({
+    ...     "event_force": (("event", "sample"), [[5, 4, 6], [8, np.nan, 7]]),
+    ...     "event_force_drop": (("event", "sample"), [[3, 2, 1], [0.5, np.nan, 1]]),
+    ...     "critical_force": ("sample", [9, 7, np.nan]),
+    ...     "arrested_events": ("sample", [2, 1, 2]),
+    ... })
+    >>> first = SimpleNamespace(unit="N", threshold=1.2, force=np.array([0, 5, 3, 8, 9.0]))
+    >>> second = SimpleNamespace(unit="N", threshold=0.2, force=np.array([0, 4, 3, 6.0]))
+    >>> for measured, predicted in _precursors(data, Curves((first, second))):
+    ...     measured.tolist(), predicted.tolist()
+    ([1.0, 0.0], [1.0, 1.0])
+    ([2.0, 0.0], [3.0, 2.0])
+    ([5.0, 6.0], [5.0, 4.0])
+
+    >>> def refused(data, unit):
+    ...     try:
+    ...         _precursors(data, Curves((SimpleNamespace(unit=unit),)))
+    ...     except InputError as error:
+    ...         return str(error).split(". ")[0]
+    >>> refused(data, "Pa"), refused(data, "1")
+    ('prediction: has no events in Pa', 'prediction: has no events in 1')
+    >>> refused(data.assign(arrested_events=("sample", [2, 3, 2])), "N")
+    'prediction: keeps 2 of up to 3 events'
+    >>> of_stress = {name: name.replace("force", "stress") for name in data.data_vars}
+    >>> first.unit = second.unit = "Pa"
+    >>> number, *_ = _precursors(data.rename(of_stress), Curves((first, second)))
+    >>> [values.tolist() for values in number]
+    [[1.0, 0.0], [1.0, 1.0]]
     """
     quantity = {"N": "force", "Pa": "stress"}.get(curves.unit, "coefficient")
     event, drop = (f"event_{name}" for name in (quantity, f"{quantity}_drop"))
@@ -250,7 +298,15 @@ def _precursors(prediction: xr.Dataset, curves: Curves) -> Iterable[tuple[Array,
 
 
 def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
-    """Return number and largest size of precursors, and force at the first, or else the peak."""
+    """Return number and largest size of precursors, and force at the first, or else the peak.
+
+    Examples
+    --------
+    >>> summary_of(np.array([0, 5, 2, 8, 6, 9.0]), 1.0)
+    (2.0, 3.0, 5.0)
+    >>> summary_of(np.array([0, 4, 7, 6.0]), 1.0)
+    (0.0, 0.0, 7.0)
+    """
     starts, ends = precursors(force, threshold)
     sizes = force[starts] - force[ends]
     first = force[starts[0]] if sizes.size else force.max()
@@ -258,6 +314,28 @@ def summary_of(force: Array, threshold: float) -> tuple[float, float, float]:
 
 
 def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
+    """>>> from types import SimpleNamespace
+    >>> from stiction.base.errors import collect_warnings
+    >>> measured = SimpleNamespace(variable="critical_force", values=(np.ones(3),))
+    >>> peaks = ("sample", [2, np.nan, 3])
+    >>> data = xr.Dataset({"critical_stress": 9.0, "critical_force": peaks})
+    >>> with collect_warnings() as caught:
+    ...     print(_predicted_peaks(data, measured).tolist(), *caught)
+    [2.0, 3.0] 1 of 3 predictions have no peak and are left out
+    >>> def refused(data, **changes):
+    ...     try:
+    ...         _predicted_peaks(data, SimpleNamespace(**(vars(measured) | changes)))
+    ...     except InputError as error:
+    ...         print(error)
+    >>> refused(data, variable="friction_coefficient")  # doctest: +ELLIPSIS
+    prediction: lacks the measured quantity, friction_coefficient. It holds critical_stress, ...
+    >>> refused(data, values=(np.ones(3), np.ones(2)))  # doctest: +ELLIPSIS
+    prediction: must be for one kind of specimen. Choose a step ...
+    >>> refused(data.expand_dims("step"))  # doctest: +ELLIPSIS
+    prediction: must be for one kind of specimen. Choose a step ...
+    >>> refused(data.isel(sample=[1]).drop_vars("critical_stress"))
+    prediction: no sample has a peak
+    """
     name = measured.variable
     if name not in prediction:
         known = ", ".join(map(str, prediction.data_vars))
@@ -275,7 +353,24 @@ def _predicted_peaks(prediction: xr.Dataset, measured: Peaks) -> Array:
 
 
 def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
-    """Return both distances, for the measured choice and random choices (1 + replicates, 2)."""
+    """Return both distances, for the measured choice and random choices (1 + replicates, 2).
+
+    The distances by their definition, for the measured values and for each other choice:
+
+    >>> from itertools import combinations
+    >>> def distances(chosen, rest):
+    ...     away = [np.mean(chosen <= v) - np.mean(rest <= v) for v in (*chosen, *rest)]
+    ...     size = chosen.size
+    ...     return size * np.mean(np.square(away)), np.sqrt(size) * np.max(np.abs(away))
+    >>> values = np.array([1, 4, 4, 2, 3.0])
+    >>> found = _permuted(values[:2], values[2:], 200, np.random.default_rng(0))
+    >>> found.shape, bool(np.allclose(found[0], distances(values[:2], values[2:])))
+    ((201, 2), True)
+    >>> pairs = [np.array(pair) for pair in combinations(range(5), 2)]
+    >>> possible = [distances(values[pair], np.delete(values, pair)) for pair in pairs]
+    >>> {*map(tuple, found.round(6).tolist())} == {*map(tuple, np.round(possible, 6).tolist())}
+    True
+    """
     at, place, counts = np.unique(
         np.concatenate([peaks, values]), return_inverse=True, return_counts=True
     )
@@ -295,7 +390,48 @@ def _permuted(peaks: Array, values: Array, replicates: int, rng: Any) -> Array:
 def _with_posterior(
     posterior: Posterior, measured: Peaks, replicates: int, rng: Any
 ) -> Agreement:
-    """Compare with campaigns drawn from the posterior (steps 4 to 6)."""
+    """Compare with campaigns drawn from the posterior (steps 4 to 6).
+
+    Peaks are uniform in this posterior for all parameters. The measured kinds of specimens are
+    in another order than the fitted kinds.
+
+    >>> from types import SimpleNamespace
+    >>> flat = SimpleNamespace(parts=lambda u: np.zeros((len(u), LAW_VALUES)))
+    >>> posterior = SimpleNamespace(
+    ...     peaks=Peaks((0.1, 0.2), (np.array([4, 5.0]), np.array([40, 50.0])), "Pa"),
+    ...     predicted=(np.linspace(2, 12, 1001), np.linspace(20, 120, 1001)),
+    ...     u=np.zeros((5, 1)), likelihood=SimpleNamespace(of=lambda peaks, kinds: flat))
+    >>> measured = Peaks((0.2, 0.1), (np.array([60.0]), np.array([6.0, 5.0])), "Pa")
+    >>> found = _with_posterior(posterior, measured, 99, np.random.default_rng(0))
+    >>> laws = found.predicted
+    >>> [[float(at[0].round(2)), float(at[-1].round(2))] for at, share in laws]
+    [[10.05, 144.85], [1.0, 14.48]]
+    >>> shares = map(np.interp, measured.values, *zip(*laws, strict=True))
+    >>> pairs = [_distances(np.sort([share])) for share in shares]
+    >>> bool(np.isclose(found.cramer_von_mises, sum(w[0] for w, _ in pairs)))
+    True
+    >>> bool(np.isclose(found.largest_deviation, max(d[0] for _, d in pairs)))
+    True
+
+    Both deviations are below q with the probability 0.9 if q is about 1.1, the quantile of two
+    campaigns with one and two tests.
+
+    >>> 0.9 < found.band < 1.25, found.p_values["cramer_von_mises"] > 0.05
+    (True, True)
+    >>> def refused(*peaks):
+    ...     try:
+    ...         _with_posterior(posterior, Peaks(*peaks), 99, np.random.default_rng(0))
+    ...     except InputError as error:
+    ...         print(str(error).split(". ")[0])
+    >>> refused((0.1,), (np.ones(3),), "N")  # doctest: +ELLIPSIS
+    peaks: the posterior has 2 peaks at 0.1 m, ... in Pa, not 3 peaks at 0.1 m in N
+    >>> refused((0.3,), (np.ones(3),), "Pa")  # doctest: +ELLIPSIS
+    peaks: the posterior has 2 peaks at 0.1 m, ... in Pa, not 3 peaks at 0.3 m in Pa
+    >>> refused((0.2,), (np.array([50, 40.0]),), "Pa")
+    peaks: the posterior was fitted to these peaks
+    >>> refused((0.2,), (np.array([0.5, 0.6]),), "Pa")
+    peaks: are about 0.55 Pa, but predictions are about 70 Pa
+    """
     fitted = posterior.peaks
     if measured.unit != fitted.unit or not {*measured.lengths} <= {*fitted.lengths}:
         raise InputError(
@@ -331,7 +467,30 @@ def _with_posterior(
 
 
 def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[Array, Array]:
-    """Return peaks (points, LAW_VALUES) at parameters u, and the fraction of peaks up to each."""
+    """Return peaks (points, LAW_VALUES) at parameters u, and the fraction of peaks up to each.
+
+    The density of a peak y is y^u here: uniform for u = 0 and linear for u = 1.
+
+    >>> from types import SimpleNamespace
+    >>> def of(peaks, kinds):
+    ...     return SimpleNamespace(parts=lambda u: kinds[0] * u * np.log(peaks[0]))
+    >>> predicted = np.zeros(3), np.linspace(2, 12, 1001)
+    >>> posterior = SimpleNamespace(predicted=predicted, likelihood=SimpleNamespace(of=of))
+    >>> at, share = _peaks_at(posterior, 1, np.array([[0], [1]]), np.array([5, 1.5]))
+    >>> at.size, share.shape, at[[0, -1]].round(4).tolist()  # half of 1.5, and 11.99 + 10.49/4
+    (400, (2, 400), [0.75, 14.6125])
+    >>> bool(np.allclose(share[0], (at - at[0]) / np.ptp(at)))
+    True
+    >>> bool(np.allclose(share[1], (at**2 - at[0] ** 2) / (at[-1] ** 2 - at[0] ** 2)))
+    True
+    >>> at, share = _peaks_at(posterior, 1, np.array([[0]]), np.array([5, 20.0]))
+    >>> at[[0, -1]].round(4).tolist()  # half of 2.01, and 20 + 17.99/4
+    [1.005, 24.4975]
+    >>> posterior.predicted = (predicted[0], np.linspace(102, 112, 1001))
+    >>> at, share = _peaks_at(posterior, 1, np.array([[0]]), np.array([105.0]))
+    >>> at[[0, -1]].round(4).tolist()  # 102.01 and 111.99, with 9.98/4 on either side
+    [99.515, 114.485]
+    """
     ends = np.quantile(posterior.predicted[kind], [OUTLYING_SHARE, 1.0 - OUTLYING_SHARE])
     low, high = min(ends[0], peaks.min()), max(ends[1], peaks.max())
     margin = RANGE_MARGIN * (high - low)
@@ -345,7 +504,14 @@ def _peaks_at(posterior: Posterior, kind: int, u: Array, peaks: Array) -> tuple[
 
 
 def _distances(share: Array) -> tuple[Array, Array]:
-    """Return W^2 and D for sorted uniform numbers (campaigns, tests)."""
+    """Return W^2 and D for sorted uniform numbers (campaigns, tests).
+
+    >>> squares, most = _distances(np.array([[0.1, 0.8], [0.5, 0.9]]))
+    >>> (squares - 1 / 24).round(9).tolist()  # 0.15^2 + 0.05^2, and 0.25^2 + 0.15^2
+    [0.025, 0.085]
+    >>> (most / np.sqrt(2)).round(9).tolist()
+    [0.4, 0.5]
+    """
     size = share.shape[1]
     steps = np.arange(size + 1) / size
     squares = np.sum((0.5 * (steps[1:] + steps[:-1]) - share) ** 2, axis=1) + 1 / (12 * size)
@@ -354,7 +520,11 @@ def _distances(share: Array) -> tuple[Array, Array]:
 
 
 def _p_values(distances: Array) -> list[float]:
-    """Return the fraction of rows whose distances are at least the distances of the first row."""
+    """Return the fraction of rows whose distances are at least the distances of the first row.
+
+    >>> _p_values(np.array([[2, 3], [2, 4], [1, 3 - 1e-12], [3, 1], [1, 5]]))
+    [0.6, 0.8]
+    """
     # Equal distances may differ by round-off.
     as_far = np.sum(distances[1:] >= distances[0] * (1.0 - 1e-9), axis=0)
     return ((1 + as_far) / len(distances)).tolist()
@@ -364,6 +534,16 @@ def _agreement(measured: Peaks, distances: Array, predicted: Any) -> Agreement:
     """Return the agreement from distances (1 + replicates, 2).
 
     Measured distances come first.
+
+    >>> squares, most = np.r_[3, np.arange(12.0)], np.r_[21, 2 * np.arange(12.0)]
+    >>> distances = np.stack([squares, most], axis=1)
+    >>> found = _agreement("peaks", distances, "laws")
+    >>> found.peaks, found.predicted
+    ('peaks', 'laws')
+    >>> found.cramer_von_mises, found.largest_deviation, found.band
+    (3.0, 21.0, 20.0)
+    >>> found.p_values == {"cramer_von_mises": 10 / 13, "largest_deviation": 2 / 13}
+    True
     """
     observed, replicates = distances[0], distances[1:]
     names = ("cramer_von_mises", "largest_deviation")

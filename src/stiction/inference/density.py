@@ -65,11 +65,25 @@ class Densities(NamedTuple):
     table: Array  # logarithms in steps of `STEP` from -`TABLE_REACH`, (nodes, steps)
 
     def standardised(self) -> Array:
-        """Return the standardised v for onsets (nodes, samples)."""
+        """Return the standardised v for onsets (nodes, samples).
+
+        >>> onsets = np.array([[1.0, 1.0], [3.0, 3.0]]) + np.exp([[1, 4], [0, 7]])
+        >>> nodes = np.array([[1, 3], [2, 5], [0.5, 0.25]])  # bound, mean and spread
+        >>> Densities(onsets, *nodes, np.zeros(0)).standardised().round(9).tolist()
+        [[-2.0, 4.0], [-20.0, 8.0]]
+        """
         return (to_v(self.onsets, self.bound) - self.mean[:, None]) / self.spread[:, None]
 
     def between(self, index: NDArray[np.int64], weight: Array) -> Array:
-        """Return bound, mean and spread, interpolated at points, with shape (3, points)."""
+        """Return bound, mean and spread, interpolated at points, with shape (3, points).
+
+        The first point lies between the nodes 0 and 2, and the second one at node 1.
+
+        >>> nodes = np.array([[1, 2, 5], [10, 30, 50], [0.1, 0.7, 0.5]])
+        >>> index, weight = np.array([[0, 2], [1, 0]]), np.array([[0.25, 0.75], [1, 0]])
+        >>> Densities(np.zeros(0), *nodes, np.zeros(0)).between(index, weight).round(9).tolist()
+        [[4.0, 2.0], [40.0, 30.0], [0.4, 0.7]]
+        """
         values = np.stack([self.bound, self.mean, self.spread])
         return np.ascontiguousarray(np.einsum("pc,kpc->kp", weight, values[:, index]))
 
@@ -80,6 +94,22 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
     Groups end at equal steps of a normal variable, so that every group
     in a nearly normal sample is narrow compared with the kernel. A
     value at an end is divided between both groups.
+
+    Examples
+    --------
+    Three values give three groups. The middle group is the smallest, and has only a part of the
+    middle value.
+
+    >>> means, share = grouped(np.array([-1, 1, 5.0]))
+    >>> half = ndtr(ndtri(5 / 6) / 3.0) - 0.5
+    >>> bool(np.allclose(share, [0.5 - half, 2.0 * half, 0.5 - half]))
+    True
+    >>> f"{abs(share @ means):.6f} {share @ means**2:.6f}"
+    '0.000000 1.000000'
+    >>> f"{(means[2] - means[1]) / (means[1] - means[0]):.6f}"
+    '2.000000'
+    >>> grouped(np.arange(1000.0))[0].size
+    256
     """
     size = ordered.size
     reach = float(ndtri(1.0 - 0.5 / size))
@@ -95,14 +125,52 @@ def grouped(ordered: Array) -> tuple[Array, Array]:
 
 
 def to_v(onsets: Array, bound: Array) -> Array:
-    """Return v for onsets (nodes, samples) above the bounds (nodes,) (step 1)."""
+    """Return v for onsets (nodes, samples) above the bounds (nodes,) (step 1).
+
+    Examples
+    --------
+    The second onset of the first node lies on its bound, and 1 is the mean distance.
+
+    >>> v = to_v(np.array([[3, 1], [6, 4.0]]), np.array([1, 2]))
+    >>> bool(np.allclose(v, np.log([[2, 1e-9], [4, 2]])))
+    True
+    """
     above = onsets - bound[:, None]
     # Round-off may put an onset on its bound.
     return np.log(np.maximum(above, 1e-9 * above.mean(axis=1, keepdims=True)))
 
 
 def densities_of(onsets: Array, bound: Array) -> Densities:
-    """Return densities of onsets (nodes, samples) that cannot lie below `bound` (nodes,)."""
+    """Return densities of onsets (nodes, samples) that cannot lie below `bound` (nodes,).
+
+    Examples
+    --------
+    >>> known = densities_of(np.array([[2, 3, 7], [4, 7, 12.0]]), np.array([1, 3]))
+    >>> bool(np.allclose(known.mean, np.log([12, 36]) / 3.0))
+    True
+    >>> bool(np.allclose(known.spread, [np.log([1, 2, 6]).std(), np.log([1, 4, 9]).std()]))
+    True
+
+    Each row is the logarithm of a density with mean 0 and variance 1. Far out it is one kernel,
+    whose width determines the curvature.
+
+    >>> z, p = np.linspace(-10, 10, known.table.shape[1]), np.exp(known.table)
+    >>> moments = np.stack([p.sum(axis=1), p @ z, p @ z**2]) * STEP
+    >>> (moments.round(6) + 0.0).tolist()
+    [[1.0, 1.0], [0.0, 0.0], [1.0, 1.0]]
+    >>> ends = np.diff(known.table, 2)[:, [0, -1]] * (1.06 * 3**-0.2 / STEP) ** 2
+    >>> ends.round(2).tolist()
+    [[-1.0, -1.0], [-1.0, -1.0]]
+
+    Without a bound, v is nearly linear in the onset.
+
+    >>> free = densities_of(np.array([[2, 3, 7], [4, 7, 12.0]]), np.array([-np.inf, 3]))
+    >>> scatter = np.array([4, 7, 12.0]).std()
+    >>> bool(np.allclose(free.bound, [4 - 1e5 * scatter, 23 / 3 - 1e5 * scatter]))
+    True
+    >>> free.standardised()[1].round(3).tolist()
+    [-1.111, -0.202, 1.313]
+    """
     if not np.isfinite(bound).all():
         bound = onsets.mean(axis=1) - BOUND_DEVIATIONS * onsets.std(axis=1).max()
     # 1. and 2.
@@ -125,7 +193,21 @@ def densities_of(onsets: Array, bound: Array) -> Densities:
 
 @jit
 def _interpolated(table: Array, index: NDArray[np.int64], weight: Array, z: float) -> float:
-    """Return the logarithm of the standardised density at z (step 5)."""
+    """Return the logarithm of the standardised density at z (step 5).
+
+    The rows of the table are k and 1000 + k^2. At z = -9.89, k is 2.2.
+
+    >>> k = np.arange(401.0)
+    >>> table, near = np.stack([0 * k, k, 1000 + k**2]), np.array([1, 2])
+    >>> weight = np.array([0.75, 0.25])
+    >>> f"{_interpolated(table, near, weight, -9.89):.6f}"  # 0.75 * 2.2 + 0.25 * 1005
+    '252.900000'
+
+    Beyond the table, 2 above its last value and 1 below its first value:
+
+    >>> [_interpolated(table, near[:1], np.ones(1), z) for z in (12.0, -11.0)]
+    [100.0, -100.0]
+    """
     inside = min(max(z, -TABLE_REACH), TABLE_REACH)
     at = (inside + TABLE_REACH) / STEP
     k = min(int(at), table.shape[1] - 2)
@@ -150,6 +232,21 @@ def _with_error(
     """Return the log density of onset plus error at y (step 6).
 
     `of_v` holds bound, mean and spread.
+
+    A normal v with mean 0.3 and standard deviation 0.4, and its integral as a sum over many z:
+
+    >>> rows = -0.5 * np.linspace(-10, 10, 401)[None] ** 2 - 0.5 * math.log(2.0 * math.pi)
+    >>> z = np.linspace(-9.9, 9.9, 100_001)
+    >>> def by_sum(y, error):
+    ...     away = (y - 1.0 - np.exp(0.3 + 0.4 * z)) / error
+    ...     total = np.exp(-0.5 * (z**2 + away**2)).sum() * 198e-6
+    ...     return math.log(total / (2.0 * math.pi * error))
+    >>> near = np.zeros(1, dtype=np.int64), np.ones(1)
+    >>> peaks = np.array([[2.1, 0.2], [9.0, 3.0], [1.0369, 5e-4], [1.1, 0.2], [0.9, 0.1]])
+    >>> found = [_with_error(*peak, (1.0, 0.3, 0.4), rows, *near) for peak in peaks]
+    >>> differences = np.abs([a - by_sum(*peak) for a, peak in zip(found, peaks, strict=True)])
+    >>> bool(np.all(differences < [5e-4, 5e-4, 5e-4, 5e-3, 0.02]))
+    True
     """
     bound, mean, spread = of_v
     low, high = y - ERRORS * error - bound, max(y, bound) + ERRORS * error - bound
@@ -190,6 +287,30 @@ def log_likelihoods(
 
     `of_v` comes from `Densities.between`. `scales` holds shift and
     stretch, with shape (2, points).
+
+    Examples
+    --------
+    A normal v gives a log-normal density of the onsets above the bound, here 1 and 0.5. Onsets
+    are shifted by 2 and stretched by 3. The last peak lies below both bounds.
+
+    >>> table = -0.5 * np.linspace(-10, 10, 401)[None] ** 2 - 0.5 * math.log(2.0 * math.pi)
+    >>> index, weight, out = np.zeros((2, 1), dtype=np.int64), np.ones((2, 1)), np.zeros((2, 2))
+    >>> of_v = np.array([[1, 0.5], [0.3, 0.8], [0.4, 0.2]])  # bound, mean and spread
+    >>> scales, peaks = np.array([[2, 2], [3, 3.0]]), np.array([9.5, 3.5])
+    >>> log_likelihoods(table, index, weight, of_v, scales, 0.0, peaks, out)
+    >>> from scipy.stats import lognorm
+    >>> expected = [lognorm(0.4, 5, 3 * np.exp(0.3)), lognorm(0.2, 3.5, 3 * np.exp(0.8))]
+    >>> bool(np.abs(out[:, 0] - [law.logpdf(9.5) for law in expected]).max() < 1e-3)
+    True
+    >>> out[:, 1].tolist()
+    [-inf, -inf]
+
+    With an error, which is stretched as well:
+
+    >>> log_likelihoods(table, index, weight, of_v, scales, 0.6, peaks, out)
+    >>> around = (0.5, 0.8, 0.2), table, index[1], weight[1]
+    >>> bool(np.isclose(out[1, 1], _with_error(0.5, 0.2, *around) - math.log(3.0)))
+    True
     """
     for i in range(index.shape[0]):
         bound, mean, spread = of_v[0, i], of_v[1, i], of_v[2, i]
