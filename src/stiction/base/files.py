@@ -57,6 +57,14 @@ def read_regular(
        may have been replaced.
     3. Read as many bytes as the file had then. Files that the system
        generates, such as in /proc, have size 0.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "data")
+    ...     _ = path.write_bytes(b"12345")
+    ...     print(read_regular(path, max_bytes=5), content_of(path, max_bytes=5))
+    b'12345' b'12345'
     """
     extra = getattr(os, "O_NONBLOCK", 0)
     if not follow_links:
@@ -71,6 +79,19 @@ def read_regular(
 
 
 def _check_regular(state: os.stat_result, max_bytes: int) -> None:
+    """Refuse folders, devices and large files.
+
+    >>> from types import SimpleNamespace
+    >>> _check_regular(SimpleNamespace(st_mode=stat.S_IFREG, st_size=7), 7)
+    >>> _check_regular(SimpleNamespace(st_mode=stat.S_IFREG, st_size=8), 7)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: has 8 bytes, more than the limit of 7
+    >>> _check_regular(os.stat(os.curdir), 2**40)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is not a regular file
+    """
     if not stat.S_ISREG(state.st_mode):
         raise InputError("is not a regular file")
     if state.st_size > max_bytes:
@@ -78,7 +99,25 @@ def _check_regular(state: os.stat_result, max_bytes: int) -> None:
 
 
 def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
-    """Return the content of a regular file, or raise an `InputError`."""
+    """Return the content of a regular file, or raise an `InputError`.
+
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "data").write_bytes(b"12345")
+    ...     content_of(Path(folder, "data"), max_bytes=4)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: has 5 bytes, more than the limit of 4
+    >>> content_of(Path("no such file"))
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: does not exist
+    >>> from unittest.mock import patch
+    >>> with patch("os.stat", side_effect=PermissionError(13, "not allowed")):
+    ...     content_of(Path("closed"))
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: cannot be read: not allowed
+    """
     try:
         return read_regular(path, max_bytes=max_bytes)
     except FileNotFoundError:
@@ -88,7 +127,14 @@ def content_of(path: Path, *, max_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def _near_file(path: Path) -> str:
-    """Return a question that suggests a file whose name differs only in case, or ''."""
+    """Return a question that suggests a file whose name differs only in case, or ''.
+
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     Path(folder, "Peaks.CSV").touch()
+    ...     near, far = (_near_file(Path(folder, name)) for name in ("peaks.csv", "peak.csv"))
+    >>> near[:15], near[-11:], far
+    ('; did you mean ', "Peaks.CSV'?", '')
+    """
     with suppress(OSError):
         for name in os.listdir(path.parent):
             if name.casefold() == path.name.casefold():
@@ -97,7 +143,15 @@ def _near_file(path: Path) -> str:
 
 
 def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
-    """Refuse content that unpacks to more than `least` bytes and `times` the size of its file."""
+    """Refuse content that unpacks to more than `least` bytes and `times` the size of its file.
+
+    >>> check_unpacked(10, b"abc", 10, 2)  # at most ten bytes are always allowed
+    >>> check_unpacked(12, b"abc", 10, 4)
+    >>> check_unpacked(13, b"abc", 10, 4)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: would unpack to 13, more than the limit of 12 for its size
+    """
     limit = max(least, times * len(content))
     if size > limit:
         raise InputError(f"would unpack to {size}, more than the limit of {limit} for its size")
@@ -105,7 +159,24 @@ def check_unpacked(size: int, content: bytes, least: int, times: int) -> None:
 
 @contextmanager
 def refuse_damage(kind: str) -> Iterator[None]:
-    """Turn every error that a library raises for a broken file into an `InputError`."""
+    r"""Turn every error that a library raises for a broken file into an `InputError`.
+
+    >>> with refuse_damage("a table"):
+    ...     raise ValueError("line 3\nis too long")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is not a table: line 3
+    >>> with refuse_damage("a table"):
+    ...     raise EOFError
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is not a table: EOFError
+    >>> with refuse_damage("a table"):
+    ...     raise InputError("has no columns")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: has no columns
+    """
     try:
         yield
     except InputError:
@@ -124,6 +195,22 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
     permissions of the old file. The content is bytes, or a
     function that writes to a given path. If writing fails
     (a `StoreError`), the unfinished file is removed.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "data")
+    ...     write_whole(path, b"old")
+    ...     path.chmod(0o640)
+    ...     before = path.stat().st_mode
+    ...     write_whole(path, lambda aside: aside.write_bytes(b"new"))
+    ...     try:
+    ...         write_whole(path, lambda aside: aside.write_bytes(b"x") + open(folder, "wb"))
+    ...     except StoreError as error:
+    ...         print(str(error).startswith(f"{path}: cannot be written"))
+    ...     print(path.read_bytes(), path.stat().st_mode == before, os.listdir(folder))
+    True
+    b'new' True ['data']
     """
     aside = path.with_name(f"{path.name}.{uuid.uuid4().hex[:12]}{PART}")
     try:
@@ -152,7 +239,13 @@ def write_whole(path: Path, content: bytes | Callable[[Path], object]) -> None:
 
 
 def cannot(what: str, path: Path, error: BaseException) -> StoreError:
-    """Return the error for a file that cannot be read or written."""
+    """Return the error for a file that cannot be read or written.
+
+    >>> print(cannot("read", Path("data"), OSError(5, "input/output error")))
+    data: cannot be read: input/output error
+    >>> print(cannot("written", Path("data"), RuntimeError("NetCDF: bad name")))
+    data: cannot be written: NetCDF: bad name
+    """
     return StoreError(f"{path}: cannot be {what}: {getattr(error, 'strerror', None) or error}")
 
 
@@ -160,6 +253,14 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
     """Write an .npz archive, completely or not at all.
 
     Errors are the same as in `write_whole`.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder, "chunks", "first.npz")
+    ...     write_arrays(path, {"load": np.array([3, 7]), "slip": np.array(0.25)})
+    ...     {name: array.tolist() for name, array in read_arrays(path).items()}
+    {'load': [3, 7], 'slip': 0.25}
     """
     archive = io.BytesIO()
     np.savez(archive, **arrays)
@@ -173,6 +274,30 @@ def arrays_in(content: bytes) -> dict[str, NDArray[Any]]:
 
     Raise an error of `UNREADABLE` for compressed members, and for
     members that together are larger than the archive.
+
+    Examples
+    --------
+    >>> archive = io.BytesIO()
+    >>> with zipfile.ZipFile(archive, "w") as file:
+    ...     file.writestr("load.npy", bytes(9))
+    ...     file.writestr("slip.npy", bytes(9), compress_type=zipfile.ZIP_DEFLATED)
+    >>> arrays_in(archive.getvalue())
+    Traceback (most recent call last):
+        ...
+    ValueError: members are compressed or larger than the file
+    >>> with zipfile.ZipFile(archive, "w") as file:
+    ...     file.writestr("load.npy", bytes(999))
+    ...     file.filelist.append(file.filelist[0])  # two members with the same content
+    >>> arrays_in(archive.getvalue())
+    Traceback (most recent call last):
+        ...
+    ValueError: members are compressed or larger than the file
+    >>> archive = io.BytesIO()
+    >>> np.savez(archive, law=np.array([None]))  # numpy would unpickle an object
+    >>> arrays_in(archive.getvalue())
+    Traceback (most recent call last):
+        ...
+    ValueError: Object arrays cannot be loaded when allow_pickle=False
     """
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
@@ -194,14 +319,32 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def cache_folder() -> Path:
-    """Return `STICTION_CACHE_DIR` if set, or else the platform's cache folder for the user."""
+    """Return `STICTION_CACHE_DIR` if set, or else the platform's cache folder for the user.
+
+    >>> from unittest.mock import patch
+    >>> with patch.dict(os.environ, STICTION_CACHE_DIR="kept"):
+    ...     print(cache_folder())
+    kept
+    >>> with patch.dict(os.environ, STICTION_CACHE_DIR=""):
+    ...     cache_folder() == Path(platformdirs.user_cache_dir("stiction"))
+    True
+    """
     given = os.environ.get("STICTION_CACHE_DIR")
     return Path(given) if given else Path(platformdirs.user_cache_dir("stiction"))
 
 
 @cache
 def _warn_once(text: str) -> None:
-    """Warn once in a process, even where warnings are collected."""
+    """Warn once in a process, even where warnings are collected.
+
+    >>> with warnings.catch_warnings(record=True) as shown:
+    ...     warnings.simplefilter("always")
+    ...     _warn_once.__wrapped__("full")
+    ...     _warn_once("slow"), _warn_once("slow")
+    (None, None)
+    >>> [str(warning.message) for warning in shown][:2]
+    ['cache: full', 'cache: slow']
+    """
     warnings.warn(f"cache: {text}", UserWarning, stacklevel=2)
 
 
@@ -219,6 +362,22 @@ def private_folder(folder: Path) -> Path:
     2. Make all missing folders with mode 0700, for any umask.
     3. Check the content of the folder, the folder, and all folders
        above it.
+
+    >>> with tempfile.TemporaryDirectory() as top:
+    ...     folder = private_folder(Path(top, "cache", "own", "line"))
+    ...     modes = [oct(path.stat().st_mode & 0o777) for path in (folder, folder.parent)]
+    ...     folder == Path(top, "cache", "own", "line").resolve()
+    True
+    >>> modes if os.name == "posix" else ["0o700"] * 2
+    ['0o700', '0o700']
+    >>> with warnings.catch_warnings(), tempfile.TemporaryDirectory() as top:
+    ...     warnings.simplefilter("ignore")
+    ...     folder = private_folder(Path("cache", "own"))
+    ...     os.chmod(top, 0o777)
+    ...     if os.name == "posix":
+    ...         assert private_folder(Path(top, "own")) == folder
+    >>> folder.is_absolute(), folder.parent == _temporary_folder(), folder.name
+    (True, True, 'own')
     """
     if not folder.is_absolute():
         return _stand_in(f"{folder} is not an absolute path", folder.name)
@@ -237,7 +396,27 @@ def private_folder(folder: Path) -> Path:
 
 
 def _weakness(folder: Path) -> str:
-    """Return why somebody besides this user and root could write to a folder, or ''."""
+    """Return why somebody besides this user and root could write to a folder, or ''.
+
+    A folder is open to others if it or a folder above it is, unless only owners can rename
+    there (the sticky bit). Its content is protected by a folder that others cannot enter.
+
+    >>> def weakness(above, mode, inside, make=Path.touch):
+    ...     with tempfile.TemporaryDirectory() as top:
+    ...         folder = Path(top, "own")
+    ...         folder.mkdir()
+    ...         make(Path(folder, "kernel"))
+    ...         for path, allowed in ((folder / "kernel", inside), (folder, mode), (top, above)):
+    ...             os.chmod(path, allowed)
+    ...         return _weakness(folder).rpartition(os.sep)[2]
+    >>> if os.name == "posix":
+    ...     assert weakness(0o1777, 0o755, 0o644) == weakness(0o755, 0o700, 0o666) == ""
+    ...     assert weakness(0o755, 0o710, 0o720, Path.mkdir) == "kernel can be written by others"
+    ...     assert weakness(0o755, 0o701, 0o602) == "kernel can be written by others"
+    ...     assert weakness(0o755, 0o702, 0o600) == "own can be written by others"
+    ...     assert weakness(0o755, 0o1777, 0o600) == "own can be written by others"
+    ...     assert weakness(0o770, 0o700, 0o600).endswith("can be written by others")
+    """
     inside = {
         Path(top) / name for top, *names in os.walk(folder) for name in (*names[0], *names[1])
     }
@@ -266,6 +445,13 @@ def _stand_in(weakness: str, name: str) -> Path:
 
 @cache
 def _temporary_folder() -> Path:
+    """Return a folder that is removed at the end of the process.
+
+    >>> _temporary_folder().is_dir(), _temporary_folder() is _temporary_folder()
+    (True, True)
+    >>> _temporary_folder().name[:9]
+    'stiction-'
+    """
     folder = tempfile.mkdtemp(prefix="stiction-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)
@@ -282,6 +468,12 @@ def _kernel_sources() -> dict[str, bytes]:
 
     A file that raises `InputError` is left out unless it defines a
     kernel, so that an edited message recompiles nothing.
+
+    >>> names = "base.jit", "random.mapping", "base.arrays", "problem.friction.kernels"
+    >>> [f"stiction.{name}" in _kernel_sources() for name in (*names, "base.errors")]
+    [True, True, True, True, False]
+    >>> _kernel_sources()["stiction.base.arrays"][3:20]
+    b'Arrays: their typ'
     """
     package = Path(__file__).parents[1]
     sources = {}
@@ -305,6 +497,24 @@ def kernel_folder(module: str, compiler: str) -> Path:
     laws are resolved by type inside kernels and belong to every state.
     Kernels are code, so only the package or the environment choose
     their folder.
+
+    Examples
+    --------
+    The name of the folder changes with the files that the module imports, and with friction laws.
+
+    >>> from unittest.mock import patch
+    >>> texts = {"stiction.a": b"import stiction.b", "stiction.b": b"from stiction.c import d"}
+    >>> texts |= dict.fromkeys(("stiction.c.d", "stiction.e", "stiction.problem.friction.l"), b"")
+    >>> def state(changed="", compiler="any"):
+    ...     edited = texts | ({changed: texts[changed] + b"#"} if changed else {})
+    ...     with tempfile.TemporaryDirectory() as top, patch.dict(os.environ, NUMBA_CACHE_DIR=top):
+    ...         with patch("stiction.base.files._kernel_sources", lambda: edited):
+    ...             folder = kernel_folder.__wrapped__("stiction.a", compiler)
+    ...             return str(folder.parent.relative_to(Path(top).resolve()))
+    >>> [state(name) == state() for name in texts], state(compiler="other") == state()
+    ([False, False, False, True, False], False)
+    >>> len(state())
+    16
     """
     texts = _kernel_sources()
     waiting = [
