@@ -23,6 +23,22 @@ def one_blas_thread() -> Iterator[None]:
     The number of threads belongs to the process.
     If two limits overlapped, the later exit would
     otherwise restore the limit of the other user.
+
+    Examples
+    --------
+    >>> from unittest.mock import patch
+    >>> with patch("threadpoolctl.threadpool_limits") as limits:
+    ...     restore = limits.return_value.restore_original_limits
+    ...     for _ in range(2):
+    ...         with one_blas_thread():
+    ...             with one_blas_thread():
+    ...                 pass
+    ...             print(restore.call_count, limits.call_count)
+    ...         print(restore.call_count, limits.call_args)
+    0 1
+    1 call(limits=1, user_api='blas')
+    1 2
+    2 call(limits=1, user_api='blas')
     """
     global _users, _limit
     from threadpoolctl import threadpool_limits

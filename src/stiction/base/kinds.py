@@ -26,6 +26,31 @@ def register(kind: T) -> T:
     when the module of the class is imported. No import is needed
     if the package has an entry point of the same name in the group
     ``stiction.methods``, ``.laws``, ``.marginals`` or ``.spectra``.
+
+    >>> from typing import Literal
+    >>> @register
+    ... @dataclasses.dataclass
+    ... class Uneven:
+    ...     length: float = 2.5
+    ...     type: Literal["uneven"] = "uneven"
+    ...     family = "examples"
+    >>> list(Kinds("examples")), Kinds("examples")["uneven"] is register(Uneven)
+    (['uneven'], True)
+    >>> class Other(Uneven):
+    ...     pass
+    >>> register(Other)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Other: type 'uneven' is taken by <class ...Uneven'>. Rename it
+    >>> Other.__abstractmethods__ = {"value", "slope"}
+    >>> register(Other)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: Other: must define slope, value
+    >>> register(int)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: <class 'int'>: needs a field such as type: Literal[...
     """
     name = getattr(getattr(kind, "__dataclass_fields__", {}).get("type"), "default", None)
     if not isinstance(name, str):
@@ -46,6 +71,23 @@ class Kinds(Mapping[str, Any]):
     `places` ("module:name") lead to classes in the package. A class in
     the package, or of an entry point, is imported when a file names its
     type.
+
+    Examples
+    --------
+    A class that is offered as an entry point is loaded when a file names it:
+
+    >>> from types import SimpleNamespace
+    >>> class Offered:
+    ...     __dataclass_fields__ = {"type": SimpleNamespace(default="offered")}
+    ...     family = "further examples"
+    >>> _ = _registered.pop("further examples", None)
+    >>> kinds = Kinds("further examples", {"error": "base.errors:InputError"})
+    >>> point = SimpleNamespace(load=lambda: Offered, dist=SimpleNamespace(name="mypackage"))
+    >>> kinds._offered = {"offered": [point], "twice": [point, point], "misnamed": [point]}
+    >>> list(kinds), len(kinds), kinds["error"].__name__, kinds["offered"] is Offered
+    (['error', 'offered', 'twice', 'misnamed'], 4, 'InputError', True)
+    >>> list(kinds), [name in kinds for name in ("error", "offered", "twice", "other")]
+    (['error', 'offered', 'twice', 'misnamed'], [True, True, True, False])
     """
 
     def __init__(self, family: str, places: Mapping[str, str] | None = None) -> None:
@@ -77,6 +119,24 @@ class Kinds(Mapping[str, Any]):
         return name in self._places or name in self._registered or name in self._offered
 
     def _load(self, name: str, points: Sequence[EntryPoint]) -> None:
+        """Load a class from its entry point, or raise an `InputError` that names the package.
+
+        >>> from types import SimpleNamespace
+        >>> kinds = Kinds("laws/examples")
+        >>> first, second = (SimpleNamespace(dist=SimpleNamespace(name=name)) for name in "ab")
+        >>> kinds._load("power", [first, second])  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction...InputError: 'power' of the package a, b (...laws/examples)...Uninstall...
+        >>> class Law:
+        ...     __dataclass_fields__ = {"type": SimpleNamespace(default="root")}
+        ...     family = "laws/examples"
+        >>> point = SimpleNamespace(load=lambda: Law, dist=None)
+        >>> kinds._load("power", [point])  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+            ...
+        stiction.base.errors.InputError: 'power' of the package None ... another type
+        """
         try:
             if len(points) > 1:
                 raise ImportError("two packages offer this type. Uninstall one package")
@@ -100,6 +160,36 @@ class OneOf:
     table without a `type`. `convert` maps a value to such an object. If
     it returns NotImplemented, a table goes to its class and any other
     value to the annotated type.
+
+    Examples
+    --------
+    >>> from typing import Annotated, Literal
+    >>> @register
+    ... @dataclasses.dataclass
+    ... class Band:
+    ...     length: float = 2.5
+    ...     type: Literal["band"] = "band"
+    ...     family = "spectra of examples"
+    >>> def convert(value):
+    ...     if isinstance(value, str):
+    ...         return Band(float(value[:-2]))
+    ...     return [value] if isinstance(value, Band) else NotImplemented
+    >>> _ = _registered["spectra of examples"].pop("wide", None)
+    >>> one = OneOf(Kinds("spectra of examples"), lambda value: convert(value), "band")
+    >>> field = pydantic.TypeAdapter(Annotated[int, one])
+    >>> field.validate_python("7 m"), field.validate_python({"length": "7"})
+    (Band(length=7.0, type='band'), [Band(length=7.0, type='band')])
+    >>> field.validate_python(7.0), field.dump_python(Band(7.0)), field.dump_python(8)
+    (7, {'length': 7.0, 'type': 'band'}, 8)
+    >>> @dataclasses.dataclass
+    ... class Wide(Band):
+    ...     type: Literal["wide"] = "wide"
+    >>> field.dump_python(Wide())  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    pydantic_core...: Wide is a class of your own that study files cannot name. Decorate it with...
+    >>> field.validate_python({"type": register(Wide).type, "length": 3.5})
+    [Wide(length=3.5, type='wide')]
     """
 
     kinds: Kinds
@@ -133,7 +223,27 @@ class OneOf:
 
 
 def from_table(kinds: Kinds, given: Mapping[str, Any], context: Any = None) -> Any:
-    """Make an object of the class that `type` names in a table, or raise an `InputError`."""
+    """Make an object of the class that `type` names in a table, or raise an `InputError`.
+
+    >>> from typing import Literal
+    >>> @register
+    ... @dataclasses.dataclass
+    ... class Gap:
+    ...     width: float
+    ...     type: Literal["gap"] = "gap"
+    ...     family = "examples of tables"
+    >>> from_table(Kinds("examples of tables"), {"type": "gap", "width": 3})
+    Gap(width=3.0, type='gap')
+    >>> from_table(Kinds("examples of tables"), {"width": 3})
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: needs a type (valid: gap)
+    >>> try:
+    ...     from_table(Kinds("examples of tables"), {"type": "gapp"})
+    ... except pydantic.ValidationError as error:
+    ...     print(error.errors()[0]["loc"], error.errors()[0]["ctx"]["error"])
+    ('type',) unknown 'gapp'; did you mean 'gap'? (valid: gap)
+    """
     rest = dict(given)
     name = rest.pop("type", None)
     if name is None:

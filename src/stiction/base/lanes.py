@@ -6,6 +6,28 @@ inlined code, and a kernel that was just compiled then differs in its
 last bits from the same kernel loaded from disk. Here the lanes are
 written out: lane l sums the terms l, l + 4, l + 8, ..., for any width
 of the machine's registers.
+
+Examples
+--------
+The terms are 3 k + 1 for k = 0 to 7, and lane l sums the terms l and l + 4.
+
+>>> import numba
+>>> import numpy as np
+>>> @numba.njit
+... def sums(a, b):
+...     once = multiply_add(load(a, 0), load(b, 0), zeros())
+...     both = multiply_add(load(a, 4), load(b, 4), once)
+...     number = multiply_add(a[1], b[2] + 2.0, a[2])
+...     return totals(once, both, add(both, once), load(a, 1)), total(both), number
+>>> k, ones = np.arange(8.0), np.ones(8)
+>>> sums(3.0 * k + 1.0, ones)
+((22.0, 92.0, 114.0, 34.0), 92.0, 19.0)
+
+The sums are rounded in this order: (0 + 1) + (2 + 3), and (0 + 2) + (1 + 3).
+
+>>> rounded = sums(np.array([2.0**54, 1.0, -(2.0**54), 1.0, 0.0, 0.0, 0.0, 0.0]), ones)
+>>> rounded[0][0], rounded[1]
+(0.0, 2.0)
 """
 
 from typing import Any

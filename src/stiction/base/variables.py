@@ -24,7 +24,13 @@ class Variable:
 
     @property
     def wide(self) -> bool:
-        """Whether a sample has a value for each node, rather than a number or a vector."""
+        """Whether a sample has a value for each node, rather than a number or a vector.
+
+        >>> [Variable("m", "", dims).wide for dims in (("sample",), ("sample", "direction"))]
+        [False, False]
+        >>> Variable("m", "", ("sample", "x", "direction")).wide, Variable("m", "", ("x",)).wide
+        (True, False)
+        """
         return not set(self.dims[1:]) <= {DIRECTION}
 
 
@@ -75,7 +81,15 @@ OF_THE_FIELD = ("mean", "standard_deviation", "low", "high", "loc", "scale", "no
 
 
 def unit_of_key(key: str, of_field: str) -> str:
-    """Return the unit of a parameter with a dotted key, for a field in the unit `of_field`."""
+    """Return the unit of a parameter with a dotted key, for a field in the unit `of_field`.
+
+    >>> [unit_of_key(f"strength.marginal.{name}", "Pa") for name in ("mean", "shape", "low")]
+    ['Pa', '1', 'Pa']
+    >>> unit_of_key("strength.spectrum.correlation_length", "Pa"), unit_of_key("noise", "N")
+    ('m', 'N')
+    >>> unit_of_key("correlation.scale", "Pa"), unit_of_key("between.noise", "Pa")
+    ('1', '1')
+    """
     *before, last = key.split(".")
     if {"between", "correlation"} & {*before}:
         return "1"
@@ -112,7 +126,12 @@ part that can break."""
 
 
 def force_variables(variables: Mapping[str, Variable]) -> dict[str, Variable]:
-    """Return the variables for the forces, N, that accompany the stresses among some variables."""
+    """Return the variables for the forces, N, that accompany the stresses among some variables.
+
+    >>> known = {"slip": Variable("m", "slip"), "mean_stress": Variable("Pa", "mean", ("load",))}
+    >>> force_variables(known)
+    {'force': Variable(units='N', long_name='shear force', dims=('load',))}
+    """
     dims = {name: known.dims for name, known in variables.items() if name in FORCES}
     return {FORCES[name][0]: Variable("N", FORCES[name][1], dims[name]) for name in dims}
 
@@ -124,6 +143,14 @@ def forces(
 
     `area` is the area that can break, and `whole_area` the area of the
     whole interface, m².
+
+    The force of the machine refers to the whole interface.
+
+    >>> values = {"mean_stress": 3.0, "slip": 1.0, "machine_stress": 5.0}
+    >>> forces(values, 2.0, 7.0)
+    {'force': 6.0, 'machine_force': 35.0}
+    >>> forces(values, None, 7.0), forces(values, 2.0, None)
+    ({}, {})
     """
     if area is None or whole_area is None:
         return {}
