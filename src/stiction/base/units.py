@@ -90,7 +90,13 @@ _POWER = re.compile(r"([^\W\d_]+|%|1(?!\d))(?:\^?([+-]?\d))?$")
 
 
 def _symbol(text: str) -> str:
-    """Return the symbol for a unit in words. Return any other text unchanged."""
+    """Return the symbol for a unit in words. Return any other text unchanged.
+
+    >>> [_symbol(text) for text in ("millimeters", "MegaPascal", "inches", "micrometre")]
+    ['mm', 'MPa', 'in', 'um']
+    >>> [_symbol(text) for text in ("mm", "metress", "mikrometer", "microns", "percent")]
+    ['mm', 'metress', 'um', 'um', '%']
+    """
     match = _WORD.match(text)
     return _PREFIX_NAMES[match[1].lower()] + _NAMES[match[2].lower()] if match else text
 
@@ -100,6 +106,27 @@ def parse(text: str) -> Unit | None:
 
     Blanks or dots separate powers of known units. The first unit after
     a slash is a divisor.
+
+    Examples
+    --------
+    >>> tuple(parse("MPa")), parse("inch").factor, parse("furlong"), parse("m/")
+    ((1000000.0, (1, -1, -2)), 0.0254, None, None)
+    >>> [parse(text).powers for text in ("N/mm^2", "Pa m-1", "J/m2 s", "kg·m⁻³", "1/s", "m**-2")]
+    [(1, -1, -2), (1, -2, -2), (1, 0, -1), (1, -3, 0), (0, 0, -1), (0, -2, 0)]
+    >>> round(parse("N/mm^2").factor, 3), round(parse("kN mm-1").factor, 3), parse(" % ").factor
+    (1000000.0, 1000000.0, 0.01)
+    >>> tuple(parse("-"))
+    (1.0, (0, 0, 0))
+    >>> [parse(text) for text in ("10", "m^x", "", "MPa psi-", "N*q")]
+    [None, None, None, None, None]
+    >>> lbf, inch = 0.45359237 * 9.80665, 0.0254  # by definition, N and m
+    >>> pressures = parse("psi").factor * inch**2 / lbf, parse("ksi").factor * inch**2 / lbf
+    >>> [round(ratio, 9) for ratio in (parse("lbf").factor / lbf, *pressures)]
+    [1.0, 1.0, 1000.0]
+    >>> print(*[f"{parse(name).factor:.6g}" for name in "mil ft in gf kgf kp daN kip bar".split()])
+    2.54e-05 0.3048 0.0254 0.00980665 9.80665 9.80665 10 4448.22 100000
+    >>> print(*[f"{parse(name).factor:g}" for name in "h hr min sec secs msec TPa cm ug".split()])
+    3600 3600 60 1 1 0.001 1e+12 0.01 1e-09
     """
     text = text.strip()
     if text in _KNOWN:
@@ -121,13 +148,23 @@ def parse(text: str) -> Unit | None:
 
 
 def is_in(text: str | None, si: str) -> bool:
-    """Return whether a text names a unit of the same dimension as an SI unit."""
+    """Return whether a text names a unit of the same dimension as an SI unit.
+
+    >>> [is_in(text, "Pa") for text in ("N/mm2", "psi", "N", "", None, "x")]
+    [True, True, False, False, False, False]
+    >>> is_in("m", "x")
+    False
+    """
     given, wanted = parse(text or ""), parse(si)
     return given is not None and wanted is not None and given.powers == wanted.powers
 
 
 def states_unit(text: str) -> bool:
-    """Return whether a text is a number, with a known unit or without, such as '4 cm'."""
+    """Return whether a text is a number, with a known unit or without, such as '4 cm'.
+
+    >>> [states_unit(text) for text in ("4 cm", " 4e3 ", "4 N mm-2", "4 apples", "cm", "inf m", "")]
+    [True, True, True, False, False, False, False]
+    """
     number, _, unit = text.strip().partition(" ")
     with suppress(ValueError):
         return math.isfinite(float(number)) and (not unit or parse(unit) is not None)
@@ -135,7 +172,21 @@ def states_unit(text: str) -> bool:
 
 
 def conversion(text: str, units: Sequence[str]) -> tuple[float, str]:
-    """Return the factor from a unit to the first SI unit of its dimension, and this SI unit."""
+    """Return the factor from a unit to the first SI unit of its dimension, and this SI unit.
+
+    >>> conversion("mm", ("Pa", "m")), conversion("%", ("Pa", "1", "m"))
+    ((0.001, 'm'), (0.01, '1'))
+    >>> conversion("kN mm-1", ("N m-1",))
+    (1000000.0, 'N m-1')
+    >>> conversion("mpa", ("Pa",))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: unknown unit 'mpa'; did you mean MPa? (known: m, cm, ...
+    >>> conversion("mm", ("Pa", "1"))
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is in mm, which cannot be converted to Pa or 1
+    """
     given = parse(text)
     if given is None:
         near = [name for name in _COMMON.split(", ") if name.lower() == text.strip().lower()]
@@ -152,7 +203,21 @@ def conversion(text: str, units: Sequence[str]) -> tuple[float, str]:
 
 
 def unit_for(units: str, values: Any) -> tuple[float, str]:
-    """Return the factor and name of the unit that suits the size of SI values."""
+    """Return the factor and name of the unit that suits the size of SI values.
+
+    The largest value decides, and pressures change their unit at a tenth.
+
+    >>> [unit_for("m", [size, 0.0])[1] for size in (1000.0, -999.0, 1e-3, 0.99e-3, 1e-12, 0.0)]
+    ['km', 'm', 'mm', 'µm', 'nm', 'm']
+    >>> print([f"{unit_for('m', size)[0]:g}" for size in (1e3, 1.0, 1e-3, 1e-6, 1e-9)])
+    ['0.001', '1', '1000', '1e+06', '1e+09']
+    >>> [unit_for("Pa", [value, float("nan")])[1] for value in (1.1e5, 0.9e5, 101.0, 99.0, 0.01)]
+    ['MPa', 'kPa', 'kPa', 'Pa', 'Pa']
+    >>> unit_for("N", [2.0, -3e6, 4e3]), unit_for("s", 2.5e-6)
+    ((1e-06, 'MN'), (1000000.0, 'µs'))
+    >>> unit_for("1", 3e9), unit_for("kg", 5.0)
+    ((1.0, ''), (1.0, 'kg'))
+    """
     if units not in _MULTIPLES:
         return 1.0, "" if units == "1" else units
     array = np.asarray(values, dtype=np.float64)
@@ -164,7 +229,13 @@ def unit_for(units: str, values: Any) -> tuple[float, str]:
 
 
 def in_words(units: str, value: float) -> str:
-    """Return an SI value in the unit that suits its size, such as '40 kN'."""
+    """Return an SI value in the unit that suits its size, such as '40 kN'.
+
+    >>> [in_words("N", force) for force in (40321.0, 999.6, 999.4, -0.0123)]
+    ['40.3 kN', '1 kN', '999 N', '-0.0123 N']
+    >>> in_words("1", 0.12345)
+    '0.123'
+    """
     value = float(f"{value:.3g}")  # 999.6 N are 1 kN
     factor, unit = unit_for(units, value)
     return f"{value * factor:.3g} {unit}".rstrip()
@@ -175,6 +246,18 @@ def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
 
     A value alone has six digits. A value with an interval has two
     digits more than the interval resolves.
+
+    >>> as_texts("Pa", [1234567.8]), as_texts("m", [0.0])
+    ((['1.23457'], 'MPa'), (['0'], 'm'))
+
+    The largest value is 138 times the spread. Three digits resolve it, and two are added.
+
+    >>> as_texts("N", [-1424.345, -1420.123, -1430.456])
+    (['-1.4243', '-1.4201', '-1.4305'], 'kN')
+    >>> as_texts("1", [-0.5, 0.5123456, math.inf]), as_texts("1", [math.nan])
+    ((['-0.5', '0.512', 'inf'], ''), (['nan'], ''))
+    >>> as_texts("1", [1.0, 1.0 + 1e-12])[0], as_texts("1", [2.0, 1.98123456])[0]
+    (['1', '1'], ['2', '1.9812'])
     """
     factor, unit = unit_for(units, values)
     finite = [value for value in values if math.isfinite(value)]
@@ -188,7 +271,15 @@ def as_texts(units: str, values: Sequence[float]) -> tuple[list[str], str]:
 
 
 def is_quantity(value: Any) -> bool:
-    """Return whether a value, or an array, has a unit of pint or astropy."""
+    """Return whether a value, or an array, has a unit of pint or astropy.
+
+    >>> from types import SimpleNamespace
+    >>> pint, astropy = {"magnitude": 3.0, "to": None}, {"to_value": None, "unit": "m"}
+    >>> [is_quantity(SimpleNamespace(**given)) for given in (pint, astropy)]
+    [True, True]
+    >>> [is_quantity(SimpleNamespace(**{name: None})) for name in (*pint, *astropy)]
+    [False, False, False, False]
+    """
     pint = hasattr(value, "magnitude") and hasattr(value, "to")
     return pint or (hasattr(value, "to_value") and hasattr(value, "unit"))
 
@@ -198,6 +289,34 @@ def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | No
 
     A list of quantities becomes an array. A value without a unit is
     returned as given.
+
+    A quantity of astropy converts by `to_value`, and a quantity of pint by `to`.
+
+    >>> class Length:
+    ...     unit = "mm"
+    ...     def __init__(self, number):
+    ...         self.number = number
+    ...     def to_value(self, text):
+    ...         return self.number * {"m": 1e-3, "Pa*m**-1": 5.0, "": 2.0}[text]
+    >>> magnitude_in_one_of(Length(7), ("Pa", "m")), magnitude_in_one_of(7, ("Pa",))
+    ((0.007, 'm'), (7, None))
+    >>> magnitude_in_one_of(Length(7), ("Pa m-1",))
+    (35.0, 'Pa m-1')
+    >>> from types import SimpleNamespace
+    >>> pint = SimpleNamespace(magnitude=7, to=lambda text: SimpleNamespace(magnitude=len(text)))
+    >>> magnitude_in_one_of(Length(7), ("1",)), magnitude_in_one_of(pint, ("Pa",))
+    ((14.0, '1'), (2, 'Pa'))
+    >>> numbers, unit = magnitude_in_one_of([Length(7), Length(9)], ("Pa", "m"))
+    >>> numbers.round(6).tolist(), unit
+    ([0.007, 0.009], 'm')
+    >>> magnitude_in_one_of([Length(7), 9], ("m",))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: holds quantities of several kinds, or numbers without a unit...
+    >>> magnitude_in_one_of(Length(7), ("Pa", "N"))
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is in mm, which cannot be converted to Pa or N
     """
     if isinstance(value, list | tuple) and any(map(is_quantity, value)):
         pairs = [magnitude_in_one_of(item, units) for item in value]
@@ -219,7 +338,11 @@ def magnitude_in_one_of(value: Any, units: Iterable[str]) -> tuple[Any, str | No
 
 
 def units_of_argument(name: str) -> tuple[str, ...]:
-    """Return the SI units that a quantity for this argument may have."""
+    """Return the SI units that a quantity for this argument may have.
+
+    >>> [units_of_argument(name) for name in ("strength", "mean", "poisson_ratio")]
+    [('Pa',), ('Pa', '1', 'm'), ('1',)]
+    """
     if name in UNITS:
         return (UNITS[name],)
     return ("Pa", "1", "m") if name in OF_THE_FIELD else ("1",)
@@ -229,6 +352,22 @@ def as_numbers(value: Any) -> Array:
     """Return `value` as a float64 array, or raise an `InputError` that names its type.
 
     None and masked entries are missing values, NaN.
+
+    >>> as_numbers([[1, 2, 3], (4, 5, 6)]).tolist(), as_numbers([1, None]).tolist()
+    ([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], [1.0, nan])
+    >>> as_numbers(np.ma.masked_equal([3, 7, 3], 3)).tolist(), as_numbers(7).shape
+    ([nan, 7.0, nan], ())
+    >>> for given in ([1, [2]], "a.csv", ["a", "b"], True, [1e3, 10**400], np.ma.masked_all(2)):
+    ...     try:
+    ...         as_numbers(given)
+    ...     except InputError as error:
+    ...         print(error)
+    must be numbers in rows of equal length, got [1, [2]]
+    must be numbers, got str. Read files by st.read_profile(path) or st.read_peaks(path)
+    must be numbers, got elements of type <U1
+    must be numbers, got bool
+    must be numbers below 1e308
+    has no values: its mask covers all entries
     """
     if isinstance(value, np.ma.MaskedArray):
         if value.size and np.ma.getmaskarray(value).all():
@@ -257,7 +396,13 @@ def as_numbers(value: Any) -> Array:
 
 
 def stated_unit(array: Any) -> str:
-    """Return the unit that a labelled array states, '' if it states no unit."""
+    """Return the unit that a labelled array states, '' if it states no unit.
+
+    >>> import xarray as xr
+    >>> stated = {"unit": " mm "}, {}, {"units": 1}, {"unit": "m", "units": "cm"}
+    >>> [stated_unit(xr.DataArray(0, attrs=given)) for given in stated]
+    ['mm', '', '1', 'cm']
+    """
     return str(array.attrs.get("units") or array.attrs.get("unit") or "").strip()
 
 
@@ -266,6 +411,21 @@ def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[A
 
     The unit comes from a quantity, from the caller (`given`) or from
     the source.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> x = xr.DataArray(np.array([3.0, 7.0]), attrs={"units": "mm"})
+    >>> in_si(x, ("Pa", "m")), in_si(x.drop_attrs(), ("m", "Pa"))
+    ((array([0.003, 0.007]), 'm'), (array([3., 7.]), 'm'))
+    >>> in_si(x.drop_attrs(), ("Pa", "m"), "cm")[0].tolist()
+    [0.03, 0.07]
+    >>> in_si(x, ("m",), "cm")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is given in cm, but the source states mm. Leave the unit out...
+    >>> in_si(xr.DataArray([3, None]), ("1",))[0].tolist()
+    [3.0, nan]
     """
     numbers, stated = array.data, stated_unit(array)
     if type(numbers) is not np.ndarray or numbers.dtype != np.float64:
@@ -278,7 +438,15 @@ def in_si(array: Any, units: Sequence[str], given: str | None = None) -> tuple[A
 
 
 def check_agreement(given: str, stated: str) -> None:
-    """Refuse a unit of the caller that differs from the unit that the source states."""
+    """Refuse a unit of the caller that differs from the unit that the source states.
+
+    >>> check_agreement("N/mm2", "MPa"), check_agreement("mm", ""), check_agreement("mm", "metr")
+    (None, None, None)
+    >>> check_agreement("mm", "um")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: is given in mm, but the source states um...
+    """
     ours, theirs = parse(given), parse(stated)
     if ours and theirs and not math.isclose(ours.factor, theirs.factor, rel_tol=1e-12):
         raise InputError(
@@ -314,6 +482,33 @@ def check_measured(
     With `doubted`, warn about a number that is far from all others and
     often marks a missing value. In messages, values are written as
     `given`, with their line in a table or their number.
+
+    Examples
+    --------
+    The warning asks for a distance beyond the range of all other values, here 8 - (-99) > 9 - 8.
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> values = np.array([8.0, -99.0, 9.0, -99.0])
+    >>> with collect_warnings() as caught:
+    ...     check_measured(values, "slip", (4, 5, 6, 7))
+    ...     check_measured(values, "slip", doubted=False)
+    ...     check_measured(np.array([8.0, -99.0, 120.0]), "slip")
+    ...     check_measured(np.array([-99.0, -99.0]), "slip")
+    >>> [warned.text[:66] for warned in caught]
+    ['slip: -99 occurs in line 5 (2 such values), and often marks a miss']
+    >>> with collect_warnings() as caught:
+    ...     check_measured(np.array([1.0, 2.0, 9.96921e36]), "slip", given=np.array([3, 7, 1e30]))
+    >>> caught[0].text[:39]
+    'slip: 1e+30 occurs in entry 2 (1 such v'
+    >>> for values in ([3.0, -9.9e37], [3.0, 0.0, -2.0]):
+    ...     try:
+    ...         check_measured(np.array(values), "strength", (), 10.0 * np.array(values))
+    ...     except InputError as error:
+    ...         print(str(error)[:68])
+    strength holds -9.9e+38 in entry 1, which marks an overload. Cut the
+    strength must be positive, but is 0 in entry 1 (2 such values). If 0
+    >>> check_measured(np.array([0.0, -9.8e37, np.nan]), "slip")
+    >>> check_measured(np.array([np.nan]), "slip")
     """
     shown = np.ravel(values if given is None else given)
     known = shown[np.isfinite(shown)]
@@ -343,7 +538,12 @@ def check_measured(
 
 
 def _entry(wrong: Array, lines: Any) -> str:
-    """Describe the place of the first wrong value: its line in a table, or its number."""
+    """Describe the place of the first wrong value: its line in a table, or its number.
+
+    >>> wrong = np.array([False, True, True])
+    >>> _entry(wrong, [11, 13, 17]), _entry(wrong, [11, 13]), _entry(wrong, ())
+    ('line 13', 'entry 1', 'entry 1')
+    """
     entry = int(np.argmax(wrong))
     return f"line {lines[entry]}" if np.size(lines) == wrong.size else f"entry {entry}"
 
@@ -357,10 +557,61 @@ def profile_in_si(
     x_unit: str | None = None,
     doubted: bool = True,
 ) -> Any:
-    """Return a profile with its values, and its coordinates x and y, in SI and checked.
+    r"""Return a profile with its values, and its coordinates x and y, in SI and checked.
 
     Numbers become an array. A DataArray states its unit in the
     attribute `units`: a strength may also be a friction coefficient, 1.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> places = xr.DataArray([1.0, 3.0], dims="x", attrs={"units": "cm"})
+    >>> given = xr.DataArray([5.0, 7.0], coords={"x": places}, attrs={"units": "kPa"})
+    >>> profile = profile_in_si(given, "strength")
+    >>> profile.values.tolist(), profile.x.values.tolist(), profile.attrs
+    ([5000.0, 7000.0], [0.01, 0.03], {'units': 'Pa'})
+    >>> profile_in_si(given.drop_attrs(), "strength", unit="%", x_unit="mm").x.values.tolist()
+    [0.001, 0.003]
+    >>> profile_in_si([5, 7], "strength").tolist()
+    [5.0, 7.0]
+    >>> profile_in_si(given.assign_attrs(units="1"), "strength").attrs
+    {'units': '1'}
+    >>> profile_in_si(given.rename(x="y"), "strength", ("N m-2",)).y.values.tolist()
+    [0.01, 0.03]
+    >>> profile_in_si(given.assign_attrs(units="kN"), "slip", ("N",)).attrs
+    {'units': 'N'}
+    >>> profile_in_si(given.assign_attrs(units="1"), "slip")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: slip is in 1, which cannot be converted to m
+    >>> profile_in_si(given, "strength", x_unit="kg")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: x is in kg, which cannot be converted to m
+    >>> profile_in_si(given.assign_coords(x=[1.0, np.inf]), "strength")
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: x must be finite, but is not in entry 1
+
+    Units that a table or a profile of heights does not state are doubted.
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> bare = given.drop_attrs().assign_attrs(read="table.txt")
+    >>> low = xr.DataArray([0.0, 0.001, np.nan], dims="x")
+    >>> with collect_warnings() as caught:
+    ...     _ = profile_in_si(bare, "strength"), profile_in_si(bare.drop_attrs(), "slip")
+    ...     _ = profile_in_si(bare, "slip", unit="m"), profile_in_si(bare, "slip", x_unit="m")
+    ...     _ = profile_in_si(low, "height"), profile_in_si(low + low**2, "height")
+    ...     _ = profile_in_si(low + low**2, "height", unit="m")
+    ...     _ = profile_in_si((low + low**2).assign_attrs(units="m"), "height")
+    ...     _ = profile_in_si(bare, "residual_ratio", x_unit="m")
+    >>> print(*[warned.text.split(". ")[0][:70] for warned in caught], sep="\n")
+    strength is read in Pa and x is read in m, because no unit is stated
+    x is read in m, because no unit is stated
+    slip is read in m, because no unit is stated
+    height: has no unit and is read in m
+    >>> caught[-1].text.split(". ")[1]
+    'The heights span 0.001 m'
     """
     units = units or (QUANTITIES[quantity].units, *["1"] * (quantity in STRENGTHS))
     if not hasattr(value, "dims"):
@@ -421,6 +672,22 @@ def doubt_units(doubts: Iterable[Doubt]) -> bool:
     """Warn about the first unusual ratio, and return whether there is any.
 
     If a ratio is impossible, an `InputError` lists all unusual ratios.
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> usual, possible = (2.0, 5.0), (1.0, 9.0)
+    >>> with collect_warnings() as caught:
+    ...     [doubt_units([Doubt("a", ratio, usual, possible)]) for ratio in (1.0, 2.0, 5.0, 9.0)]
+    ...     doubt_units([Doubt("b", 3.0, usual), Doubt("c", 99.0, usual), Doubt("d", 0.0, usual)])
+    [True, False, False, True]
+    True
+    >>> [warned.text for warned in caught]
+    ['a', 'a', 'c']
+    >>> doubts = Doubt("a", 6.0, usual), Doubt("b", 3.0, usual), Doubt("c", 0.9, usual, possible)
+    >>> doubt_units(doubts)
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: a
+    c
     """
     unusual = [doubt for doubt in doubts if not doubt.usual[0] <= doubt.ratio <= doubt.usual[1]]
     if any(not one.possible[0] <= one.ratio <= one.possible[1] for one in unusual):
