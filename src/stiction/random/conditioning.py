@@ -106,7 +106,37 @@ class ReadPoints(np.ndarray):
 
 
 def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
-    """Return an array from a measurement: rows with x (and y on a plane), and a row with values."""
+    """Return an array from a measurement: rows with x (and y on a plane), and a row with values.
+
+    Rows hold x (and y), then the values. A node without a value is left
+    out.
+
+    >>> from types import SimpleNamespace
+    >>> info = SimpleNamespace(context=None)
+    >>> points = _points({"values": [4.0, np.nan, 6.0], "x": [1.0, 2.0, 3.0]}, info)
+    >>> points.tolist(), points.flags.writeable, _points(points, info) is points
+    ([[1.0, 3.0], [4.0, 6.0]], False, True)
+    >>> import xarray as xr
+    >>> plane = xr.DataArray(
+    ...     [[4.0, 5.0], [6.0, 7.0]], {"y": [8.0, 9.0], "x": [1.0, 2.0]}, ("y", "x")
+    ... )
+    >>> _points(plane, info).tolist()
+    [[1.0, 1.0, 2.0, 2.0], [8.0, 9.0, 8.0, 9.0], [4.0, 6.0, 5.0, 7.0]]
+
+    The reader of a study file gets the path and the property:
+
+    >>> def read(path, quantity):
+    ...     return {"x": [3.0], "values": [{"strength": 4.0, "critical_slip": 5.0}[quantity]]}
+    >>> _points("a.csv", SimpleNamespace(context={"read": read})).tolist()
+    [[3.0], [4.0]]
+    >>> context = {"read": read, "quantity": "critical_slip"}
+    >>> _points("a.csv", SimpleNamespace(context=context)).tolist()
+    [[3.0], [5.0]]
+    >>> _points({"x": [1.0, np.nan], "values": [2.0, 3.0]}, info)
+    Traceback (most recent call last):
+    ...
+    ValueError: coordinates must be finite. Values must be finite, or NaN if not measured
+    """
     if isinstance(value, ReadPoints):
         return value
     context = info.context or {}
@@ -137,7 +167,18 @@ def _points(value: Any, info: pydantic.ValidationInfo) -> Array:
 
 
 def _values(array: Any) -> Array:
-    """Return the values of a labelled array in SI. The stated unit determines the property."""
+    """Return the values of a labelled array in SI. The stated unit determines the property.
+
+    >>> import xarray as xr
+    >>> def in_unit(units):
+    ...     return _values(xr.DataArray([1.5, 0.25], attrs={"units": units})).tolist()
+    >>> in_unit("MPa"), in_unit(""), in_unit("N/mm")
+    ([1500000.0, 250000.0], [1.5, 0.25], [1500.0, 250.0])
+    >>> in_unit("K")
+    Traceback (most recent call last):
+    ...
+    ValueError: must be in SI or state the unit of a property, got 'K'
+    """
     stated = stated_unit(array) or "1"
     known = [
         quantity.units for quantity in QUANTITIES.values() if is_in(stated, quantity.units)
@@ -148,6 +189,13 @@ def _values(array: Any) -> Array:
 
 
 def _table(points: Array) -> dict[str, list[float]]:
+    """Return the rows by name, as a study file shows them.
+
+    >>> _table(np.array([[1.0, 2.0], [7.0, 9.0]]))
+    {'x': [1.0, 2.0], 'values': [7.0, 9.0]}
+    >>> _table(np.array([[1.0], [3.0], [7.0]]))
+    {'x': [1.0], 'y': [3.0], 'values': [7.0]}
+    """
     names = ("x", "values") if len(points) == 2 else ("x", "y", "values")
     return dict(zip(names, points.tolist(), strict=True))
 
@@ -164,16 +212,57 @@ class Conditions:
 
     @property
     def places(self) -> Array:
-        """Places of the measured values, m, with shape (dimensions, points)."""
+        """Places of the measured values, m, with shape (dimensions, points).
+
+        >>> Conditions(
+        ...     {"x": [1.0, 2.0], "y": [3.0, 4.0], "values": [5.0, 6.0]}, 0.1
+        ... ).places.tolist()
+        [[1.0, 2.0], [3.0, 4.0]]
+        """
         return np.asarray(self.profile[:-1])
 
     @property
     def values(self) -> Array:
-        """Measured values with shape (points,)."""
+        """Measured values with shape (points,).
+
+        >>> Conditions(
+        ...     {"x": [1.0, 2.0], "y": [3.0, 4.0], "values": [5.0, 6.0]}, 0.1
+        ... ).values.tolist()
+        [5.0, 6.0]
+        """
         return np.asarray(self.profile[-1])
 
     def check(self, marginal: Any, interface: Interface) -> None:
-        """Raise an `InputError` if places or values are impossible for a field."""
+        """Raise an `InputError` if places or values are impossible for a field.
+
+        The ends belong to the interface, and a value may lie four errors
+        outside the marginal, here from 1 to 3.
+
+        >>> import scipy.stats
+        >>> from types import SimpleNamespace
+        >>> law, line = (
+        ...     SimpleNamespace(distribution=scipy.stats.uniform(1.0, 2.0)),
+        ...     Interface(0.1, 8),
+        ... )
+        >>> Conditions({"x": [0.0, 0.1], "values": [0.0, 4.0]}, 0.25).check(law, line)
+        >>> def mistakes(interface, **profile):
+        ...     try:
+        ...         Conditions(profile, 0.25).check(law, interface)
+        ...     except InputError as error:
+        ...         return [
+        ...             text.removeprefix("conditions.profile: ")[:75]
+        ...             for text in error.problems
+        ...         ]
+        >>> for text in mistakes(line, x=[0.02, 0.11], values=[4.5, -0.25]):
+        ...     print(text)
+        x reaches from 0.02 to 0.11 m, but the interface is 0.1 m long
+        4.5 at [0.02] m lies outside the marginal, 1 to 3, by more than 4 times its
+        >>> plane = Interface((0.1, 0.3), (8, 8))
+        >>> mistakes(plane, x=[0.0, 0.1], y=[-0.02, 0.3], values=[2.0, 2.0])
+        ['y reaches from -0.02 to 0.3 m, but the interface is 0.3 m long']
+        >>> mistakes(plane, x=[0.0], y=[0.2], values=[-0.25])
+        ['-0.25 at [0.0, 0.2] m lies outside the marginal, 1 to 3, by more than 4 tim']
+        """
         names, places = interface.dims, self.places
         if len(places) != len(names):
             raise InputError(
@@ -207,12 +296,35 @@ class Measured(NamedTuple):
     phi: Array  # (places, dimension)
 
     def by_marginal(self, of_places: Array) -> Iterator[tuple[Any, Array]]:
-        """Yield each property's marginal, with its part of an array (places, ...)."""
+        """Yield each property's marginal, with its part of an array (places, ...).
+
+        >>> measured = Measured(
+        ...     [("first", 2), ("second", 1)], np.zeros(3), np.ones(3), np.eye(3)
+        ... )
+        >>> [
+        ...     (law, part.tolist())
+        ...     for law, part in measured.by_marginal(np.array([7.0, 8.0, 9.0]))
+        ... ]
+        [('first', [7.0, 8.0]), ('second', [9.0])]
+        """
         marginals, counts = zip(*self.properties, strict=True)
         return zip(marginals, np.split(of_places, np.cumsum(counts)[:-1]), strict=True)
 
     def log_likelihood(self, z: Array) -> Array:
-        """Return log l_k at every place and z (places, ...), also without a quantile."""
+        """Return log l_k at every place and z (places, ...), also without a quantile.
+
+        The maps 5 + 2 z and 10 z, where the second has no quantile below 0.
+
+        >>> from types import SimpleNamespace
+        >>> first = SimpleNamespace(of_normal=lambda z: 5.0 + 2.0 * z)
+        >>> second = SimpleNamespace(of_normal=lambda z: np.where(z < 0.0, np.nan, 10.0 * z))
+        >>> values, noise = np.array([6.0, 3.0]), np.array([0.5, 2.0])
+        >>> measured = Measured([(first, 1), (second, 1)], values, noise, np.eye(2))
+        >>> measured.log_likelihood(np.array([1.0, 0.0])).tolist()
+        [-2.0, -1.125]
+        >>> measured.log_likelihood(np.array([[0.75, 1.5], [0.5, -1.0]])).tolist()
+        [[-0.5, -8.0], [-0.5, -1000000000.0]]
+        """
         shape = (-1, *(1 for _ in z.shape[1:]))
         mapped = np.concatenate([from_normal(*part) for part in self.by_marginal(z)])
         misfit = (self.values.reshape(shape) - mapped) * (1.0 / self.noise).reshape(shape)
@@ -221,7 +333,29 @@ class Measured(NamedTuple):
         return np.maximum(likely, LOG_OF_IMPOSSIBLE)
 
     def gaussian(self, mean: Array, variance: Array) -> tuple[Array, Array]:
-        """Step 2: return b and p (places,) from mean and variance of z given all other values."""
+        """Step 2: return b and p (places,) from mean and variance of z given all other values.
+
+        If v = m + s z, then p = (s / noise)^2 and b = s (v - m) / noise^2,
+        whatever the mean and the variance are. They contradict the values here.
+
+        >>> from types import SimpleNamespace
+        >>> import scipy.stats
+        >>> first = SimpleNamespace(
+        ...     distribution=scipy.stats.norm(5.0, 2.0), of_normal=lambda z: 5.0 + 2.0 * z
+        ... )
+        >>> second = SimpleNamespace(
+        ...     distribution=scipy.stats.norm(0.0, 10.0), of_normal=lambda z: 10.0 * z
+        ... )
+        >>> values, noise = np.array([6.0, 6.0, 120.0, -120.0]), np.array([0.5, 0.5, 2.0, 2.0])
+        >>> measured = Measured([(first, 2), (second, 2)], values, noise, np.eye(4))
+        >>> mean, variance = (
+        ...     np.array([20.0, -20.0, 0.2, -0.2]),
+        ...     np.array([0.01, 0.01, 1.5, 1.5]),
+        ... )
+        >>> b, p = measured.gaussian(mean, variance)
+        >>> b.round(6).tolist(), p.round(6).tolist()
+        ([8.0, 8.0, 300.0, -300.0], [16.0, 16.0, 25.0, 25.0])
+        """
         # The range of z in which likelihood and normal distribution
         # both matter. Of the probabilities below and above, the smaller
         # gives z.
@@ -265,7 +399,19 @@ class Regression(NamedTuple):
     data: Array  # V' sum_k b_k phi_k, (directions,)
 
     def moments(self, phi: Array) -> tuple[Array, Array]:
-        """Return the mean and standard deviation of z = phi @ draws, with shape (points,)."""
+        """Return the mean and standard deviation of z = phi @ draws, with shape (points,).
+
+        The second direction is the third draw. The first row has a part in no
+        direction, with the variance 0.16, and the second row has none.
+
+        >>> right = np.array([[0.6, 0.0], [0.8, 0.0], [0.0, 1.0]])
+        >>> regression = Regression(np.array([3.0, 0.25]), right, np.array([2.0, 0.5]))
+        >>> mean, deviation = regression.moments(np.array([[1.0, 2.0, 2.0], [0.6, 0.8, 0.0]]))
+        >>> mean.round(6).tolist()  # 2.2 * 2 / 4 + 2 * 0.5 / 1.25, and 2 / 4
+        [1.9, 0.5]
+        >>> (deviation**2).round(6).tolist()  # 2.2^2 / 4 + 2^2 / 1.25 + 0.16, and 1 / 4
+        [4.57, 0.25]
+        """
         along, gain = phi @ self.right, 1.0 + self.power
         # Variance in directions that no measurement changes.
         free = (phi**2).sum(axis=1) - (along**2).sum(axis=1)
@@ -284,7 +430,17 @@ class Conditioning(NamedTuple):
     points: int
 
     def draws(self, draws: Array) -> Array:
-        """Return mu + P^(1/2) a for each row a of standard normal draws (samples, dimension)."""
+        """Return mu + P^(1/2) a for each row a of standard normal draws (samples, dimension).
+
+        >>> right = np.array([[0.6, 0.0], [0.8, 0.0], [0.0, 1.0]])
+        >>> regression = Regression(np.array([3.0, 8.0]), right, np.array([2.0, 1.8]))
+        >>> conditioning, draws = Conditioning(regression, (0.0, 0.0), 0.0, 2), np.zeros((2, 3))
+        >>> draws[1] = 1.0, 2.0, 3.0
+        >>> conditioning.draws(draws).round(6).tolist()  # a = 0 gives the mean
+        [[0.3, 0.4, 0.2], [0.64, 1.52, 1.2]]
+        >>> draws.tolist()
+        [[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]
+        """
         right, gain = self.regression.right, 1.0 + self.regression.power
         mean, factors = self.regression.data / gain, gain**-0.5 - 1.0
         # Sample by sample and without BLAS, so that a sample does not
@@ -296,7 +452,24 @@ class Conditioning(NamedTuple):
         return conditioned
 
     def warn(self) -> None:
-        """Warn about measured values that do not suit the field."""
+        """Warn about measured values that do not suit the field.
+
+        For two values, 12 is the largest misfit without a warning.
+
+        >>> def texts(error, misfit):
+        ...     with collect_warnings() as warned:
+        ...         Conditioning(None, error, misfit, 2).warn()
+        ...     return [str(warning) for warning in warned]
+        >>> from stiction.base.errors import collect_warnings
+        >>> texts((0.1, 0.1), 12.0)
+        []
+        >>> texts((0.0, 0.0), 12.5)[0][:79]
+        'conditions: the measured values are unlikely for this field (chi-square 12.5 fo'
+        >>> texts((0.05, 0.12), 0.0)[0][60:131]
+        'with errors up to about 0.05 standard deviations in the mean, and 12 % '
+        >>> len(texts((0.12, 0.0), 99.0))
+        2
+        """
         if self.misfit > self.points + MAX_CHI_SQUARE * np.sqrt(2.0 * self.points):
             warn_accuracy(
                 "conditions: the measured values are unlikely for this field (chi-square"
@@ -312,7 +485,56 @@ class Conditioning(NamedTuple):
 
 
 def conditioned(measured: Measured) -> Conditioning:
-    """Condition draws on measured values of properties, with the algorithm in this file."""
+    """Condition draws on measured values of properties, with the algorithm in this file.
+
+    If the maps are straight, formula (2) holds exactly with p = (s /
+    noise)^2 and b = s (v - m) / noise^2.
+
+    >>> from types import SimpleNamespace
+    >>> import scipy.stats
+    >>> first = SimpleNamespace(
+    ...     distribution=scipy.stats.norm(5.0, 2.0), of_normal=lambda z: 5.0 + 2.0 * z
+    ... )
+    >>> second = SimpleNamespace(
+    ...     distribution=scipy.stats.norm(0.0, 10.0), of_normal=lambda z: 10.0 * z
+    ... )
+    >>> phi, p, b = (
+    ...     np.array([[0.6, 0.8], [0.0, 1.0]]),
+    ...     np.array([16.0, 25.0]),
+    ...     np.array([8.0, 7.5]),
+    ... )
+    >>> values, noise = np.array([6.0, 3.0]), np.array([0.5, 2.0])
+    >>> known = conditioned(Measured([(first, 1), (second, 1)], values, noise, phi))
+    >>> covariance = np.linalg.inv(np.eye(2) + phi.T @ (p[:, None] * phi))
+    >>> mean, deviation = known.regression.moments(np.eye(2))
+    >>> (
+    ...     np.allclose(mean, covariance @ phi.T @ b),
+    ...     np.allclose(deviation**2, np.diag(covariance)),
+    ... )
+    (True, True)
+    >>> misfits = values - [5.0, 0.0] - [2.0, 10.0] * (phi @ mean)
+    >>> np.isclose(known.misfit, np.sum((misfits / noise) ** 2) + mean @ mean).item()
+    True
+    >>> max(known.error) < 1e-9, known.points
+    (True, 2)
+
+    Two values at one place, with the map exp(z / 2), give almost the same
+    as integrals over z:
+
+    >>> law = SimpleNamespace(
+    ...     distribution=scipy.stats.lognorm(0.5), of_normal=lambda z: np.exp(0.5 * z)
+    ... )
+    >>> values, noise = np.array([2.9, 2.1]), np.array([0.4, 0.5])
+    >>> known = conditioned(Measured([(law, 2)], values, noise, np.ones((2, 1))))
+    >>> z = np.linspace(-8.0, 8.0, 4001)
+    >>> misfits = (values[:, None] - np.exp(0.5 * z)) / noise[:, None]
+    >>> density = np.exp(-0.5 * z**2 - 0.5 * (misfits**2).sum(axis=0))
+    >>> mean = density @ z / density.sum()
+    >>> deviation = np.sqrt(density @ (z - mean) ** 2 / density.sum())
+    >>> found = known.regression.moments(np.eye(1))
+    >>> bool(abs(found[0] - mean) < 0.003), bool(abs(found[1] - deviation) < 0.006)
+    (True, True)
+    """
     phi = measured.phi
     # 1. and 2. Gaussians as if each value were the only one.
     cavity = np.zeros(len(phi)), np.ones(len(phi))
@@ -340,7 +562,22 @@ def conditioned(measured: Measured) -> Conditioning:
 def _estimate_error(
     measured: Measured, shift: Array, precision: Array, mean: Array, slopes: Array
 ) -> tuple[float, float]:
-    """Step 6: compare samples of z = mean + slopes w with the same samples, weighted by (1)."""
+    """Step 6: compare samples of z = mean + slopes w with the same samples, weighted by (1).
+
+    Without a Gaussian, b = p = 0, samples with the variance 1/4 get the
+    weight of a value with p = 4. Their mean moves from 0.3 to 0.4, and their
+    variance falls to 1/8.
+
+    >>> from types import SimpleNamespace
+    >>> law = SimpleNamespace(of_normal=lambda z: 5.0 + 2.0 * z)
+    >>> measured = Measured([(law, 1)], np.array([6.0]), np.array([1.0]), np.eye(1))
+    >>> mean, slopes = np.array([0.3]), np.array([[0.5]])
+    >>> errors = _estimate_error(measured, np.zeros(1), np.zeros(1), mean, slopes)
+    >>> [round(error, 1) for error in errors]  # 0.1 / 0.5 and 1 - 0.5^0.5
+    [0.2, 0.3]
+    >>> max(_estimate_error(measured, np.array([2.0]), np.array([4.0]), mean, slopes)) < 1e-9
+    True
+    """
     draws = np.random.default_rng(0).standard_normal((N_CHECK_SAMPLES, slopes.shape[1]))
     z = draws @ slopes.T  # less its mean
     # The Gaussians are scaled to 1 at the mean, because a constant
@@ -361,7 +598,32 @@ def _estimate_error(
 
 
 def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression, Array, Array]:
-    """Step 3: return the regression, with b and p, which are reduced if they have no posterior."""
+    """Step 3: return the regression, with b and p, which are reduced if they have no posterior.
+
+    The rows may have any precision, also a negative one.
+
+    >>> phi, b, p = (
+    ...     np.array([[0.6, 0.8], [1.0, 0.0]]),
+    ...     np.array([2.0, 0.7]),
+    ...     np.array([3.0, -0.5]),
+    ... )
+    >>> def is_right(b, p):
+    ...     covariance = np.linalg.inv(np.eye(2) + phi.T @ (p[:, None] * phi))
+    ...     mean, deviation = _regression(phi, b, p)[0].moments(np.eye(2))
+    ...     close = np.allclose(mean, covariance @ phi.T @ b)
+    ...     return close and np.allclose(deviation**2, np.diag(covariance))
+    >>> is_right(b, p), is_right(b, np.array([3.0, 5.0])), is_right(b, np.array([3.0, 0.0]))
+    (True, True, True)
+
+    p = -2 has no posterior. It is reduced until P^-1 - 1 is -0.45, and b by
+    the same factor.
+
+    >>> regression, b, p = _regression(np.eye(1), np.array([3.0]), np.array([-2.0]))
+    >>> regression.power.round(6).tolist(), b.round(6).tolist(), p.round(6).tolist()
+    ([-0.45], [0.675], [-0.45])
+    >>> _regression(phi[[0, 0]], np.ones(2), np.array([3.0, 2.0]))[0].power.round(6).tolist()
+    [5.0]
+    """
     scale = np.sqrt(np.maximum(np.abs(precision), MIN_SCALE))
     left, singular, right = svd(phi * scale[:, None], full_matrices=False)
     kept = singular > MIN_SINGULAR_VALUE
@@ -381,7 +643,31 @@ def _regression(phi: Array, shift: Array, precision: Array) -> tuple[Regression,
 def _from_others(
     phi: Array, regression: Regression, shift: Array, precision: Array
 ) -> tuple[Array, Array]:
-    """Step 4: return the mean and variance of z at each place, given the values at other places."""
+    """Step 4: return the mean and variance of z at each place, given the values at other places.
+
+    Given the other value only, z of the first row has the mean 0.6 (-1/3)
+    and the variance 0.6^2 / 3 + 0.8^2.
+
+    >>> phi, b, p = (
+    ...     np.array([[1.0, 0.0], [0.6, 0.8]]),
+    ...     np.array([1.5, -1.0]),
+    ...     np.array([3.0, 2.0]),
+    ... )
+    >>> mean, variance = _from_others(phi, _regression(phi, b, p)[0], b, p)
+    >>> mean.round(6).tolist(), variance.round(6).tolist()
+    ([-0.2, 0.225], [0.76, 0.73])
+
+    At least half the precision without measurements remains, and a sharp
+    value needs no others:
+
+    >>> row, b, p = np.array([[2.0]]), np.array([1.5]), np.array([3.0])
+    >>> mean, variance = _from_others(row, _regression(row, b, p)[0], b - 0.25, p + 0.2)
+    >>> mean.round(6).tolist(), variance.round(6).tolist()
+    ([2.0], [8.0])
+    >>> row, p = np.array([[1.0]]), np.array([1e9])
+    >>> [part.tolist() for part in _from_others(row, _regression(row, b, p)[0], b, p)]
+    [[0.0], [1.0]]
+    """
     mean, deviation = regression.moments(phi)
     least = 0.5 / (phi**2).sum(axis=1)
     remaining = np.maximum(deviation**-2 - precision, least)
@@ -393,7 +679,17 @@ def _from_others(
 
 
 def lower_factor(matrix: Array) -> Array:
-    """Return the lower triangular L with L L^T = matrix, which may be singular."""
+    """Return the lower triangular L with L L^T = matrix, which may be singular.
+
+    The first two properties determine the third one below.
+
+    >>> lower_factor(np.array([[1.0, 0.6, 0.96], [0.6, 1.0, 0.8], [0.96, 0.8, 1.0]])).round(
+    ...     6
+    ... ).tolist()
+    [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.96, 0.28, 0.0]]
+    >>> lower_factor(np.array([[4.0, 4.0, 2.0], [4.0, 4.0, 2.0], [2.0, 2.0, 10.0]])).tolist()
+    [[2.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.0, 3.0]]
+    """
     size = matrix.shape[0]
     factor = np.zeros_like(matrix)
     for j in range(size):
@@ -412,6 +708,30 @@ def conditioning_of(
     """Return the columns of the conditioned draws and their conditioning, or None.
 
     `random` is a `stiction.random.fields.RandomInterface`.
+
+    The residual strength was measured, and has the correlation 0.6 with the
+    strength. Where it was measured, z has the mean (2 / 0.5) (6 - 5) / 0.5
+    / (1 + (2 / 0.5)^2).
+
+    >>> import scipy.stats
+    >>> import stiction as st
+    >>> field = st.RandomField(scipy.stats.norm(5.0, 2.0), st.SquaredExponentialSpectrum(0.05))
+    >>> line, value = Interface(0.1, 16), {"x": [0.03], "values": [6.0]}
+    >>> random = st.RandomInterface(
+    ...     strength=field,
+    ...     residual_strength=field.given(value, noise=0.5),
+    ...     normal_pressure=field,
+    ...     correlation={("strength", "residual_strength"): 0.6},
+    ... )
+    >>> columns, known = conditioning_of(random, line)
+    >>> basis = field.modes(line).basis(np.array([[0.03]]))
+    >>> columns.tolist() == list(range(2 * basis.size))
+    True
+    >>> mean = known.draws(np.zeros((1, columns.size)))
+    >>> (np.hstack([0.6 * basis, 0.8 * basis]) @ mean.T).round(6).tolist(), round(8.0 / 17.0, 6)
+    ([[0.470588]], 0.470588)
+    >>> conditioning_of(st.RandomInterface(strength=field), line) is None
+    True
     """
     if all(field.conditions is None for field in random.properties.values()):
         return None

@@ -97,6 +97,24 @@ class WithFactors:
         return replace(self, _between=dict(between))  # type: ignore[type-var]
 
     def _scattered(self, interfaces: Sequence[RandomInterface]) -> list[RandomInterface]:
+        """Return the interfaces with the factors for new specimens.
+
+        >>> from types import SimpleNamespace as Named
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> a, b = st.Lognormal(mean=1.0, cv=0.1), st.Lognormal(mean=1.0, cv=0.3)
+        >>> known = RandomInterface(
+        ...     strength=field, between={"strength": a, "normal_pressure": a}
+        ... )
+        >>> tests, new = [known, RandomInterface(strength=field)], {"normal_pressure": b}
+        >>> scattered = WithFactors._scattered(Named(_between=new), tests)
+        >>> [{name: law.cv for name, law in one.between.items()} for one in scattered]
+        [{'strength': 0.1, 'normal_pressure': 0.3}, {'normal_pressure': 0.3}]
+        >>> WithFactors._scattered(Named(_between={}), tests) == tests
+        True
+        """
         if not self._between:
             return list(interfaces)
         factors = [{**(one.between or {}), **self._between} for one in interfaces]
@@ -114,7 +132,23 @@ class Predictive(Protocol):
 
 
 def _known(given: Any) -> Any:
-    """Return random interfaces, or raise an `InputError` that names the first invalid entry."""
+    """Return random interfaces, or raise an `InputError` that names the first invalid entry.
+
+    >>> import stiction as st
+    >>> field = RandomField(
+    ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+    ... )
+    >>> random = RandomInterface(strength=field)
+    >>> _known(field) == random, _known([field, random]) == [random, random]
+    (True, True)
+    >>> mixture = EquallyLikely((random, random))
+    >>> _known(mixture) is mixture
+    True
+    >>> _known([field, 3.0])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: [1] must be a RandomInterface or a RandomField, got 3.0. ...
+    """
     if isinstance(given, Source | EquallyLikely):
         return given
     if not isinstance(given, list | tuple):
@@ -142,6 +176,36 @@ class EquallyLikely:
     All members use the same draw for a property and a mode, so that the
     profiles of a sample keep their form if its member changes. A single
     member needs no such first draw.
+
+    Examples
+    --------
+    The means 2 and 3 MPa are proportional to each other, so the first two
+    members belong to one group. They are of one kind only if they are
+    equal.
+
+    >>> import stiction as st
+    >>> def random(mean, cv, **between):
+    ...     field = RandomField(
+    ...         st.Lognormal(mean=mean, cv=cv), st.SquaredExponentialSpectrum(0.05)
+    ...     )
+    ...     return RandomInterface(strength=field, between=between or None)
+    >>> factor = st.Lognormal(mean=1.0, cv=0.1)
+    >>> members = (
+    ...     random(2e6, 0.2),
+    ...     random(3e6, 0.2),
+    ...     random(2e6, 0.3),
+    ...     random(2e6, 0.2, critical_slip=factor),
+    ... )
+    >>> mixture = EquallyLikely(members)
+    >>> mixture.kinds.tolist(), mixture.groups.tolist()
+    ([0, 1, 2, 0], [0, 0, 1, 0])
+    >>> mixture.means.round().tolist(), mixture.names, sorted(mixture.varying)
+    ([2000000.0, 3000000.0, 2000000.0, 2000000.0], ('strength',), ['critical_slip', 'strength'])
+    >>> laws, numbers = EquallyLikely((random(2e6, 0.2, strength=factor), *members)).factor_laws
+    >>> laws == [factor, None], numbers.tolist()
+    (True, [0, 1, 1, 1, 1])
+    >>> mixture.several, EquallyLikely(members[:1]).several
+    (True, False)
     """
 
     members: tuple[RandomInterface, ...]
@@ -166,7 +230,17 @@ class EquallyLikely:
 
     @property
     def properties(self) -> dict[str, RandomField]:
-        """Random properties of the first member."""
+        """Random properties of the first member.
+
+        >>> import stiction as st
+        >>> spectrum = st.SquaredExponentialSpectrum(0.05)
+        >>> fields = [
+        ...     RandomField(st.Lognormal(mean=mean, cv=0.2), spectrum) for mean in (2e6, 3e6)
+        ... ]
+        >>> mixture = EquallyLikely(tuple(RandomInterface(strength=field) for field in fields))
+        >>> mixture.properties == {"strength": fields[0]}
+        True
+        """
         return self.members[0].properties
 
     @property
@@ -205,6 +279,32 @@ class EquallyLikely:
     def factor_column(self, interface: Interface) -> int | None:
         """Return the column of the draw for the strength's factor, or `None` if
         a member has no factor.
+
+        The strength has two draws below. The draws of one member follow its own
+        order, and the draws of several members follow the draw that selects the
+        member, in the order of properties.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> names, factor = (
+        ...     ("critical_slip", "normal_pressure", "strength"),
+        ...     st.Lognormal(mean=1.0, cv=0.1),
+        ... )
+        >>> random = RandomInterface(strength=field, between=dict.fromkeys(names, factor))
+        >>> line, single, several = (
+        ...     Interface(0.1, 8),
+        ...     EquallyLikely((random,)),
+        ...     EquallyLikely((random,) * 2),
+        ... )
+        >>> single.factor_column(line), several.factor_column(line)
+        (4, 3)
+        >>> single.dimension(line), several.dimension(line)
+        (5, 6)
+        >>> without = RandomInterface(strength=field, between={"critical_slip": factor})
+        >>> EquallyLikely((random, without)).factor_column(line) is None
+        True
         """
         if None in self.factor_laws[0]:
             return None
@@ -213,7 +313,30 @@ class EquallyLikely:
         return next(stream.columns.start for stream in streams if stream.number == number)
 
     def select(self, draws: Array, rows: NDArray[np.int64], members: NDArray[np.int64]) -> None:
-        """Change rows of draws so that they select given members."""
+        """Change rows of draws so that they select given members.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> mixture = EquallyLikely((RandomInterface(strength=field),) * 3, order=(2, 0, 1))
+        >>> draws = np.zeros((3, 2))
+        >>> mixture.select(
+        ...     draws, np.array([0, 2]), np.array([2, 1])
+        ... )  # first and last in the order
+        >>> (
+        ...     ndtr(draws[:, 0]).round(6).tolist(),
+        ...     draws[:, 1].tolist(),
+        ...     mixture.member(draws).tolist(),
+        ... )
+        ([0.166667, 0.5, 0.833333], [0.0, 0.0, 0.0], [2, 0, 1])
+        >>> replace(mixture, order=()).select(draws, np.array([1]), np.array([2]))
+        >>> ndtr(draws[:, 0]).round(6).tolist()
+        [0.166667, 0.833333, 0.833333]
+        >>> EquallyLikely(mixture.members[:1]).select(draws, np.array([0]), np.array([0]))
+        >>> round(float(ndtr(draws[0, 0])), 6)
+        0.166667
+        """
         if not self.several:
             return
         count = len(self.members)
@@ -223,7 +346,26 @@ class EquallyLikely:
         draws[rows, 0] = ndtri((place[members] + 0.5) / count)
 
     def member(self, draws: Array) -> NDArray[np.int64]:
-        """Return the number of the member that each sample selects."""
+        """Return the number of the member that each sample selects.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> mixture, draws = (
+        ...     EquallyLikely((RandomInterface(strength=field),) * 3),
+        ...     np.zeros((4, 2)),
+        ... )
+        >>> draws[:, 0] = ndtri([0.1, 0.6, 0.9, 1.0])
+        >>> draws[3, 0] = 40.0  # has the probability 1 in double precision
+        >>> (
+        ...     mixture.member(draws).tolist(),
+        ...     replace(mixture, order=(1, 2, 0)).member(draws).tolist(),
+        ... )
+        ([0, 1, 2, 2], [1, 2, 0, 0])
+        >>> EquallyLikely(mixture.members[:1]).member(draws).tolist()
+        [0, 0, 0, 0]
+        """
         if not self.several:
             return np.zeros(len(draws), np.int64)
         count = len(self.members)
@@ -239,7 +381,43 @@ class EquallyLikely:
         return draws_of(_shared(self, interface)[0], interface, samples, seed, first)
 
     def from_draws(self, interface: Interface, draws: Array) -> dict[str, Array]:
-        """Map draws (samples, dimension) to profiles (samples, *shape) by name."""
+        """Map draws (samples, dimension) to profiles (samples, *shape) by name.
+
+        Only the first member has the factor of the slip, and only the second
+        has two modes, so it uses the fourth and fifth draw.
+
+        >>> import stiction as st
+        >>> def random(mean, length, between):
+        ...     field = RandomField(
+        ...         st.Lognormal(mean=mean, cv=0.2), st.SquaredExponentialSpectrum(length)
+        ...     )
+        ...     return RandomInterface(strength=field, between=between)
+        >>> factor = st.Lognormal(mean=1.0, cv=0.3)
+        >>> mixture = EquallyLikely(
+        ...     (random(2e6, 0.06, {"critical_slip": factor}), random(3e6, 0.03, None))
+        ... )
+        >>> line = Interface(0.1, 8)
+        >>> draws = mixture.draws(line, samples=4, seed=5, first=2)
+        >>> draws[:, 0] = -1.0, 1.0, 0.5, -0.5
+        >>> profiles = mixture.from_draws(line, draws)
+        >>> first = mixture.members[0].from_draws(line, draws[[0, 3]][:, [1, 2, 5]])
+        >>> second = mixture.members[1].from_draws(line, draws[1:3, 1:5])
+        >>> bool((profiles["strength"][[0, 3]] == first["strength"]).all())
+        True
+        >>> bool((profiles["strength"][1:3] == second["strength"]).all())
+        True
+        >>> slips = profiles["between.critical_slip"]
+        >>> (
+        ...     bool((slips[[0, 3]] == first["between.critical_slip"]).all()),
+        ...     bool((slips[1:3] == 1.0).all()),
+        ... )
+        (True, True)
+        >>> EquallyLikely(mixture.members[1:]).from_draws(line, draws[:, 1:5])["strength"].shape
+        (4, 8)
+        >>> again = mixture.draws(line, samples=6, seed=5)[2:]
+        >>> bool((again[:, 1:] == draws[:, 1:]).all()), mixture.dimension(line)
+        (True, 6)
+        """
         if not self.several:
             return self.members[0].from_draws(interface, draws)
         check_draws(draws, self.dimension(interface))
@@ -264,6 +442,24 @@ def _shared(
 
     Of several members, the first stream selects the member, and a stream
     holds the draws that any member uses.
+
+    The first member has the modes 1 and 2, whose draws have the numbers 2
+    to 5. The second has the mean mode with the number 0, and the mode 1.
+
+    >>> import stiction as st
+    >>> def random(length, mean_mode):
+    ...     spectrum = st.SquaredExponentialSpectrum(length)
+    ...     field = RandomField(st.Lognormal(mean=2e6, cv=0.2), spectrum, mean_mode=mean_mode)
+    ...     return RandomInterface(strength=field)
+    >>> members, line = (random(0.03, False), random(0.06, True)), Interface(0.1, 8)
+    >>> streams, columns = _shared(EquallyLikely(members), line)
+    >>> [(stream.number, stream.numbers.tolist()) for stream in streams], streams[1].columns
+    ([(2000, [0]), (0, [0, 2, 3, 4, 5])], slice(1, 6, None))
+    >>> [column.tolist() for column in columns]
+    [[2, 3, 4, 5], [1, 2, 3]]
+    >>> streams, columns = _shared(EquallyLikely(members[1:]), line)
+    >>> [stream.number for stream in streams], [column.tolist() for column in columns]
+    ([0], [[0, 1, 2]])
     """
     layouts = [layout(member, interface) for member in random.members]
     if not random.several:
@@ -285,13 +481,28 @@ def _shared(
 
 
 def _numbered(entries: Sequence[Any]) -> tuple[list[Any], NDArray[np.int64]]:
-    """Return the different entries, and for each entry its number among them."""
+    """Return the different entries, and for each entry its number among them.
+
+    >>> names, numbers = _numbered(["b", "a", "b", "c", "a"])
+    >>> names, numbers.tolist()
+    (['b', 'a', 'c'], [0, 1, 0, 2, 1])
+    """
     known: dict[Any, int] = {}
     numbers = [known.setdefault(entry, len(known)) for entry in entries]
     return list(known), np.array(numbers, np.int64)
 
 
 def _named(member: RandomInterface) -> str:
+    """Return the properties of an interface for a message.
+
+    >>> from types import SimpleNamespace as Named
+    >>> fields = {
+    ...     "strength": Named(quantity="friction_coefficient"),
+    ...     "critical_slip": Named(quantity=None),
+    ... }
+    >>> _named(Named(properties=fields))
+    'strength (friction_coefficient) and critical_slip'
+    """
     fields = member.properties.items()
     return " and ".join(
         f"{name} ({field.quantity})" if field.quantity else name for name, field in fields
@@ -299,7 +510,23 @@ def _named(member: RandomInterface) -> str:
 
 
 def form_of(field: RandomField) -> Any:
-    """Return a key that is equal for fields whose values are proportional to each other."""
+    """Return a key that is equal for fields whose values are proportional to each other.
+
+    >>> import stiction as st
+    >>> def form(mean=2e6, cv=0.2, length=0.05, **options):
+    ...     spectrum = st.SquaredExponentialSpectrum(length)
+    ...     return form_of(RandomField(st.Lognormal(mean=mean, cv=cv), spectrum, **options))
+    >>> form() == form(mean=3.3e6)
+    True
+    >>> others = [form(cv=0.3), form(length=0.06), form(mean_mode=True), form(anisotropy=2.0)]
+    >>> form() in [*others, form(quantity="friction_coefficient")]
+    False
+    >>> values = {"x": [0.03], "values": [2.1e6]}
+    >>> field = RandomField(st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05))
+    >>> field = field.given(values, noise=1e5)
+    >>> form_of(field) is field
+    True
+    """
     if field.conditions is not None:
         return field
     relative = field.marginal.distribution.ppf(FORM_SHARES) / field.mean
@@ -308,18 +535,50 @@ def form_of(field: RandomField) -> Any:
 
 
 def drawn_from(source: Source, count: int, seed: int) -> EquallyLikely:
-    """Return a mixture that holds `count` interfaces from a source."""
+    """Return a mixture that holds `count` interfaces from a source.
+
+    >>> from types import SimpleNamespace as Named
+    >>> import stiction as st
+    >>> spectrum, asked = st.SquaredExponentialSpectrum(0.05), []
+    >>> fields = [RandomField(st.Lognormal(mean=mean, cv=0.2), spectrum) for mean in (2e6, 3e6)]
+    >>> source = Named(interfaces=lambda count, seed: asked.append((count, seed)) or fields)
+    >>> mixture = drawn_from(source, 2, 7)
+    >>> mixture.means.round().tolist(), mixture.source is source, asked
+    ([2000000.0, 3000000.0], True, [(2, 7)])
+    """
     return EquallyLikely(tuple(_known(list(source.interfaces(count, seed)))), source=source)
 
 
 def specimens_of_fit(random: EquallyLikely) -> int | None:
-    """Return `specimens` of the fit if the strength is its `field` alone, otherwise `None`."""
+    """Return `specimens` of the fit if the strength is its `field` alone, otherwise `None`.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def member(between):
+    ...     return Named(between=between, strength=Named(specimens_of_fit=5), properties={})
+    >>> alone, factor = member(None), member({"strength": "its law"})
+    >>> [specimens_of_fit(EquallyLikely(own)) for own in ((alone,), (factor,), (alone, alone))]
+    [5, None, None]
+    """
     member = random.members[0]
     return None if random.several or member.between else member.strength.specimens_of_fit
 
 
 def as_random(given: Any, seed: int = 0) -> EquallyLikely:
-    """Return one interface, or several from a list or a source."""
+    """Return one interface, or several from a list or a source.
+
+    >>> from types import SimpleNamespace as Named
+    >>> import stiction as st
+    >>> spectrum, asked = st.SquaredExponentialSpectrum(0.05), []
+    >>> fields = [RandomField(st.Lognormal(mean=mean, cv=0.2), spectrum) for mean in (2e6, 3e6)]
+    >>> len(as_random(fields[0]).members), len(as_random(fields).members)
+    (1, 2)
+    >>> mixture = as_random(fields)
+    >>> as_random(mixture) is mixture
+    True
+    >>> source = Named(interfaces=lambda count, seed: asked.append((count, seed)) or fields)
+    >>> as_random(source, 7).source is source, asked
+    (True, [(1000, 7)])
+    """
     known = _known(given)
     if isinstance(known, EquallyLikely):
         return known

@@ -110,7 +110,15 @@ class RandomField(Listed):
 
     @property
     def mean(self) -> float:
-        """Field mean, in its unit (Pa for strength)."""
+        """Field mean, in its unit (Pa for strength).
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.25), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> round(field.mean), round(field.standard_deviation)
+        (2000000, 500000)
+        """
         return float(self.marginal.distribution.mean())
 
     @property
@@ -120,7 +128,22 @@ class RandomField(Listed):
 
     @checked
     def modes(self, interface: Interface) -> Modes:
-        """Return the modes of the field on an interface, or raise an `InputError` without modes."""
+        """Return the modes of the field on an interface, or raise an `InputError` without modes.
+
+        >>> import stiction as st
+        >>> marginal, spectrum = (
+        ...     st.Lognormal(mean=2e6, cv=0.2),
+        ...     st.SquaredExponentialSpectrum(0.05),
+        ... )
+        >>> plane = Interface((0.3, 0.2), (16, 8))
+        >>> field = RandomField(marginal, spectrum, mean_mode=True, anisotropy=0.7)
+        >>> field.modes(plane) is make_modes(spectrum, True, 0.7, plane)
+        True
+        >>> RandomField(marginal, spectrum).modes(plane) is make_modes(
+        ...     spectrum, False, 1.0, plane
+        ... )
+        True
+        """
         if self.anisotropy is not None and not interface.is_plane:
             raise InputError(
                 f"anisotropy: applies to planes only, got {self.anisotropy:g}. Leave it out"
@@ -151,7 +174,26 @@ class RandomField(Listed):
 
     @checked
     def quantile(self, interface: Interface, probability: Share) -> Array:
-        """Return the quantile of the field at each node, given the measured values."""
+        """Return the quantile of the field at each node, given the measured values.
+
+        Where v = 5 + 2 z was measured as 6 with the error 0.5, z has the mean
+        (2 / 0.5) (6 - 5) / 0.5 / 17 and the variance 1 / 17.
+
+        >>> import scipy.stats
+        >>> import stiction as st
+        >>> field = RandomField(scipy.stats.norm(5.0, 2.0), st.SquaredExponentialSpectrum(0.05))
+        >>> known, line = (
+        ...     field.given({"x": [0.025], "values": [6.0]}, noise=0.5),
+        ...     Interface(0.1, 8),
+        ... )
+        >>> at_nodes = known.quantile(line, 0.8)
+        >>> there = 5.0 + 2.0 * (8.0 / 17.0 + float(ndtri(0.8)) / 17.0**0.5)
+        >>> at_nodes.shape, math.isclose(at_nodes[2], there, rel_tol=1e-8)
+        ((8,), True)
+        >>> everywhere = field.quantile(Interface((0.1, 0.2), (8, 10)), 0.8)
+        >>> everywhere.shape, np.allclose(everywhere, 5.0 + 2.0 * float(ndtri(0.8)), rtol=1e-8)
+        ((8, 10), True)
+        """
         mean, deviation = np.zeros(interface.size), np.ones(interface.size)
         if known := conditioning_of(self._alone, interface):
             grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
@@ -169,6 +211,22 @@ class RandomField(Listed):
         Sample i depends on the seed and on i only. An `AccuracyWarning`
         says if the grid is too coarse for the spectrum, or the interface
         too short for a field without mean mode.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.008)
+        ... )
+        >>> line = Interface(0.2, 64)
+        >>> fields, alone = (
+        ...     field.sample(line, samples=5, seed=3),
+        ...     RandomInterface(strength=field),
+        ... )
+        >>> bool((field.sample(line, samples=2, seed=3, first=3) == fields[3:]).all())
+        True
+        >>> bool((alone.profiles(line, samples=5, seed=3)["strength"] == fields).all())
+        True
+        >>> field.sample(line).shape
+        (1, 64)
         """
         self._alone.warn_if_inaccurate(interface)
         profiles = self._alone.profiles(interface, samples=samples, seed=seed, first=first)
@@ -180,7 +238,29 @@ class RandomField(Listed):
         return RandomInterface(strength=self)
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
-        """Warn if the grid is too coarse for the spectrum or the interface too short."""
+        """Warn if the grid is too coarse for the spectrum or the interface too short.
+
+        The modes 1 to 5 hold 5/15, 4/15, ..., 1/15 of the variance. Eight nodes
+        resolve four modes, and a mean mode would hold 3 / (3 + 15).
+
+        >>> import stiction as st
+        >>> from stiction.base.errors import collect_warnings
+        >>> step = 2.0 * math.pi / 0.1
+        >>> spectrum = st.CustomSpectrum(lambda k: np.maximum(6.0 - k / step, 0.0), 5.5 * step)
+        >>> marginal = st.Lognormal(mean=2e6, cv=0.2)
+        >>> def warned(nodes, mean_mode):
+        ...     field = RandomField(marginal, spectrum, mean_mode=mean_mode)
+        ...     with collect_warnings() as texts:
+        ...         field.warn_if_inaccurate(Interface(0.1, nodes))
+        ...     return [str(text) for text in texts]
+        >>> lost, short = warned(8, False)
+        >>> lost[81:122], lost[147:]
+        ('but 6.7 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
+        >>> short[:67]
+        'the field has no mean mode, which would hold 17 % of the variance o'
+        >>> len(warned(8, True)), warned(10, True)
+        (1, [])
+        """
         modes = self.modes(interface)
         lost, short = modes.unresolved
         if lost > MAX_UNRESOLVED:
@@ -211,6 +291,21 @@ class RandomField(Listed):
         `of` selects the mapped field (with a Hermite expansion:
         Grigoriu, 1995) or z. If the tails of the marginal are too
         heavy, an `AccuracyWarning` gives the error.
+
+        A lognormal field has the correlation (exp(s^2 rho) - 1) / (exp(s^2) -
+        1), with s^2 = log(1 + cv^2). A single mode has rho = cos(2 pi x / L).
+
+        >>> import stiction as st
+        >>> spectrum = st.CustomSpectrum(np.ones_like, 100.0)
+        >>> field, line = (
+        ...     RandomField(st.Lognormal(mean=2.0, cv=0.75), spectrum),
+        ...     Interface(0.1, 8),
+        ... )
+        >>> field.correlation(line, of="z").round(6).tolist()
+        [1.0, 0.707107, 0.0, -0.707107, -1.0, -0.707107, 0.0, 0.707107]
+        >>> expected = (1.5625 ** np.cos(math.pi / 4.0 * np.arange(8.0)) - 1.0) / 0.5625
+        >>> np.allclose(field.correlation(line), expected)
+        True
         """
         modes = self.modes(interface)
         origin = np.zeros((len(interface.shape), 1))
@@ -218,6 +313,15 @@ class RandomField(Listed):
         return rho if of == "z" else correlation_of_mapped(rho, self._map_coefficients())
 
     def _map_coefficients(self) -> Array:
+        """Return c_0, c_1, ... of `mapping`, or warn about a large remainder.
+
+        >>> import stiction as st
+        >>> spectrum = st.SquaredExponentialSpectrum(0.05)
+        >>> field = RandomField(st.Lognormal(mean=2.0, cv=0.75), spectrum)
+        >>> s = math.log(1.5625) ** 0.5
+        >>> np.allclose(field._map_coefficients()[:3], [2.0, 2.0 * s, 2.0 * s**2 / 2.0**0.5])
+        True
+        """
         coefficients = hermite_coefficients(self.marginal)
         # The last coefficient represents the
         # terms that the expansion leaves out.
@@ -233,6 +337,18 @@ class RandomField(Listed):
         """Return the distance (m) at which the correlation of the field first falls to 1/e.
 
         `spectrum.efolding_length` is the distance for z. On a plane, it is along x.
+
+        A lognormal field has the correlation 1/e where (1 + cv^2)^rho = 1 +
+        cv^2 / e.
+
+        >>> import stiction as st
+        >>> spectrum = st.SquaredExponentialSpectrum(0.05)
+        >>> field = RandomField(st.Lognormal(mean=2.0, cv=0.75), spectrum)
+        >>> rho = math.log(1.0 + 0.5625 / math.e) / math.log(1.5625)
+        >>> math.isclose(
+        ...     field.efolding_length(), lag_of_correlation(spectrum, rho), rel_tol=1e-6
+        ... )
+        True
         """
         coefficients = self._map_coefficients()
 
@@ -245,7 +361,23 @@ class RandomField(Listed):
 
 
 def _pairs(value: Any) -> Any:
-    """Return {("a", "b"): rho} or {"a": {"b": rho}} as {"a": {"b": rho}}, in the order of names."""
+    """Return {("a", "b"): rho} or {"a": {"b": rho}} as {"a": {"b": rho}}, in the order of names.
+
+    >>> _pairs({("residual_strength", "strength"): 0.5, "critical_slip": {"strength": 0.25}})
+    {'strength': {'residual_strength': 0.5, 'critical_slip': 0.25}}
+    >>> _pairs({("stength", "strength"): 0.5, "initial_stress": {"a": 1, "strength": 2}})
+    {'strength': {'stength': 0.5, 'initial_stress': 2}, 'initial_stress': {'a': 1}}
+    >>> _pairs(3.0)
+    3.0
+    >>> _pairs({"strength": 0.5})
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must name two different properties, got 'strength'
+    >>> _pairs({("strength", "normal_pressure", "a"): 0.5})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must name two different properties, got ('strength', ...)
+    """
     if not isinstance(value, Mapping):
         return value
     pairs: dict[str, dict[str, Any]] = {}
@@ -334,7 +466,18 @@ class RandomInterface(Listed):
     @field_validator(*NAMES, mode="before")
     @classmethod
     def _name_quantity(cls, field: Any, info: ValidationInfo) -> Any:
-        """Pass the quantity of a measured profile to the reader of a study file."""
+        """Pass the quantity of a measured profile to the reader of a study file.
+
+        >>> from types import SimpleNamespace as Named
+        >>> info, field = Named(context={}, field_name="critical_slip"), {"quantity": None}
+        >>> RandomInterface._name_quantity(field, info) is field, info.context
+        (True, {'quantity': 'critical_slip'})
+        >>> _ = RandomInterface._name_quantity({"quantity": "friction_coefficient"}, info)
+        >>> info.context
+        {'quantity': 'friction_coefficient'}
+        >>> RandomInterface._name_quantity({}, Named(context=None, field_name="critical_slip"))
+        {}
+        """
         if info.context is not None and isinstance(field, dict):
             of_stress = field.get("quantity") is None
             info.context["quantity"] = info.field_name if of_stress else "friction_coefficient"
@@ -388,18 +531,63 @@ class RandomInterface(Listed):
 
     @property
     def varying(self) -> set[str]:
-        """Names of what differs from sample to sample: random, or with a factor."""
+        """Names of what differs from sample to sample: random, or with a factor.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> factors = dict.fromkeys(
+        ...     ["pressing_force", "strength", "critical_slip"], st.Lognormal(mean=1.0, cv=0.1)
+        ... )
+        >>> sorted(RandomInterface(strength=field, between=factors).varying)
+        ['critical_slip', 'normal_pressure', 'strength']
+        >>> RandomInterface(strength=field).varying
+        {'strength'}
+        """
         pressed = {"pressing_force": "normal_pressure"}
         return {*self.names, *(pressed.get(name, name) for name in self.between or ())}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the random properties."""
+        """Names of the random properties.
+
+        >>> import stiction as st
+        >>> spectrum = st.SquaredExponentialSpectrum(0.05)
+        >>> a, b = (
+        ...     RandomField(st.Lognormal(mean=mean, cv=0.2), spectrum) for mean in (2e6, 3e6)
+        ... )
+        >>> random = RandomInterface(normal_pressure=a, strength=b)
+        >>> random.properties == {"strength": b, "normal_pressure": a}, random.names
+        (True, ('strength', 'normal_pressure'))
+        """
         return tuple(self.properties)
 
     @property
     def matrix(self) -> Array:
-        """Correlation matrix of the properties, in the order `names`."""
+        """Correlation matrix of the properties, in the order `names`.
+
+        The strength is linked with the pressure through the initial stress.
+
+        >>> import stiction as st
+        >>> field = RandomField(
+        ...     st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05)
+        ... )
+        >>> random = RandomInterface(
+        ...     strength=field,
+        ...     residual_strength=field,
+        ...     initial_stress=field,
+        ...     normal_pressure=field,
+        ...     correlation={
+        ...         ("strength", "initial_stress"): 0.5,
+        ...         ("initial_stress", "normal_pressure"): -0.25,
+        ...     },
+        ... )
+        >>> random.matrix.tolist()
+        [[1.0, 0.0, 0.5, 0.0], [0.0, 1.0, 0.0, 0.0], [0.5, 0.0, 1.0, -0.25], [0.0, 0.0, -0.25, 1.0]]
+        >>> random.linked.astype(int).tolist()
+        [[1, 0, 1, 1], [0, 1, 0, 0], [1, 0, 1, 1], [1, 0, 1, 1]]
+        """
         matrix = np.eye(len(self.names))
         for first, coefficients in (self.correlation or {}).items():
             for second, rho in coefficients.items():
@@ -413,7 +601,20 @@ class RandomInterface(Listed):
         return np.linalg.matrix_power(self.matrix != 0.0, len(self.names))
 
     def dimension(self, interface: Interface) -> int:
-        """Count the standard normal draws in a sample."""
+        """Count the standard normal draws in a sample.
+
+        >>> import stiction as st
+        >>> spectrum = st.CustomSpectrum(np.ones_like, 130.0)  # the modes 1 and 2
+        >>> field, factor = (
+        ...     RandomField(st.Lognormal(mean=2e6, cv=0.2), spectrum),
+        ...     st.Lognormal(mean=1.0, cv=0.1),
+        ... )
+        >>> random = RandomInterface(
+        ...     strength=field, between={"strength": factor, "critical_slip": factor}
+        ... )
+        >>> random.dimension(Interface(0.1, 8))
+        6
+        """
         return int(layout(self, interface)[-1].columns.stop)
 
     @checked
@@ -426,6 +627,15 @@ class RandomInterface(Listed):
         j) only. The result has shape (samples, dimension). It holds the
         draws for the properties in the order of `names`, and then the
         draws for `between`.
+
+        >>> import stiction as st
+        >>> spectrum, line = st.CustomSpectrum(np.ones_like, 130.0), Interface(0.1, 8)
+        >>> random = RandomInterface(
+        ...     strength=RandomField(st.Lognormal(mean=2e6, cv=0.2), spectrum)
+        ... )
+        >>> draws = random.draws(line, 5, 7)
+        >>> draws.shape, bool((random.draws(line, 2, 7, 3) == draws[3:]).all())
+        ((5, 4), True)
         """
         return draws_of(layout(self, interface), interface, samples, seed, first)
 
@@ -435,6 +645,30 @@ class RandomInterface(Listed):
 
         For a property that is not random, the name is `FACTOR` followed
         by the property.
+
+        A single mode has the draws of cos(2 pi x / L) and sin(2 pi x / L). The
+        residual strength has its own draws times 0.8, and the strength's times
+        0.6. A factor with cv = 0.75 has the median 0.8.
+
+        >>> import scipy.stats
+        >>> import stiction as st
+        >>> spectrum, line = st.CustomSpectrum(np.ones_like, 100.0), Interface(0.1, 8)
+        >>> factor = st.Lognormal(mean=1.0, cv=0.75)
+        >>> random = RandomInterface(
+        ...     strength=RandomField(scipy.stats.norm(5.0, 2.0), spectrum),
+        ...     residual_strength=RandomField(scipy.stats.norm(30.0, 10.0), spectrum),
+        ...     correlation={("strength", "residual_strength"): 0.6},
+        ...     between={"critical_slip": factor, "pressing_force": factor, "strength": factor},
+        ... )
+        >>> draws = np.zeros((2, 7))
+        >>> draws[0] = 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0
+        >>> profiles = random.from_draws(line, draws)
+        >>> for name, rows in profiles.items():
+        ...     print(name, rows.shape, rows[:, 2:8:2].round(4).tolist())
+        strength (2, 8) [[4.0, 2.4, 4.0], [4.0, 4.0, 4.0]]
+        residual_strength (2, 8) [[38.0, 24.0, 22.0], [30.0, 30.0, 30.0]]
+        between.critical_slip (2, 8) [[1.5603, 1.5603, 1.5603], [0.8, 0.8, 0.8]]
+        between.normal_pressure (2, 8) [[0.8, 0.8, 0.8], [0.8, 0.8, 0.8]]
         """
         check_draws(draws, self.dimension(interface))
         streams = layout(self, interface)
@@ -470,11 +704,42 @@ class RandomInterface(Listed):
         """Return sampled profiles (samples, *shape) by name.
 
         Sample i depends on the seed and on i only.
+
+        >>> import stiction as st
+        >>> spectrum, line = st.CustomSpectrum(np.ones_like, 130.0), Interface(0.1, 8)
+        >>> random = RandomInterface(
+        ...     strength=RandomField(st.Lognormal(mean=2e6, cv=0.2), spectrum)
+        ... )
+        >>> fields = random.from_draws(line, random.draws(line, 2, 7, 3))["strength"]
+        >>> bool(
+        ...     (random.profiles(line, samples=2, seed=7, first=3)["strength"] == fields).all()
+        ... )
+        True
         """
         return self.from_draws(interface, self.draws(interface, samples, seed, first))
 
     def warn_if_inaccurate(self, interface: Interface) -> None:
-        """Warn if the grid is too coarse or the interface too short for a field."""
+        """Warn if the grid is too coarse or the interface too short for a field.
+
+        >>> import stiction as st
+        >>> from stiction.base.errors import collect_warnings
+        >>> marginal, line = st.Lognormal(mean=2e6, cv=0.2), Interface(0.2, 64)
+        >>> good, short = (
+        ...     RandomField(marginal, st.SquaredExponentialSpectrum(xi)) for xi in (0.008, 0.05)
+        ... )
+        >>> unlikely = good.given(
+        ...     {"x": [0.01, 0.02, 0.03], "values": [9e6, 9e6, 9e6]}, noise=1e4
+        ... )
+        >>> for residual in (good, short, unlikely):
+        ...     with collect_warnings() as texts:
+        ...         RandomInterface(
+        ...             strength=good, residual_strength=residual
+        ...         ).warn_if_inaccurate(line)
+        ...     print([str(text)[:41] for text in texts])
+        []
+        ['the field has no mean mode, which would h']
+        ['conditions: the measured values are unlik']
+        """
         for field in self.properties.values():
             field.warn_if_inaccurate(interface)
         if known := conditioning_of(self, interface):
@@ -482,7 +747,18 @@ class RandomInterface(Listed):
 
 
 def check_draws(draws: Array, dimension: int) -> None:
-    """Raise an `InputError` unless draws are finite and have shape (samples, dimension)."""
+    """Raise an `InputError` unless draws are finite and have shape (samples, dimension).
+
+    >>> check_draws(np.zeros((2, 3)), 3)
+    >>> check_draws(np.zeros((3, 2)), 3)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: draws: must have shape (samples, 3), got (3, 2)
+    >>> check_draws(np.zeros(3), 3)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: draws: must have shape (samples, 3), got (3,)
+    """
     if draws.ndim != 2 or draws.shape[1] != dimension:
         raise InputError(f"draws: must have shape (samples, {dimension}), got {draws.shape}")
     if not np.isfinite(draws).all():
@@ -490,7 +766,14 @@ def check_draws(draws: Array, dimension: int) -> None:
 
 
 def as_random_interface(given: Any) -> RandomInterface:
-    """Return a `RandomInterface`. A `RandomField` becomes its strength."""
+    """Return a `RandomInterface`. A `RandomField` becomes its strength.
+
+    >>> import stiction as st
+    >>> field = RandomField(st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.05))
+    >>> random = as_random_interface(field)
+    >>> random.strength is field, as_random_interface(random) is random
+    (True, True)
+    """
     if isinstance(given, RandomField):
         return RandomInterface(strength=given)
     if not isinstance(given, RandomInterface):

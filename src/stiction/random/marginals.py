@@ -48,7 +48,22 @@ class Marginal(Listed):
         """Frozen `scipy.stats` distribution of the marginal."""
 
     def check_moments(self, given: object = "") -> None:
-        """Raise an `InputError` unless the distribution is frozen and its moments are finite."""
+        """Raise an `InputError` unless the distribution is frozen and its moments are finite.
+
+        >>> from types import SimpleNamespace as Named
+        >>> def check(law):
+        ...     try:
+        ...         Marginal.check_moments(Named(distribution=law, type="own"), "mine")
+        ...     except InputError as error:
+        ...         return str(error)[:70]
+        >>> check(scipy.stats.norm(2.0, 0.5))
+        >>> check(scipy.stats.norm)
+        'own: its distribution must be frozen, such as scipy.stats.norm(1e6, 2e'
+        >>> check(scipy.stats.cauchy(2.0, 0.5)) == check(scipy.stats.pareto(1.5))  # no variance
+        True
+        >>> check(scipy.stats.pareto(1.5))
+        'own: must have a finite mean and a positive, finite standard deviation'
+        """
         distribution = self.distribution
         if not hasattr(distribution, "dist"):
             raise InputError(
@@ -65,6 +80,11 @@ class Marginal(Listed):
 
 @cache
 def _frozen_once(family: Any) -> Any:
+    """Return a frozen distribution, whose shapes do not matter.
+
+    >>> _frozen_once(scipy.stats.beta).args
+    (1.0, 1.0)
+    """
     return family(*[1.0] * family.numargs)
 
 
@@ -73,6 +93,16 @@ def frozen(family: Any, *args: float) -> Any:
 
     scipy generates the documentation of each new frozen distribution,
     which takes a millisecond. A copy has the same documentation.
+
+    >>> law = frozen(scipy.stats.truncnorm, -1.0, 2.0, 10.0, 3.0)
+    >>> (
+    ...     [float(end) for end in law.support()],
+    ...     float(law.cdf(10.0))
+    ...     == float(scipy.stats.truncnorm(-1.0, 2.0, 10.0, 3.0).cdf(10.0)),
+    ... )
+    ([7.0, 16.0], True)
+    >>> [float(end) for end in frozen(scipy.stats.uniform, 3.0, 2.0).support()], law.args
+    ([3.0, 5.0], (-1.0, 2.0, 10.0, 3.0))
     """
     distribution = copy(_frozen_once(family))
     distribution.args = args
@@ -97,6 +127,10 @@ class Beta(Marginal):
     >>> import stiction as st
     >>> float(st.Beta(alpha=1.0, beta=1.0, low=1e6, high=2e6).distribution.mean())  # uniform
     1500000.0
+
+    >>> law = Beta(alpha=1.0, beta=3.0, low=2.0, high=6.0).distribution
+    >>> float(law.mean()), [float(end) for end in law.support()]
+    (3.0, [2.0, 6.0])
     """
 
     alpha: Positive
@@ -119,7 +153,18 @@ class Beta(Marginal):
 
 @model(kw_only=True)
 class _ByMoments(Marginal):
-    """Families above a lower bound, described by the mean and the coefficient of variation."""
+    """Families above a lower bound, described by the mean and the coefficient of variation.
+
+    All families have the mean and the deviation, whatever the bound is.
+
+    >>> for family in (Lognormal, Weibull, Gamma, TruncatedNormal):
+    ...     law = family(mean=3.0, cv=0.25, low=1.0).distribution
+    ...     print(f"{law.mean():.6f} {law.std():.6f} {law.support()[0]:.6f}")
+    3.000000 0.750000 1.000000
+    3.000000 0.750000 1.000000
+    3.000000 0.750000 1.000000
+    3.000000 0.750000 1.000000
+    """
 
     mean: Annotated[Positive, Field(gt=1e-18, lt=1e18)]
     cv: Annotated[Positive, Field(gt=1e-9)]
@@ -127,6 +172,18 @@ class _ByMoments(Marginal):
 
     @model_validator(mode="after")
     def _has_a_distribution(self) -> Self:
+        """Accept a mean above `low` and a cv of at most 10, with a warning above 1.
+
+        >>> from stiction.base.errors import collect_warnings
+        >>> with collect_warnings() as texts:
+        ...     laws = Gamma(mean=3.0, cv=1.0), Gamma(mean=3.0, cv=2.5)
+        >>> [str(text) for text in texts]
+        ['cv: is a standard deviation over a mean, at most 10, got 2.5 (for 2.5 % give 0.025)']
+        >>> Gamma(mean=3.0, cv=10.5)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: Gamma: cv: ..., got 10.5 (for 10.5 % give 0.105)
+        """
         if not self.mean > self.low:
             raise InputError(f"mean must be above low, got {self.mean:g} and {self.low:g}")
         hint = (
@@ -181,10 +238,26 @@ class Lognormal(_ByMoments):
     _scipy_family: ClassVar[Any] = scipy.stats.lognorm
 
     def _shape(self, ratio: float) -> tuple[float, float]:
+        """Return the deviation s of the logarithm, and exp(s^2 / 2).
+
+        >>> shape, mean_over_scale = Lognormal(mean=2.0, cv=0.1)._shape(0.75)
+        >>> round(shape**2, 9) == round(math.log(1.5625), 9), mean_over_scale
+        (True, 1.25)
+        """
         return math.sqrt(math.log1p(ratio**2)), math.sqrt(1.0 + ratio**2)
 
     def of_normal(self, z: Array) -> Array:
-        """Return F^-1(Phi(z)), the mapping of standard normal numbers, in closed form."""
+        """Return F^-1(Phi(z)), the mapping of standard normal numbers, in closed form.
+
+        The median is 1 / 1.25 above `low`.
+
+        >>> marginal, z = Lognormal(mean=2.0, cv=0.375, low=1.0), np.array([0.0, -2.5, 1.0])
+        >>> marginal.of_normal(z)[:1].tolist()
+        [1.8]
+        >>> expected = marginal.distribution.ppf(scipy.stats.norm.cdf(z))
+        >>> np.allclose(marginal.of_normal(z), expected, rtol=1e-9)
+        True
+        """
         above = self.mean - self.low
         shape, mean_over_scale = self._shape(self.cv * self.mean / above)
         return self.low + above / mean_over_scale * np.exp(shape * z)
@@ -199,6 +272,22 @@ class Weibull(_ByMoments):
     _scipy_family: ClassVar[Any] = scipy.stats.weibull_min
 
     def _shape(self, ratio: float) -> tuple[float, float]:
+        """Return the shape k, and Gamma(1 + 1/k). The shapes 1 and 2 belong to the
+        exponential and the Rayleigh distribution.
+
+        >>> marginal = Weibull(mean=2.0, cv=0.1)
+        >>> [round(number, 9) for number in marginal._shape(1.0)]
+        [1.0, 1.0]
+        >>> shape, mean_over_scale = marginal._shape(math.sqrt(4.0 / math.pi - 1.0))
+        >>> round(shape, 9), round(mean_over_scale**2, 9) == round(math.pi / 4.0, 9)
+        (2.0, True)
+        >>> def ratio(shape):
+        ...     return math.sqrt(
+        ...         math.gamma(1.0 + 2.0 / shape) / math.gamma(1.0 + 1.0 / shape) ** 2 - 1.0
+        ...     )
+        >>> [round(ratio(marginal._shape(given)[0]), 7) for given in (9.99, 0.3, 0.00101)]
+        [9.99, 0.3, 0.00101]
+        """
         if not 1e-3 < ratio < 10.0:
             raise InputError(f"cv: must be 0.001 to 10 times mean - low, got {ratio:g}")
 
@@ -223,6 +312,11 @@ class Gamma(_ByMoments):
     _scipy_family: ClassVar[Any] = scipy.stats.gamma
 
     def _shape(self, ratio: float) -> tuple[float, float]:
+        """Return the shape twice, because the mean is the shape times the scale.
+
+        >>> Gamma(mean=2.0, cv=0.1)._shape(0.5)
+        (4.0, 4.0)
+        """
         return ratio**-2, ratio**-2
 
 
@@ -247,6 +341,22 @@ class TruncatedNormal(_ByMoments):
     >>> marginal = st.TruncatedNormal(mean=1e6, cv=0.2, low=0.5e6, high=1.5e6)
     >>> round(float(marginal.distribution.median()))
     1000000
+
+    >>> law = TruncatedNormal(mean=2.0, cv=0.2, low=1.5, high=4.0).distribution
+    >>> f"{law.mean():.6f} {law.std():.6f}", [round(float(end), 6) for end in law.support()]
+    ('2.000000 0.400000', [1.5, 4.0])
+
+    An exponential distribution has cv = 1, and a uniform one on [0, 2] has
+    the variance 1/3. No truncated normal distribution scatters more.
+
+    >>> round(float(TruncatedNormal(mean=2.0, cv=0.98).distribution.std()), 6)
+    1.96
+    >>> round(float(TruncatedNormal(mean=1.0, cv=0.57, high=2.0).distribution.std()), 6)
+    0.57
+    >>> TruncatedNormal(mean=1.0, cv=0.58, high=2.0)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ...cv: no normal distribution between low=0 and high=2 has ...
     """
 
     high: Real | None = None
@@ -288,6 +398,17 @@ class ScipyMarginal(Marginal):
     A distribution without a name in scipy is kept `frozen`. Such a
     distribution cannot be written to a study file, and equals only
     itself.
+
+    >>> marginal = ScipyMarginal("uniform", (("loc", 1.0), ("scale", 3.0)))
+    >>> float(marginal.distribution.mean()), marginal.plain()
+    (2.5, {'type': 'uniform', 'loc': 1.0, 'scale': 3.0})
+    >>> law = scipy.stats.norm(2.0, 0.5)
+    >>> ScipyMarginal("own", frozen=law).distribution is law
+    True
+    >>> ScipyMarginal("own", frozen=law).plain()
+    Traceback (most recent call last):
+    ...
+    ValueError: marginal is the Python distribution 'own', which scipy does not know
     """
 
     type: str
@@ -324,6 +445,28 @@ def affine_parameters(marginal: Any) -> tuple[tuple[str, ...], float, float]:
 
     The distribution of (tau_p - a)/b does not depend on these
     parameters. a and b are linear in them.
+
+    >>> affine_parameters(Beta(alpha=1.5, beta=2.5, low=3.0, high=7.0))
+    (('low', 'high'), 3.0, 4.0)
+    >>> affine_parameters(ScipyMarginal("norm", (("loc", 3.0), ("scale", 0.5))))
+    (('loc', 'scale'), 3.0, 0.5)
+    >>> affine_parameters(ScipyMarginal("lognorm", (("s", 0.5),)))
+    (('loc', 'scale'), 0.0, 1.0)
+    >>> (
+    ...     affine_parameters(Weibull(mean=3.0, cv=0.2)),
+    ...     affine_parameters(TruncatedNormal(mean=3.0, cv=0.2)),
+    ... )
+    ((('mean',), 0.0, 3.0), (('mean',), 0.0, 3.0))
+
+    The bounds of other marginals do not move with the mean:
+
+    >>> others = (
+    ...     Weibull(mean=3.0, cv=0.2, low=1.0),
+    ...     TruncatedNormal(mean=3.0, cv=0.2, high=6.0),
+    ...     ScipyMarginal("own", frozen=scipy.stats.norm(2.0, 0.5)),
+    ... )
+    >>> {affine_parameters(marginal) for marginal in others}
+    {((), 0.0, 1.0)}
     """
     if isinstance(marginal, Beta):
         return ("low", "high"), marginal.low, marginal.high - marginal.low
@@ -346,6 +489,33 @@ def marginal_of(value: Any) -> Marginal:
 
     Raises an `InputError` for any other value, or if a moment is not
     finite.
+
+    >>> marginal = marginal_of(
+    ...     {"type": "beta", "alpha": 1.5, "beta": 2.5, "low": 3.0, "high": 7.0}
+    ... )
+    >>> (
+    ...     marginal == Beta(alpha=1.5, beta=2.5, low=3.0, high=7.0),
+    ...     marginal_of(marginal) is marginal,
+    ... )
+    (True, True)
+    >>> of_scipy = {"type": "beta", "a": 1.5, "b": 2.5, "loc": 3.0, "scale": 4.0}
+    >>> marginal_of(of_scipy).parameters
+    (('a', 1.5), ('b', 2.5), ('loc', 3.0), ('scale', 4.0))
+    >>> marginal_of(of_scipy) == marginal_of(scipy.stats.beta(1.5, 2.5, loc=3.0, scale=4.0))
+    True
+    >>> marginal_of({"type": "norm", "loc": 3.0}).type
+    'norm'
+
+    A histogram has no name in scipy.
+
+    >>> law = scipy.stats.rv_histogram(([3, 1], [2.0, 4.0, 6.0]))
+    >>> marginal = marginal_of(scipy.stats._distn_infrastructure.rv_continuous_frozen(law))
+    >>> marginal.type, float(marginal.distribution.mean())
+    ('rv_histogram', 3.5)
+    >>> marginal_of(scipy.stats.poisson(3.0))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must be st.Beta(...), st.Lognormal(...) or a frozen ...
     """
     if isinstance(value, Marginal):
         # Families of this package have finite moments by construction.
@@ -375,6 +545,16 @@ def _of_scipy(name: str, given: Mapping[str, Any], first: tuple[Any, ...] = ()) 
     """Return the marginal from a scipy family, by name and parameters.
 
     `first` are in order.
+
+    >>> _of_scipy("truncnorm", {"scale": 0.5}, (-2.0, 3.0, 7.0)).parameters
+    (('a', -2.0), ('b', 3.0), ('loc', 7.0), ('scale', 0.5))
+    >>> _of_scipy("norm", {}, (7.0, 0.5)).parameters
+    (('loc', 7.0), ('scale', 0.5))
+    >>> _of_scipy("beta", {"a": 2.0, "sacle": 3.0})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: beta: unknown 'sacle'; did you mean 'scale'? (valid: ...)
+    beta.b: missing
     """
     family = getattr(scipy.stats, name, None)
     if not isinstance(family, scipy.stats.rv_continuous):

@@ -69,11 +69,27 @@ class SpectralDensity(Listed):
 
     @property
     def scale(self) -> float:
-        """Wavenumber (rad/m) at which the integration by octaves begins."""
+        """Wavenumber (rad/m) at which the integration by octaves begins.
+
+        >>> CustomSpectrum(np.ones_like, 3000.0).scale
+        0.003
+        """
         return 1e-6 * self.cutoff()
 
     def correlation(self, lag: Array) -> Array:
-        """Return the correlation at `lag` (m) on a line, with truncation."""
+        """Return the correlation at `lag` (m) on a line, with truncation.
+
+        A constant density up to K has the correlation sin(K x) / (K x).
+
+        >>> spectrum = CustomSpectrum(lambda k: 7.0 + 0.0 * k, 4.0)
+        >>> spectrum.correlation(np.array([[0.0, 0.3], [-0.3, 1.0]])).round(6).tolist()
+        [[1.0, 0.776699], [0.776699, -0.189201]]
+        >>> round(math.sin(1.2) / 1.2, 6), round(math.sin(4.0) / 4.0, 6)
+        (0.776699, -0.189201)
+        >>> length = spectrum.efolding_length
+        >>> round(math.sin(4.0 * length) / (4.0 * length) * math.e, 9)
+        1.0
+        """
         edges, power = _truncated(self)
         lags = np.abs(np.ravel(lag)).tolist()
         integrals = [_integrate(self, edges, lag=lag, power=power) for lag in lags]
@@ -96,6 +112,19 @@ def _integrate(
 
     The tolerance is 1e-12 of `power`, or
     of each piece if `power` is not known.
+
+    >>> spectrum, edges = (
+    ...     CustomSpectrum(lambda k: 7.0 + 0.0 * k, 4.0),
+    ...     np.array([0.0, 1.0, 4.0]),
+    ... )
+    >>> [
+    ...     round(_integrate(spectrum, edges, order), 9) for order in (0, 1, 2)
+    ... ]  # 7 k^(m+1) / (m + 1)
+    [28.0, 56.0, 149.333333333]
+    >>> round(_integrate(spectrum, edges, lag=0.3, power=28.0), 9) == round(
+    ...     7.0 / 0.3 * math.sin(1.2), 9
+    ... )
+    True
     """
     options: dict[str, Any] = {"weight": "cos", "wvar": lag} if lag > 0.0 else {}
     options |= {"epsabs": INTEGRAL_RTOL * power, "epsrel": INTEGRAL_RTOL}
@@ -118,7 +147,21 @@ def _integrate(
 
 @lru_cache(maxsize=256)
 def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
-    """Return the ends of octaves up to the cutoff, rad/m, and the power below the cutoff."""
+    """Return the ends of octaves up to the cutoff, rad/m, and the power below the cutoff.
+
+    The density 1 / (1 + k^2) has the power arctan(K), and is truncated where
+    99 % of pi/2 are kept.
+
+    >>> edges, power = _truncated(ExponentialSpectrum(1.0))
+    >>> edges[:-1].tolist(), round(float(edges[-1]), 5) == round(math.tan(0.495 * math.pi), 5)
+    ([0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0], True)
+    >>> round(power / math.pi, 9)
+    0.495
+    >>> _truncated(PowerLawSpectrum(2.0 * math.pi))[0].tolist()
+    [0.0, 0.5, 1.0, 2.0, 2.5]
+    >>> _truncated(SquaredExponentialSpectrum(1.0, power_kept=0.01))[0].round(6).tolist()
+    [0.0, 0.017725]
+    """
     scale, end = spectrum.scale, spectrum.cutoff()
     # From half the scale on, each piece ends at twice the wavenumber of
     # the piece before.
@@ -129,7 +172,21 @@ def _truncated(spectrum: SpectralDensity) -> tuple[Array, float]:
 
 @lru_cache(maxsize=256)
 def lag_of_correlation(spectrum: SpectralDensity, target: float) -> float:
-    """Step 2: return the first lag (m) at which the correlation on a line falls to `target`."""
+    """Step 2: return the first lag (m) at which the correlation on a line falls to `target`.
+
+    >>> spectrum = CustomSpectrum(lambda k: 7.0 + 0.0 * k, 4.0)
+    >>> lag = lag_of_correlation(spectrum, 0.2)
+    >>> round(math.sin(4.0 * lag) / (4.0 * lag), 9), 4.0 * lag < math.pi
+    (0.2, True)
+
+    This density has its power near 50 rad/m. The correlation oscillates,
+    almost as exp(-x^2) cos(50 x), and 0.5 is first reached near 50 x = pi/3:
+
+    >>> narrow = CustomSpectrum(lambda k: np.exp(-0.25 * (k - 50.0) ** 2), 60.0)
+    >>> lag = lag_of_correlation(narrow, 0.5)
+    >>> round(50.0 * lag, 2), round(math.exp(-(lag**2)) * math.cos(50.0 * lag), 6)
+    (1.05, 0.5)
+    """
     # The slope of the correlation is at most the mean wavenumber.
     # Between lags that are close against the root mean square of the
     # wavelengths, it is nearly straight. March in such steps until it
@@ -180,21 +237,58 @@ class ScaledSpectrum(SpectralDensity):
 
     @property
     def scale(self) -> float:
-        """Wavenumber, rad/m, with which all spectra of a class scale."""
+        """Wavenumber, rad/m, with which all spectra of a class scale.
+
+        >>> SquaredExponentialSpectrum(0.25).scale, PowerLawSpectrum(0.5).scale / math.pi
+        (4.0, 4.0)
+        """
         return 1.0 / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber below which the kept power lies, rad/m.
+
+        >>> spectrum = ExponentialSpectrum(0.5, power_kept=0.5)  # 2/pi arctan(k / 2) on a line
+        >>> (
+        ...     round(spectrum.cutoff(), 9),
+        ...     round(spectrum.cutoff(2) ** 2, 9),
+        ... )  # 1 - (1 + k^2/4)^-0.5
+        (2.0, 12.0)
+        >>> round(
+        ...     SquaredExponentialSpectrum(0.5).power_within(
+        ...         SquaredExponentialSpectrum(0.5).cutoff()
+        ...     ),
+        ...     9,
+        ... )
+        0.9997
+        """
         return self.quantile(self.power_kept or self.default_power, dimensions)
 
     @property
     def efolding_length(self) -> float:
         # Search once for each shape, as a sweep may hold a hundred
         # thousand lengths.
+        """Distance, m, at which the correlation of z first falls to 1/e. It scales with the length.
+
+        >>> round(
+        ...     PowerLawSpectrum(0.03).efolding_length / PowerLawSpectrum(1.0).efolding_length,
+        ...     9,
+        ... )
+        0.03
+        >>> round(SquaredExponentialSpectrum(0.03, power_kept=1 - 1e-12).efolding_length, 6)
+        0.03
+        """
         unit = dataclasses.replace(self, correlation_length=1.0)
         return self.correlation_length * lag_of_correlation(unit, math.exp(-1.0))
 
     def with_efolding_length(self, length: float) -> Any:
-        """Return a spectrum of the same shape whose z has the e-folding length `length` (m)."""
+        """Return a spectrum of the same shape whose z has the e-folding length `length` (m).
+
+        >>> spectrum = PowerLawSpectrum(
+        ...     0.03, exponent=2.0, power_kept=0.9
+        ... ).with_efolding_length(0.5)
+        >>> round(spectrum.efolding_length, 9), spectrum.exponent, spectrum.power_kept
+        (0.5, 2.0, 0.9)
+        """
         xi = self.correlation_length * length / self.efolding_length
         return dataclasses.replace(self, correlation_length=xi)
 
@@ -205,17 +299,51 @@ class _PowerOfWavenumber(ScaledSpectrum):
     exponent = 1.0
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return the density, here of the scale 2 and the exponent 1.5.
+
+        >>> spectrum = PowerLawSpectrum(math.pi, exponent=1.5)  # scale 2
+        >>> spectrum.density(np.array([0.0, 2.0])).round(6).tolist()
+        [1.0, 0.353553]
+        >>> spectrum.density(np.array([0.0, 2.0]), 2).round(6).tolist()
+        [1.0, 0.25]
+        """
         ratio = wavenumber / self.scale
         return (1.0 + ratio * ratio) ** -(self.exponent + 0.5 * (dimensions - 1))
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
         # The power is a beta integral in t = k^2/(scale^2 + k^2).
+        """Return the fraction of the power at shorter wave vectors.
+
+        On a plane with the exponent n, the fraction is 1 - (1 + (k/scale)^2)^(1/2
+        - n).
+
+        >>> exponential, spectrum = (
+        ...     ExponentialSpectrum(0.5),
+        ...     PowerLawSpectrum(math.pi, exponent=2.0),
+        ... )
+        >>> (
+        ...     round(exponential.power_within(2.0), 9),
+        ...     round(exponential.power_within(12.0**0.5, 2), 9),
+        ... )
+        (0.5, 0.5)
+        >>> round(spectrum.power_within(12.0**0.5, 2), 9)
+        0.875
+        """
         ratio = (wavenumber / self.scale) ** 2
         return float(betainc(0.5 * dimensions, self.exponent - 0.5, ratio / (1.0 + ratio)))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
         # The complement 1 - t of the incomplete beta function avoids
         # cancellation for t near 1.
+        """Return the wavenumber below which a fraction of the power lies, as `power_within` says.
+
+        >>> exponential, spectrum = (
+        ...     ExponentialSpectrum(0.5),
+        ...     PowerLawSpectrum(math.pi, exponent=2.0),
+        ... )
+        >>> round(exponential.quantile(0.5), 9), round(spectrum.quantile(0.875, 2) ** 2, 9)
+        (2.0, 12.0)
+        """
         complement = float(betaincinv(self.exponent - 0.5, 0.5 * dimensions, 1.0 - share))
         return self.scale * math.sqrt((1.0 - complement) / complement)
 
@@ -261,6 +389,21 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return 2.0 * math.pi / self.correlation_length
 
     def cutoff(self, dimensions: int = 1) -> float:
+        """Return the wavenumber at the truncation, rad/m.
+
+        With the exponent 2 on a plane, 0.875 is kept below 3^0.5 lambda.
+
+        >>> scale = PowerLawSpectrum(0.1).scale
+        >>> kept = PowerLawSpectrum(0.1, exponent=2.0, power_kept=0.875)
+        >>> round((kept.cutoff(2) / scale) ** 2, 9)
+        3.0
+        >>> exponents = (4.0, 9.0, 0.6, 2.0)
+        >>> ratios = [PowerLawSpectrum(0.1, exponent=n).cutoff() / scale for n in exponents]
+        >>> [round(ratio, 9) for ratio in ratios[:3]], 10.5 < ratios[3] < 11.5
+        ([2.5, 2.5, 10000.0], True)
+        >>> PowerLawSpectrum(0.1, exponent=2.0).cutoff(2) / scale == ratios[3]
+        True
+        """
         if self.power_kept is None:
             # The same wavenumber on a line and on a plane.
             # A slow decay would need millions of modes for the last power.
@@ -269,6 +412,23 @@ class PowerLawSpectrum(_PowerOfWavenumber):
         return super().cutoff(dimensions)
 
     def untruncated_correlation(self, lag: Array) -> Array:
+        """Return the Matern correlation.
+
+        With a = lambda x, it is exp(-a) for the exponent 1, and (1 + a) exp(-a)
+        for 2.
+
+        >>> a = np.array([[0.0, 0.3], [-2.0, 1e-200]])
+        >>> correlation = PowerLawSpectrum(math.pi, exponent=1.0).untruncated_correlation(
+        ...     a / 2.0
+        ... )
+        >>> np.allclose(correlation, np.exp(-np.abs(a)))
+        True
+        >>> correlation = PowerLawSpectrum(math.pi, exponent=2.0).untruncated_correlation(
+        ...     a / 2.0
+        ... )
+        >>> np.allclose(correlation, (1.0 + np.abs(a)) * np.exp(-np.abs(a)))
+        True
+        """
         order = self.exponent - 0.5
         a = np.abs(lag) * self.scale
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -296,17 +456,50 @@ class SquaredExponentialSpectrum(ScaledSpectrum):
     type: Literal["squared_exponential"] = "squared_exponential"
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return exp(-(k xi_0 / 2)^2).
+
+        >>> SquaredExponentialSpectrum(0.5).density(np.array([0.0, 6.0])).round(6).tolist()
+        [1.0, 0.105399]
+        >>> round(math.exp(-2.25), 6)
+        0.105399
+        """
         return np.asarray(np.exp(-((wavenumber * self.correlation_length / 2.0) ** 2)))
 
     def power_within(self, wavenumber: float, dimensions: int = 1) -> float:
+        """Return the fraction of the power at shorter wave vectors.
+
+        With h = k xi_0 / 2, it is erf(h) on a line and 1 - exp(-h^2) on a plane.
+
+        >>> spectrum = SquaredExponentialSpectrum(0.5)
+        >>> math.isclose(spectrum.power_within(3.0), math.erf(0.75))
+        True
+        >>> math.isclose(spectrum.power_within(3.0, 2), 1.0 - math.exp(-0.5625))
+        True
+        """
         half = wavenumber * self.correlation_length / 2.0
         return float(gammainc(0.5 * dimensions, half * half))
 
     def quantile(self, share: float, dimensions: int = 1) -> float:
+        """Return the wavenumber below which a fraction of the power lies, as `power_within` says.
+
+        >>> spectrum = SquaredExponentialSpectrum(0.5)
+        >>> (
+        ...     round(spectrum.quantile(math.erf(0.75)), 9),
+        ...     round(spectrum.quantile(1.0 - math.exp(-4.0), 2), 9),
+        ... )
+        (3.0, 8.0)
+        """
         square = float(gammainccinv(0.5 * dimensions, 1.0 - share))
         return 2.0 / self.correlation_length * math.sqrt(square)
 
     def untruncated_correlation(self, lag: Array) -> Array:
+        """Return exp(-(x / xi_0)^2).
+
+        >>> SquaredExponentialSpectrum(0.5).untruncated_correlation(
+        ...     np.array([0.0, -0.75])
+        ... ).round(6).tolist()
+        [1.0, 0.105399]
+        """
         return np.asarray(np.exp(-((lag / self.correlation_length) ** 2)))
 
 
@@ -324,10 +517,26 @@ class ExponentialSpectrum(_PowerOfWavenumber):
     default_power: ClassVar[float] = 0.99
 
     def untruncated_correlation(self, lag: Array) -> Array:
+        """Return exp(-|x| / xi_0).
+
+        >>> ExponentialSpectrum(0.5).untruncated_correlation(np.array([0.0, -0.75])).round(
+        ...     6
+        ... ).tolist()
+        [1.0, 0.22313]
+        >>> round(math.exp(-1.5), 6)
+        0.22313
+        """
         return np.asarray(np.exp(-np.abs(lag) / self.correlation_length))
 
 
 def _refuse_to_write(function: Any) -> Any:
+    """Refuse to write a function to a study file.
+
+    >>> _refuse_to_write(math.cos)
+    Traceback (most recent call last):
+    ...
+    ValueError: spectrum.function is the Python function 'cos'. Use a named spectrum
+    """
     name = getattr(function, "__name__", repr(function))
     raise ValueError(f"spectrum.function is the Python function {name!r}. Use a named spectrum")
 
@@ -362,6 +571,12 @@ class CustomSpectrum(SpectralDensity):
         return self
 
     def density(self, wavenumber: Array, dimensions: int = 1) -> Array:
+        """Return the values of the function as floats.
+
+        >>> spectrum = CustomSpectrum(lambda k: (k < 3) * 2, 5.0)
+        >>> spectrum.density([2, 4]).tolist(), spectrum.cutoff(), spectrum.cutoff(2)
+        ([2.0, 0.0], 5.0, 5.0)
+        """
         return np.array(self.function(np.asarray(wavenumber)), dtype=np.float64)
 
     def cutoff(self, dimensions: int = 1) -> float:
@@ -373,7 +588,18 @@ SPECTRA = Kinds("spectra")
 
 
 def spectrum_of(value: Any) -> SpectralDensity:
-    """Return a spectrum, given as a spectrum or a table {type, ...}."""
+    """Return a spectrum, given as a spectrum or a table {type, ...}.
+
+    >>> spectrum = spectrum_of(
+    ...     {"type": "power_law", "correlation_length": 0.1, "exponent": 2.0}
+    ... )
+    >>> spectrum == PowerLawSpectrum(0.1, exponent=2.0), spectrum_of(spectrum) is spectrum
+    (True, True)
+    >>> spectrum_of(PowerLawSpectrum)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must be a spectrum such as ... got ...PowerLawSpectrum...
+    """
     if isinstance(value, SpectralDensity):
         return value
     if isinstance(value, dict):

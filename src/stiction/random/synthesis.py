@@ -52,7 +52,11 @@ Example
 A line of four nodes has a single mode with sigma = 1, A = 1 and B = 0.
 The field is cos(2 pi x/L):
 
->>> draws, sigma, numbers = np.array([[1.0, 0.0]]), np.array([0.0, 1.0]), np.array([[0, 0], [0, 1]])
+>>> draws, sigma, numbers = (
+...     np.array([[1.0, 0.0]]),
+...     np.array([0.0, 1.0]),
+...     np.array([[0, 0], [0, 1]]),
+... )
 >>> field = np.empty((1, 1, 4))
 >>> synthesise(draws, sigma, numbers, False, field)
 >>> field.round(12).tolist()
@@ -100,7 +104,15 @@ class Modes:
 
     @property
     def draw_numbers(self) -> NDArray[np.int64]:
-        """Numbers of the draws: 0 for the mean mode, and 2 j and 2 j + 1 for the mode of rank j."""
+        """Numbers of the draws: 0 for the mean mode, and 2 j and 2 j + 1 for the mode of rank j.
+
+        >>> sigma, numbers, ranks = np.full(3, 0.5), np.array([[0, 1, 3]]), np.array([1, 3])
+        >>> line = Interface(0.1, 8)
+        >>> Modes(line, sigma, numbers, ranks, has_mean=True).draw_numbers.tolist()
+        [0, 2, 3, 6, 7]
+        >>> Modes(line, sigma, numbers, ranks, has_mean=False).draw_numbers.tolist()
+        [2, 3, 6, 7]
+        """
         pairs = (2 * self.ranks[:, None] + np.arange(2)).ravel()
         return np.concatenate((FIRST_DRAW, pairs)) if self.has_mean else pairs
 
@@ -108,6 +120,27 @@ class Modes:
     def unresolved(self) -> tuple[float, float]:
         """Fractions of the variance: at wavelengths that the nodes do not resolve, and in all modes
         from the largest of these on. On a plane, nodes resolve shorter waves along the diagonal.
+
+        Eight nodes resolve the modes up to 4. The modes 5 and 6 have the
+        variance 0.35, and mode 3 has no more than mode 5.
+
+        >>> numbers, variances = (
+        ...     np.array([[0, 3, 4, 5, 6]]),
+        ...     np.array([0.1, 0.15, 0.4, 0.2, 0.15]),
+        ... )
+        >>> modes = Modes(Interface(0.1, 8), np.sqrt(variances), numbers, np.arange(1, 5), True)
+        >>> [round(fraction, 9) for fraction in modes.unresolved]
+        [0.35, 0.5]
+        >>> modes = Modes(
+        ...     Interface(0.1, 12), np.sqrt(variances), numbers, np.arange(1, 5), True
+        ... )
+        >>> modes.unresolved
+        (0.0, 0.0)
+        >>> numbers = np.array([[0, -5, 4, 4, -1], [0, 1, 7, 8, 8]])
+        >>> plane = Interface((0.1, 0.2), (8, 14))
+        >>> modes = Modes(plane, np.sqrt(variances), numbers, np.arange(1, 5), True)
+        >>> [round(fraction, 9) for fraction in modes.unresolved]
+        [0.5, 0.5]
         """
         limit = np.array(self.interface.embedding.shape)[:, None] // 2
         sigma, lost = self.sigma[1:], (np.abs(self.numbers[:, 1:]) > limit).any(axis=0)
@@ -115,7 +148,25 @@ class Modes:
         return float(np.sum(sigma[lost] ** 2)), float(np.sum(sigma[short] ** 2))
 
     def nodes_for(self, share: float) -> list[int]:
-        """Return node counts, in equal proportions, that leave at most a fraction unresolved."""
+        """Return node counts, in equal proportions, that leave at most a fraction unresolved.
+
+        The modes up to 5 hold 0.85 of the variance, and need ten nodes.
+
+        >>> numbers, variances = (
+        ...     np.array([[0, 3, 4, 5, 6]]),
+        ...     np.array([0.1, 0.15, 0.4, 0.2, 0.15]),
+        ... )
+        >>> modes = Modes(Interface(0.1, 8), np.sqrt(variances), numbers, np.arange(1, 5), True)
+        >>> modes.nodes_for(0.4), modes.nodes_for(0.2), modes.nodes_for(0.1)
+        ([8], [10], [12])
+        >>> plane, numbers = (
+        ...     Interface((0.1, 0.2), (8, 16)),
+        ...     np.array([[0, -5, 4, 3, -1], [0, 1, 7, 12, 8]]),
+        ... )
+        >>> modes = Modes(plane, np.sqrt(variances), numbers, np.arange(1, 5), True)
+        >>> modes.nodes_for(0.3), modes.nodes_for(0.01)
+        ([10, 20], [12, 24])
+        """
         shape = np.array(self.interface.shape)
         halves = np.array(self.interface.embedding.shape) / 2.0
         # Refinement of the present grid that resolves each mode.
@@ -129,6 +180,27 @@ class Modes:
 
         Each sample has its own inverse transform, so that the result
         does not depend on the batch.
+
+        At the nodes it is `basis` times the draws, also with free ends, on
+        planes and for modes that the nodes do not resolve.
+
+        >>> from stiction.random.spectra import CustomSpectrum
+        >>> spectrum = CustomSpectrum(lambda k: 1.0 / (900.0 + k), 700.0)
+        >>> free = Interface(0.1, 8, ends="free")
+        >>> for interface in (Interface(0.1, 8), free, Interface((0.1, 0.07), (12, 8))):
+        ...     for mean_mode in (True, False):
+        ...         modes = make_modes(spectrum, mean_mode, 1.3, interface)
+        ...         grid = np.meshgrid(*interface.coordinates.values(), indexing="ij")
+        ...         basis = modes.basis(np.array([places.ravel() for places in grid]))
+        ...         draws = np.cos(np.arange(2 * basis.shape[1]) ** 2.0).reshape(2, -1)
+        ...         z = modes.gaussian(draws)
+        ...         print(z.shape, np.allclose(z.reshape(2, -1), draws @ basis.T))
+        (2, 8) True
+        (2, 8) True
+        (2, 8) True
+        (2, 8) True
+        (2, 12, 8) True
+        (2, 12, 8) True
         """
         shape, start = self.interface.embedding.shape, int(self.has_mean)
         numbers = np.concatenate([np.zeros_like(self.numbers), self.numbers])[-2:]
@@ -146,7 +218,21 @@ class Modes:
         return np.ascontiguousarray(fields[:, : self.interface.shape[0]])
 
     def basis(self, places: Array) -> Array:
-        """Return phi (points, draws), with z = phi @ draws at places (dimensions, points)."""
+        """Return phi (points, draws), with z = phi @ draws at places (dimensions, points).
+
+        The mean mode, then the cosine and the sine of each mode.
+
+        >>> sigma, numbers = np.array([0.5, 0.25, 0.75]), np.array([[0, 1, 3]])
+        >>> modes = Modes(Interface(0.8, 8), sigma, numbers, np.array([1, 3]), True)
+        >>> (
+        ...     modes.basis(np.array([[0.0, 0.2]])).round(6) + 0.0
+        ... ).tolist()  # quarters of the first wave
+        [[0.5, 0.25, 0.0, 0.75, 0.0], [0.5, 0.0, 0.25, 0.0, -0.75]]
+        >>> plane, numbers = Interface((0.8, 0.4), (8, 8)), np.array([[0, -1, 1], [0, 1, 0]])
+        >>> modes = Modes(plane, sigma, numbers, np.array([1, 3]), False)
+        >>> (modes.basis(np.array([[0.2, 0.0], [0.0, 0.1]])).round(6) + 0.0).tolist()
+        [[0.0, -0.25, 0.0, 0.75], [0.0, 0.25, 0.75, 0.0]]
+        """
         lengths = np.array(self.interface.embedding.lengths)[:, None]
         phase = 2.0 * np.pi * (places / lengths).T @ self.numbers[:, 1:]
         start = int(self.has_mean)
@@ -168,6 +254,44 @@ def make_modes(
     A field on a specimen is half of a periodic field that is twice as
     long. With this period, the correlation at lags along the specimen
     is the same as on an infinite interface.
+
+    A constant density gives equal variances, and half of one to the mean.
+
+    >>> from stiction.random.spectra import CustomSpectrum
+    >>> flat = CustomSpectrum(np.ones_like, 1.2)
+    >>> modes = make_modes(flat, True, 1.0, Interface(20.0 * math.pi, 32))  # k = 0.1, 0.2, ...
+    >>> modes.numbers.tolist(), modes.ranks.tolist()
+    ([[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12])
+    >>> (modes.sigma[[0, 1, 12]] ** 2 * 12.5).round(9).tolist()
+    [0.5, 1.0, 1.0]
+    >>> (make_modes(flat, False, 1.0, modes.interface).sigma[[0, 1, 12]] ** 2 * 12.0).round(
+    ...     9
+    ... ).tolist()
+    [0.0, 1.0, 1.0]
+
+    On a plane with k = (jx / 2, jy), anisotropy multiplies jy:
+
+    >>> plane = Interface((4.0 * math.pi, 2.0 * math.pi), (8, 8))
+    >>> def vectors(anisotropy):
+    ...     return sorted(
+    ...         map(tuple, make_modes(flat, True, anisotropy, plane).numbers.T.tolist())
+    ...     )
+    >>> vectors(1.0)
+    [(-1, 1), (0, 0), (0, 1), (1, 0), (1, 1), (2, 0)]
+    >>> vectors(1.5)
+    [(0, 0), (1, 0), (2, 0)]
+    >>> vectors(0.5)
+    [(-2, 1), (-1, 1), (-1, 2), (0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (2, 0), (2, 1)]
+
+    With free ends the period is twice the length, and a falling density
+    gives variances in proportion:
+
+    >>> falling = CustomSpectrum(lambda k: 3.0 - k, 1.2)
+    >>> modes = make_modes(
+    ...     falling, True, 1.0, Interface(2.0 * math.pi, 8, ends="free")
+    ... )  # k = 0, 1/2, 1
+    >>> (modes.sigma**2 * 6.0).round(9).tolist(), modes.interface.length == 2.0 * math.pi
+    ([1.5, 2.5, 2.0], True)
     """
     placed_on, interface = interface, interface.embedding
     dimensions = len(interface.shape)
@@ -212,6 +336,22 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
     plane the order follows growing rectangles with the proportions of
     the interface, so that the draws of a mode depend on neither the
     spectrum nor the grid.
+
+    >>> _numbers(Interface(0.1, 8), np.array([3.7])).tolist()
+    [[0, 1, 2, 3]]
+
+    The first rectangle on a plane of 2 to 1 has 2 columns on either side and
+    one row. A second rectangle leaves these numbers as they are.
+
+    >>> plane = Interface((0.2, 0.1), (8, 8))
+    >>> first = _numbers(plane, np.array([2.4, 1.3]))
+    >>> first.tolist()
+    [[0, 1, 2, -2, -1, 0, 1, 2], [0, 0, 0, 1, 1, 1, 1, 1]]
+    >>> second = _numbers(plane, np.array([2.4, 2.3]))
+    >>> bool((second[:, :8] == first).all()), second.shape, second[:, 8:14].tolist()
+    (True, (2, 23), [[3, 4, -4, -3, 3, 4], [0, 0, 1, 1, 1, 1]])
+    >>> _numbers(Interface((0.1, 0.2), (8, 8)), np.array([1.3, 2.4])).tolist()
+    [[0, 1, -1, 0, 1, -1, 0, 1], [0, 0, 1, 1, 1, 2, 2, 2]]
     """
     modes, along, across = float(largest[0]), 1, 1
     if interface.is_plane:
@@ -237,7 +377,11 @@ def _numbers(interface: Interface, largest: Array) -> NDArray[np.int64]:
 
 
 def block_of(dimensions: int) -> int:
-    """Return the samples per generator, on a line (1 dimension) or a plane (2)."""
+    """Return the samples per generator, on a line (1 dimension) or a plane (2).
+
+    >>> block_of(1), block_of(2)
+    (256, 1)
+    """
     return SAMPLES_PER_BLOCK if dimensions == 1 else 1
 
 
@@ -251,11 +395,34 @@ class Stream(NamedTuple):
     of_property: Any = None  # those `columns` that are modes of the property itself
 
     def places_of(self, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the columns for some draws in the stream."""
+        """Return the columns for some draws in the stream.
+
+        >>> stream = Stream(0, 256, np.array([0, 2, 3, 6, 7]), slice(10, 15))
+        >>> stream.places_of(np.array([2, 7])).tolist()
+        [11, 14]
+        """
         return self.columns.start + np.searchsorted(self.numbers, numbers)
 
     def draw(self, seed: int, first: int, samples: int) -> Array:
-        """Draw samples `first`, `first` + 1, ...: A_0, then A and B of mode after mode."""
+        """Draw samples `first`, `first` + 1, ...: A_0, then A and B of mode after mode.
+
+        Block 1 begins with sample 256. Its generator also draws the numbers 0,
+        1, 3 and 4.
+
+        >>> def drawn(*key):
+        ...     sequence = np.random.SeedSequence(entropy=7, spawn_key=key)
+        ...     return np.random.Generator(np.random.PCG64DXSM(sequence))
+        >>> draws = Stream(3, 256, np.array([2, 5])).draw(seed=7, first=254, samples=4)
+        >>> bool((draws[:2] == drawn(3, 0).standard_normal((6, 256))[[2, 5], 254:].T).all())
+        True
+        >>> bool((draws[2:] == drawn(3, 1).standard_normal((6, 256))[[2, 5], :2].T).all())
+        True
+        >>> draws = Stream(3, 1, np.array([2, 5])).draw(
+        ...     seed=7, first=254, samples=2
+        ... )  # on a plane
+        >>> bool((draws[1] == drawn(3, 255, 1).standard_normal(6)[[2, 5]]).all())
+        True
+        """
         block, draws = self.block, np.empty((samples, self.numbers.size))
         # 4. Block after block.
         done = 0
@@ -276,7 +443,15 @@ class Stream(NamedTuple):
 def draws_of(
     streams: Sequence[Stream], interface: Interface, samples: int, seed: int, first: int
 ) -> Array:
-    """Draw samples `first`, `first` + 1, ... of streams as an array (samples, dimension)."""
+    """Draw samples `first`, `first` + 1, ... of streams as an array (samples, dimension).
+
+    >>> streams = [Stream(number, 256, np.array([0, 4])) for number in (3, 0)]
+    >>> draws = draws_of(streams, Interface(0.1, 8), samples=3, seed=7, first=2)
+    >>> draws.shape, bool((draws[:, 2:] == streams[1].draw(7, 2, 3)).all())
+    ((3, 4), True)
+    >>> bool((draws[:, :2] == streams[0].draw(7, 2, 3)).all())
+    True
+    """
     # Draws, and about as many numbers in the profiles that follow from them.
     numbers = sum(stream.numbers.size + interface.size for stream in streams)
     check_memory("samples", 8.0 * min(samples, 2**62) * numbers)
@@ -285,7 +460,36 @@ def draws_of(
 
 @lru_cache(maxsize=8192)
 def layout(random: Any, interface: Any) -> list[Stream]:
-    """Return the stream of draws for each property and each factor between specimens."""
+    """Return the stream of draws for each property and each factor between specimens.
+
+    The strength has one mode, and the residual strength a mean mode too.
+    They are correlated, so both draw the numbers 0, 2 and 3.
+
+    >>> import stiction as st
+    >>> marginal, spectrum = st.Lognormal(mean=2e6, cv=0.2), st.SquaredExponentialSpectrum(0.06)
+    >>> a, b = (st.RandomField(marginal, spectrum, mean_mode=mean) for mean in (False, True))
+    >>> random = st.RandomInterface(
+    ...     strength=a,
+    ...     residual_strength=b,
+    ...     normal_pressure=a,
+    ...     correlation={("strength", "residual_strength"): 0.5},
+    ...     between=dict.fromkeys(
+    ...         ["pressing_force", "critical_slip"], st.Lognormal(mean=1.0, cv=0.1)
+    ...     ),
+    ... )
+    >>> for stream in layout(random, Interface(0.1, 8)):
+    ...     columns = stream.columns.start, stream.columns.stop
+    ...     print(stream.number, stream.numbers.tolist(), columns, stream.of_property)
+    0 [0, 2, 3] (0, 3) [1 2]
+    1 [0, 2, 3] (3, 6) [0 1 2]
+    6 [2, 3] (6, 8) [0 1]
+    1007 [0] (8, 9) None
+    1004 [0] (9, 10) None
+    >>> {stream.block for stream in layout(random, Interface(0.1, 8))}
+    {256}
+    >>> [stream.block for stream in layout(random, Interface((0.1, 0.05), (8, 8)))]
+    [1, 1, 1, 256, 256]
+    """
     numbers = [field.modes(interface).draw_numbers for field in random.properties.values()]
     streams, start, block = [], 0, block_of(len(interface.shape))
     for name, of_field, row in zip(random.names, numbers, random.linked, strict=True):
