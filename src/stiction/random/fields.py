@@ -254,8 +254,8 @@ class RandomField(Listed):
         ...         field.warn_if_inaccurate(Interface(0.1, nodes))
         ...     return [str(text) for text in texts]
         >>> lost, short = warned(8, False)
-        >>> lost[81:122], lost[147:]
-        ('but 6.7 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
+        >>> lost[85:122], lost[147:]
+        ('6.7 % of the variance is not resolved', 'give interface.nodes >= 10 or power_kept=0.933')
         >>> short[:67]
         'the field has no mean mode, which would hold 17 % of the variance o'
         >>> len(warned(8, True)), warned(10, True)
