@@ -80,13 +80,22 @@ class Options(NamedTuple):
 
     @property
     def stated(self) -> tuple[float | str, ...]:
-        """Numbers and words that the caller uses for a missing value."""
+        """Numbers and words that the caller uses for a missing value.
+
+        >>> Options().stated, Options(missing=0).stated, Options(missing=[-99, "Bad"]).stated
+        ((), (0,), (-99, 'Bad'))
+        """
         several = self.missing if isinstance(self.missing, tuple | list) else (self.missing,)
         return tuple(value for value in several if value is not None)
 
     @property
     def words(self) -> set[str]:
-        """All words for a missing value, in lower case."""
+        """All words for a missing value, in lower case.
+
+        >>> words = Options(missing=(-99, " Bad")).words
+        >>> "bad" in words, "#nv" in words, "-99" in words
+        (True, True, False)
+        """
         given = {word.strip().casefold() for word in self.stated if isinstance(word, str)}
         return _EMPTY | given
 
@@ -102,12 +111,21 @@ class Row(NamedTuple):
     kinds: Sequence[str] = ()
 
     def of_kind(self, kind: str, columns: Iterable[int]) -> list[str]:
-        """Return the cells of a kind in some columns."""
+        """Return the cells of a kind in some columns.
+
+        >>> row = Row(7, ["x", "3", "", "4"], ["word", "number", "missing", "number"])
+        >>> row.of_kind("number", [0, 2, 3, 9])
+        ['4']
+        """
         return [self.cells[i] for i in columns if self.kinds[i : i + 1] == [kind]]
 
     @property
     def text(self) -> str:
-        """Text of the line for a message."""
+        """Text of the line for a message.
+
+        >>> Row(7, ["mean", "", "4"]).text, len(Row(7, ["a" * 99]).text)
+        ("line 7 'mean, 4'", 69)
+        """
         return f"line {self.number} {', '.join(filter(None, self.cells))[:60]!r}"
 
 
@@ -120,7 +138,27 @@ class Grid(NamedTuple):
 
 
 def table_of_frame(frame: Any) -> Table:
-    """Convert a DataFrame with headings to the form of a table from a file."""
+    """Convert a DataFrame with headings to the form of a table from a file.
+
+    An index with fractions holds positions. Text that pandas can convert
+    counts as numbers.
+
+    >>> import pandas as pd
+    >>> force = pd.Series(["3", None], dtype=object)
+    >>> frame = pd.DataFrame({"who": ["5", "B"], "F (N)": force})
+    >>> frame.index = pd.Index([0.5, 2.0], name="s (mm)")
+    >>> for column in table_of_frame(frame).columns:
+    ...     print(column, column.name, column.unit, column.values, column.cells)
+    column 0 's (mm)' s mm [0.5 2. ] ()
+    column 1 'who' who  [nan nan] ['5', 'B']
+    column 2 'F (N)' F N [ 3. nan] ()
+    >>> table_of_frame(frame).columns[1].text, table_of_frame(frame).lines.tolist()
+    ("column 'who' does not hold numbers", [0, 1])
+    >>> for frame in frame.rename_axis(None), frame.reset_index(drop=True):
+    ...     print([column.heading for column in table_of_frame(frame).columns])
+    ['x', 'who', 'F (N)']
+    ['who', 'F (N)']
+    """
     import pandas as pd
 
     headings = [str(name) for name in frame.columns]
@@ -140,7 +178,16 @@ def table_of_frame(frame: Any) -> Table:
 
 
 def split_at_blanks(line: str, words: set[str]) -> list[str]:
-    """Split a line at blanks, but not between a name and its unit in brackets."""
+    """Split a line at blanks, but not between a name and its unit in brackets.
+
+    >>> split_at_blanks("x (in mm)  tau [kPa] at  rest", set())
+    ['x (in mm)', 'tau [kPa]', 'at', 'rest']
+
+    A row with data is split at every blank:
+
+    >>> split_at_blanks("1,5  (Bad) 3", {"(bad)"}), split_at_blanks("1,5 (Bad) 3", set())
+    (['1,5', '(Bad)', '3'], ['1,5 (Bad)', '3'])
+    """
     cells = line.split()
     if all(NUMBER.match(cell) or cell.casefold() in words for cell in cells):
         return cells
@@ -151,7 +198,48 @@ def split_at_blanks(line: str, words: set[str]) -> list[str]:
 
 
 def table_of(grid: Grid, options: Options, source: str) -> Table:
-    """Return the columns of a table with names, units and numbers (steps 1 to 5)."""
+    """Return the columns of a table with names, units and numbers (steps 1 to 5).
+
+    A title, a name with its unit, a unit below a name, separators at the
+    ends of lines, and a mean:
+
+    >>> lines = ["Test 7", "x (mm);F;", ";kN;", ";", "0;1,5;", "2;n/a;", "mean;1,5;"]
+    >>> rows = [Row(number, line.split(";")) for number, line in enumerate(lines, 3)]
+    >>> table = table_of(Grid(rows, [], ";"), Options(), "a.csv")
+    >>> [(c.name, c.unit, c.values.tolist(), c.number, c.heading) for c in table.columns]
+    [('x', 'mm', [0.0, 2.0], 0, 'x (mm)'), ('F', 'kN', [1.5, nan], 1, 'F')]
+    >>> table.source, table.lines.tolist(), table.headed, table.left_out, table.mark
+    ('a.csv', [7, 8], True, ("line 9 'mean, 1,5' (statistics)",), ',')
+
+    Words fill the first column. The last comment names the columns:
+
+    >>> rows = [Row(1, ["A", "1.5"]), Row(2, ["B", "2.5"])]
+    >>> for grid in (Grid(rows, ["# 7", "who;F (N)"], ";"), Grid(rows, ["who  F (N)"], " ")):
+    ...     who, force = table_of(grid, Options(), "").columns
+    ...     print(who.heading, who.cells, who.text[:28], force.heading, force.unit)
+    who ['A', 'B'] line 1: 'A' is not a number. F (N) N
+    who ['A', 'B'] line 1: 'A' is not a number. F (N) N
+
+    Blanks may also separate a name from its unit. A comment that names
+    another number of columns is no heading:
+
+    >>> rows = [Row(1, ["0", "1.5"]), Row(2, ["3", "2.5"])]
+    >>> table = table_of(Grid(rows, ["x mm  tau kPa"], " "), Options(), "")
+    >>> [(column.name, column.unit) for column in table.columns]
+    [('x', 'mm'), ('tau', 'kPa')]
+    >>> table = table_of(Grid(rows, ["x;tau;n"], ";"), Options(), "")
+    >>> [column.name for column in table.columns], table.headed, table.mark
+    (['0', '1'], False, '.')
+
+    The first column may be an index. An empty column needs no heading:
+
+    >>> rows = [Row(1, ["", "", "F"]), Row(2, ["0", "", "7"]), Row(3, ["1", "", ""])]
+    >>> [column.name for column in table_of(Grid(rows, [], ","), Options(), "").columns]
+    ['0', '1', 'F']
+    >>> table = table_of(Grid([Row(1, ["-", "-"]), Row(2, ["3", "4.5"])], [], ","), Options(), "")
+    >>> table.headed, len(table_of(Grid([Row(1, ["3", "4", "7"])], [], ","), Options(), "")[0])
+    (False, 3)
+    """
     words, separator = options.words, grid.separator
     rows = [
         row._replace(kinds=[_kind(cell, words) for cell in row.cells])
@@ -208,18 +296,40 @@ def table_of(grid: Grid, options: Options, source: str) -> Table:
 
 
 def _not_a_number(line: int, cell: str) -> str:
+    """Return the message about a cell that holds no number.
+
+    >>> _not_a_number(4, "1.2.3")
+    "line 4: '1.2.3' is not a number. If it marks a missing value, pass missing='1.2.3'"
+    """
     advice = f"If it marks a missing value, pass missing={cell!r}"
     return f"line {line}: {describe(cell)} is not a number. {advice}"
 
 
 def _kind(cell: str, words: set[str]) -> str:
-    """Return whether a cell holds a number, a missing value or another word."""
+    """Return whether a cell holds a number, a missing value or another word.
+
+    >>> [_kind(cell, {"n/a"}) for cell in ("-1.5", "1'250", "N/A", "***", "A1")]
+    ['number', 'number', 'missing', 'missing', 'word']
+    """
     value = 0.0 if NUMBER.match(cell) else _number(cell, words, None)
     return "word" if value is None else "number" if value == value else "missing"
 
 
 def _numeric_columns(rows: Sequence[Row]) -> list[int]:
-    """Return the columns in which most rows with numbers have them (step 1)."""
+    """Return the columns in which most rows with numbers have them (step 1).
+
+    Each text shows the kinds of cells: 1 for a number, a for a word and -
+    for a missing value. A further column needs two numbers, and more
+    numbers than words:
+
+    >>> def columns(*lines):
+    ...     kinds = {"1": "number", "a": "word", "-": "missing"}
+    ...     return _numeric_columns([Row(0, [], [*map(kinds.get, line)]) for line in lines])
+    >>> columns("aaaa", "1a1--", "1-1--", "1a1--", "1a11-", "1a11-", "1a1-1")
+    [0, 2, 3]
+    >>> columns("11", "11", "1a", "1a"), columns("1-", "1-", "1-", "-1", "-1")
+    ([0], [0])
+    """
     places = [tuple(i for i, kind in enumerate(row.kinds) if kind == "number") for row in rows]
     counts = Counter(filter(None, places))
     if not counts:
@@ -237,7 +347,43 @@ def _numeric_columns(rows: Sequence[Row]) -> list[int]:
 def _rows_of_data(
     rows: Sequence[Row], numeric: Sequence[int], separator: str
 ) -> tuple[list[Row], list[Row], list[str], tuple[int, ...]]:
-    """Return the headings, the rows with data, the rows left out, and where tables begin."""
+    """Return the headings, the rows with data, the rows left out, and where tables begin.
+
+    Means and remarks below the first row with data begin a new table:
+
+    >>> def rows_of(*lines):
+    ...     cells = [line.split(";") for line in lines]
+    ...     kinds = [[_kind(cell, {"-", ""}) for cell in row] for row in cells]
+    ...     return [*map(Row, range(1, len(lines) + 1), cells, kinds)]
+    >>> rows = rows_of("mean;3", "x;F", "mm;N", "1;2", "sum;3", "x;F", "3;-", "end;", "4;6")
+    >>> header, data, left_out, begins = _rows_of_data(rows, [0, 1], ";")
+    >>> [row.number for row in header], [row.number for row in data], begins
+    ([2, 3], [4, 7, 9], (4, 7, 9))
+    >>> left_out[1:]
+    ["line 5 'sum, 3' (statistics)", "line 8 'end' (no numbers)"]
+    >>> _rows_of_data(rows_of("1;2", "end;", "-;-", "3;4"), [0, 1], ";")[3]
+    (1, 4)
+    >>> _rows_of_data(rows[:4], [0, 1], ";")[3]
+    ()
+    >>> header, data, _, begins = _rows_of_data(rows_of("run;7", "x;F", "1;2"), [0, 1], ";")
+    >>> [row.number for row in header], [row.number for row in data], begins
+    ([1, 2], [3], ())
+
+    Two words are a remark only if blanks separate cells. A row with a word
+    and a number is refused, also above the data:
+
+    >>> rows = rows_of("1;2", "the;end", "3;4")
+    >>> _rows_of_data(rows, [0, 1], " ")[2]
+    ["line 2 'the, end' (no numbers)"]
+    >>> for rows in (rows, rows_of("1;2", "5;x"), rows_of("1;x", "3;4")):
+    ...     try:
+    ...         _rows_of_data(rows, [0, 1], ";")
+    ...     except InputError as error:
+    ...         print(str(error)[:25])
+    line 2: 'the' is not a nu
+    line 2: 'x' is not a numb
+    line 1: 'x' is not a numb
+    """
     wrong = [row.of_kind("word", numeric) for row in rows]
     has_number = [bool(row.of_kind("number", numeric)) for row in rows]
     left_out, statistics = [], _statistics(rows)
@@ -261,7 +407,7 @@ def _rows_of_data(
         elif not wrong[place]:
             if interrupted and has_number[place]:
                 begins.append(row.number)
-            interrupted = False
+                interrupted = False
             data.append(row)
         elif not has_number[place] and (
             len([*filter(None, row.cells)]) < max(2, len(numeric)) or separator == " "
@@ -274,7 +420,17 @@ def _rows_of_data(
 
 
 def _statistics(rows: Sequence[Row]) -> set[int]:
-    """Return the rows that begin with the name of a statistic and hold a number (step 2)."""
+    """Return the rows that begin with the name of a statistic and hold a number (step 2).
+
+    Short names such as n count next to a longer name:
+
+    >>> lines = "n 1", "7 2", "s 3", "Mean: 4", "v 5", "8 6", "SD(3) 7", "who 8", "r 9"
+    >>> rows = [Row(0, ["", *line.split()], ["missing", "word", "number"]) for line in lines]
+    >>> sorted(_statistics(rows))
+    [2, 3, 4, 6]
+    >>> _statistics([Row(0, ["mean", "max"], ["word", "word"])])  # headings
+    set()
+    """
     labels = []
     for row in rows:
         label, kind = next(pair for pair in zip(row.cells, row.kinds, strict=True) if pair[0])
@@ -290,6 +446,16 @@ def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[R
     """Leave out a last row that is cut.
 
     Refuse any other row with too few cells (step 2).
+
+    >>> rows, left_out = [Row(1, ["1", "2"]), Row(2, ["3", "4"]), Row(3, ["5"])], []
+    >>> _without_cut_end(rows, 2, left_out) == rows[:2], left_out
+    (True, ["line 3 '5' (cut: 1 of 2 cells)"])
+    >>> _without_cut_end(rows[::-1], 2, left_out)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: line 3 has 1 cells, but line 2 has 2. ..., or give it 2 cells
+    >>> len(_without_cut_end(rows[:2], 2, left_out)), len(left_out)
+    (2, 1)
     """
     if len(rows[-1].cells) < width and len(rows) > 1:
         left_out.append(f"{rows[-1].text} (cut: {len(rows[-1].cells)} of {width} cells)")
@@ -305,7 +471,18 @@ def _without_cut_end(rows: list[Row], width: int, left_out: list[str]) -> list[R
 
 
 def _of_width(row: Row, width: int, separator: str) -> Row:
-    """Return a heading with a cell for each column, without headings beyond the last number."""
+    """Return a heading with a cell for each column, without headings beyond the last number.
+
+    Blanks may belong to a name, so a further heading stays and is refused
+    later:
+
+    >>> [_of_width(Row(3, ["x", "F", *more]), 2, ";").cells for more in ([], ["note"], [""])]
+    [['x', 'F'], ['x', 'F'], ['x', 'F']]
+    >>> [_of_width(Row(3, ["x", "F", *more]), 2, " ").cells for more in (["note"], [""])]
+    [['x', 'F', 'note'], ['x', 'F']]
+    >>> _of_width(Row(3, ["x"]), 3, ";"), _of_width(Row(3, [""]), 3, ";").cells
+    (Row(number=3, cells=['x', '', ''], kinds=()), [''])
+    """
     cells = list(row.cells)
     while len(cells) > width and (not cells[-1] or separator != " "):
         cells.pop()
@@ -313,7 +490,14 @@ def _of_width(row: Row, width: int, separator: str) -> Row:
 
 
 def _check_pairs(columns: Sequence[Sequence[str]], first: Row) -> None:
-    """Refuse pairs of whole numbers between commas, which may be decimal commas."""
+    """Refuse pairs of whole numbers between commas, which may be decimal commas.
+
+    >>> _check_pairs([["1", "2"], ["3", "4.5"]], Row(6, ["1", "3"]))
+    >>> _check_pairs([["+1", "2"], ["3", "-45"]], Row(6, ["+1", "3"]))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: line 6: '+1,3' may be one number or two. Separate...
+    """
     digits = re.compile(r"[+-]?\d+")
     if all(digits.fullmatch(cell) for cells in columns for cell in cells):
         raise InputError(
@@ -334,6 +518,23 @@ def _decimal_mark(
     The number 1.020 means 1.02 in some countries
     and 1020 in others. Such a file is refused
     unless the caller or a different cell says otherwise.
+
+    >>> def mark(*cells, separator=" ", stated=None):
+    ...     rows = [Row(number, [cell, "7.5"]) for number, cell in enumerate(cells, 3)]
+    ...     try:
+    ...         return _decimal_mark([cells, "?"], [0], rows, separator, stated)
+    ...     except InputError as error:
+    ...         return str(error)[:37]
+    >>> mark("1", "2e3"), mark("1.020", "1.5"), mark("-1,020", "0,020"), mark("1.020")
+    (None, '.', ',', '.')
+    >>> mark("1.020", separator=";"), mark("1.02", separator=";"), mark("1,020,000")
+    ("line 3 has '1.020', which may have th", '.', "line 3 has '1,020,000', which may hav")
+    >>> mark("1.020", separator=chr(9)), mark("1,020", separator=",", stated=",")
+    ("line 3 has '1.020', which may have th", ',')
+    >>> mark("980", "1.020"), mark("x,5", "1,020.5")
+    ("line 4 has '1.020', which may have th", "line 4 has '1,020.5', and line 4 has ")
+    >>> mark("1.020", stated=","), mark("1,020.5", stated="."), mark("980", "1.02", stated=",")
+    (',', '.', "line 4 has '1.02', in which '.' does ")
     """
     # A cell such as 0.5 or 1.02 shows that its mark separates decimals.
     example: dict[str, str] = {}  # by mark: a cell that contains it, with its line
@@ -373,7 +574,15 @@ def _decimal_mark(
 
 
 def _numbers(cells: Sequence[str], words: set[str], mark: str | None) -> list[float | None]:
-    """Return the numbers in a column (step 3)."""
+    """Return the numbers in a column (step 3).
+
+    >>> _numbers(["1.5", "-2e3"], set(), "."), _numbers(["1,5", "-", "x"], {"-"}, ",")
+    ([1.5, -2000.0], [1.5, nan, None])
+    >>> _numbers(["1_0", "7"], set(), "."), _numbers(["1,020", "7.5"], set(), ".")
+    ([None, 7.0], [1020.0, 7.5])
+    >>> _numbers(["1.020"], set(), ","), _numbers(["1.020"], set(), None)
+    ([1020.0], [1.02])
+    """
     if mark != "," and not any("_" in cell for cell in cells):
         with suppress(ValueError):
             return list(map(float, cells))
@@ -381,7 +590,14 @@ def _numbers(cells: Sequence[str], words: set[str], mark: str | None) -> list[fl
 
 
 def _number(cell: str, words: set[str], mark: str | None) -> float | None:
-    """Return the number in a cell, NaN for a missing value, None for any other text."""
+    """Return the number in a cell, NaN for a missing value, None for any other text.
+
+    >>> cells = "1.020,5", "1.020", "1 250 000,5", chr(8722) + "3", "Bad", "***", "x", "1_0"
+    >>> [_number(cell, {"bad"}, ",") for cell in cells]
+    [1020.5, 1020.0, 1250000.5, -3.0, nan, nan, None, None]
+    >>> [_number(cell, set(), ".") for cell in ("1,5", "1,020.25", "1.020", "bad", "")]
+    [None, 1020.25, 1.02, None, nan]
+    """
     if cell.casefold() in words or not cell.strip("*"):
         return math.nan
     cell = GROUPS.sub(lambda match: match[1] + re.sub(r"\D", "", match[2]), cell)
@@ -402,7 +618,33 @@ def _number(cell: str, words: set[str], mark: str | None) -> float | None:
 
 
 def _headings(header: list[Row], width: int) -> list[tuple[str, str, str]]:
-    """Return the name, the unit and the heading of each column (step 5)."""
+    """Return the name, the unit and the heading of each column (step 5).
+
+    >>> _headings([], 2), _headings([Row(1, ["", "F / kN", "(mm)"])], 3)[::2]
+    ([('0', '', ''), ('1', '', '')], [('0', '', ''), ('', 'mm', '(mm)')])
+
+    Units may lie below the names, or above them in files of LabVIEW:
+
+    >>> _headings([Row(1, ["x", "tau"]), Row(2, ["(mm)", "kPa"]), Row(3, ["-", ""])], 2)
+    [('x', 'mm', 'x'), ('tau', 'kPa', 'tau')]
+    >>> labview = [Row(1, ["Y_Unit_Label", "N", "mm"]), Row(2, ["X_Value", "Force", "Slip"])]
+    >>> _headings(labview, 3)
+    [('X_Value', 's', 'X_Value'), ('Force', 'N', 'Force'), ('Slip', 'mm', 'Slip')]
+    >>> _headings([Row(0, ["X_Dimension", "Frequency", "Frequency"]), *labview], 3)[0]
+    ('X_Value', '', 'X_Value')
+
+    A line with another number of names, or another unit below a name, is
+    refused:
+
+    >>> _headings([Row(4, ["x", "F", "N"])], 2)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: line 4 names 3 columns, but the lines below have 2. ...
+    >>> _headings([Row(1, ["x (mm)", "F"]), Row(2, ["m", "N"])], 2)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: 'x (mm)' has 'm' below it, which is another unit
+    """
     header = [row for row in header if not {*row.cells} <= {"", "-"}]
     if not header:
         return [(str(number), "", "") for number in range(width)]
@@ -433,7 +675,15 @@ def _headings(header: list[Row], width: int) -> list[tuple[str, str, str]]:
 
 
 def _are_units(cells: Iterable[str]) -> bool:
-    """Return whether a row states units: most of its cells are units, and the others are short."""
+    """Return whether a row states units: most of its cells are units, and the others are short.
+
+    >>> rows = ["mm", "kPa"], ["(mm)", "", "N"], ["mm", "N", "cycles"], ["1", "-", "kN"]
+    >>> [_are_units(cells) for cells in rows]
+    [True, True, True, True]
+    >>> rows = ["1", "-", "F"], ["mm", "F"], ["mm", "N", "specimens"], [], ["N", "Test", "A"]
+    >>> [_are_units(cells) for cells in rows]
+    [False, False, False, False, False]
+    """
     bare = [cell.strip("()[]{} ") for cell in cells if cell.strip("()[]{} ")]
     known = [cell for cell in bare if parse(cell)]
     clear = any(cell not in ("1", "-", "%") for cell in known)
@@ -441,7 +691,25 @@ def _are_units(cells: Iterable[str]) -> bool:
 
 
 def name_and_unit(text: str) -> tuple[str, str]:
-    """Split a heading, such as 'strength (MPa)', 'tau/MPa', 'x_mm', 'x in mm' or 'tau MPa'."""
+    """Split a heading, such as 'strength (MPa)', 'tau/MPa', 'x_mm', 'x in mm' or 'tau MPa'.
+
+    >>> headings = "peak (MPa)", "tau/MPa", "x_mm", "x in mm", "F, kN", "a [b] / N (1)"
+    >>> [name_and_unit(heading) for heading in headings]
+    [('peak', 'MPa'), ('tau', 'MPa'), ('x', 'mm'), ('x', 'mm'), ('F', 'kN'), ('a [b] / N', '1')]
+    >>> [name_and_unit(heading) for heading in (" F / kN ", "v / m / s", "[MPa]", "a (1) b")]
+    [('F', 'kN'), ('v', 'm / s'), ('', 'MPa'), ('a (1) b', '')]
+    >>> [name_and_unit(heading) for heading in ("tau (peak) (kPa)", "x_(mm)", "N load N")]
+    [('tau (peak)', 'kPa'), ('x', 'mm'), ('N load', 'N')]
+
+    The letter N is a unit behind a force, and otherwise a part of the name:
+
+    >>> headings = "Force N", "F N", "F in N", "x N", "time s", "test s"
+    >>> [name_and_unit(heading) for heading in headings]
+    [('Force', 'N'), ('F N', ''), ('F', 'N'), ('x N', ''), ('time', 's'), ('test s', '')]
+    >>> headings = "elapsed min", "sample min", "gauge length m", "travel m", "x/m", "/m", "a/b"
+    >>> [name_and_unit(heading)[1] for heading in headings]
+    ['min', '', 'm', 'm', 'm', '', '']
+    """
     text = text.strip()
     if text[-1:] in tuple(")]}") and (start := max(map(text.rfind, "([{"))) >= 0:
         return text[:start].strip(" _"), text[start + 1 : -1].strip()
