@@ -33,6 +33,17 @@ class Prior:
     1] for each parameter. The prior is uniform in `u`. Arrays have
     shape (points, parameters). The parameters replace values in
     `problem` and `random`.
+
+    Two parameters, the first between 2 and 5, the second with density 2x:
+
+    >>> from scipy.stats import beta, uniform
+    >>> prior = Prior(None, None, {"a": uniform(2, 3), "b": beta(2, 1)})
+    >>> prior.names, prior.dimension, prior.middle.round(4).tolist()
+    (('a', 'b'), 2, [3.5, 0.7071])
+    >>> prior.whole.tolist()
+    [[0.0, 0.0], [1.0, 1.0]]
+    >>> prior.ends.round(6).tolist()  # sqrt(1e-4) is the least value of b
+    [[2.0, 0.01], [5.0, 1.0]]
     """
 
     problem: Problem
@@ -65,7 +76,13 @@ class Prior:
         return self.theta(self.whole)
 
     def theta(self, u: Array) -> Array:
-        """Return the parameters at `u`, from inverse distribution functions."""
+        """Return the parameters at `u`, from inverse distribution functions.
+
+        >>> from scipy.stats import beta, uniform
+        >>> prior = Prior(None, None, {"a": uniform(2, 3), "b": beta(2, 1)})
+        >>> prior.theta(np.array([[0.25, 0.64], [1.0, 0.09]])).round(3).tolist()
+        [[2.75, 0.8], [5.0, 0.3]]
+        """
         result = np.empty_like(u)
         for i, distribution in enumerate(self.distributions.values()):
             # An infinite end, or an end without density, cannot be
@@ -75,7 +92,20 @@ class Prior:
         return result
 
     def at(self, theta: Array) -> tuple[Problem, RandomInterface]:
-        """Return the problem and the random interface at a point (parameters,)."""
+        """Return the problem and the random interface at a point (parameters,).
+
+        >>> import stiction as st
+        >>> problem = st.paper.problem(nodes=256)
+        >>> given = {"problem.solid.density": (900, 1300), "correlation_length": (1e-3, 4e-3)}
+        >>> prior = make_prior(problem, st.paper.strength(problem), given)
+        >>> problem, random = prior.at(np.array([950.0, 3e-3]))
+        >>> float(problem.solid.density), float(random.strength.spectrum.correlation_length)
+        (950.0, 0.003)
+        >>> _ = prior.at(np.array([-950.0, 3e-3]))  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: prior: at problem.solid.density = -950, correlation_...
+        """
         with self.named(theta):
             return with_parameters(self.problem, self.random, self.names, theta)
 
@@ -95,7 +125,18 @@ def with_parameters(
 
 
 def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
-    """Refuse fields that are conditioned on the measured values of one specimen."""
+    """Refuse fields that are conditioned on the measured values of one specimen.
+
+    >>> import stiction as st
+    >>> field = st.RandomField(st.Lognormal(mean=1e6, cv=0.2), st.PowerLawSpectrum(2e-3))
+    >>> refuse_conditioned([st.RandomInterface(strength=field)])
+    >>> from types import SimpleNamespace
+    >>> second = SimpleNamespace(properties={"a": field, "b": SimpleNamespace(conditions=1)})
+    >>> refuse_conditioned([st.RandomInterface(strength=field), second])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: random: b is conditioned on another specimen. ...
+    """
     for interface in interfaces:
         for name, field in interface.properties.items():
             if field.conditions is not None:
@@ -106,7 +147,12 @@ def refuse_conditioned(interfaces: Iterable[RandomInterface]) -> None:
 
 @lru_cache(maxsize=64)
 def _tails(distribution: Any) -> tuple[float, float]:
-    """Return the probabilities between which a prior is used."""
+    """Return the probabilities between which a prior is used.
+
+    >>> from scipy.stats import beta, expon, norm, uniform
+    >>> [_tails(d) for d in (uniform(2, 3), beta(2, 1), expon(), norm())]
+    [(0.0, 1.0), (0.0001, 1.0), (0.0, 0.9999), (0.0001, 0.9999)]
+    """
     low, high = (
         0.0 if np.isfinite(end) and distribution.pdf(end) > 0.0 else TAIL_PROBABILITY
         for end in distribution.support()
@@ -115,7 +161,21 @@ def _tails(distribution: Any) -> tuple[float, float]:
 
 
 def make_prior(problem: Problem, random: Any, given: Any) -> Prior:
-    """Return the prior for these arguments, or raise an `InputError` that lists all mistakes."""
+    """Return the prior for these arguments, or raise an `InputError` that lists all mistakes.
+
+    All corners are tried. Here the lower bound passes the upper bound,
+    1.66e6, at one end:
+
+    >>> import stiction as st
+    >>> problem = st.paper.problem(nodes=256)
+    >>> random = st.paper.strength(problem)
+    >>> make_prior(problem, random, {"marginal.low": (5e5, 8e5)}).middle.tolist()
+    [650000.0]
+    >>> make_prior(problem, random, {"marginal.low": (5e5, 2e6)})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: prior: at marginal.low = 2e+06: ...
+    """
     if not isinstance(given, Mapping) or not given:
         raise InputError(
             "prior: must map parameters to distributions or ranges, such as"
@@ -153,7 +213,15 @@ class Scaling(NamedTuple):
     slopes: Array  # derivatives of shift (unit of the peaks) and stretch, (keys, 2)
 
     def of(self, theta: Array) -> Array:
-        """Return shift (in the unit of the peaks) and stretch at points, with shape (2, points)."""
+        """Return shift (in the unit of the peaks) and stretch at points, with shape (2, points).
+
+        >>> scaling = Scaling((1,), np.array([7.0, 2.0]), np.array([[10.0, 0.5]]))
+        >>> scaling.of(np.array([[7.0, 2.0], [8.0, 5.0]])).tolist()
+        [[0.0, 30.0], [1.0, 2.5]]
+        >>> both = Scaling((1, 0), np.array([7.0, 2.0]), np.array([[10.0, 0.5], [3.0, 0.0]]))
+        >>> both.of(np.array([[8.0, 5.0]])).tolist()
+        [[33.0], [2.5]]
+        """
         shift_stretch: Array = (theta - self.reference)[:, list(self.keys)] @ self.slopes
         return np.ascontiguousarray(shift_stretch.T) + np.array([[0.0], [1.0]])
 
@@ -197,6 +265,90 @@ def find_scaling(prior: Prior, method: Any, variable: str) -> Scaling:
        uniform. Otherwise a must be zero. The parameter a must also be zero
        if the load profile p varies and there is no initial stress, as on
        specimens: <b s, y>/<p, y> only stretches.
+
+    Let the strength lie between 0.4 and 2.4 MPa. A lower bound at 0.6 MPa
+    shifts and stretches it, because 0.6 + 1.8 s = 0.24 + 0.9 (0.4 + 2 s).
+    In equilibrium only stretching is possible:
+
+    >>> import stiction as st
+    >>> interface = st.Interface(0.1, 256, width=0.01)
+    >>> spectrum = st.PowerLawSpectrum(correlation_length=2e-3)
+    >>> solid = st.Solid(shear_modulus=1e9, poisson_ratio=0.33, density=1170.0, plane="stress")
+    >>> def scaling(ends, theta, given, method=st.LocalCriterion(), quantity=None, of="Pa",
+    ...             load=st.Load(), **weakening):
+    ...     weakening = weakening or {"weakening_rate": 5e11}
+    ...     problem = st.Problem(solid=solid, interface=interface, load=load,
+    ...                          friction=st.LinearWeakening(**weakening))
+    ...     if isinstance(ends, tuple):
+    ...         ends = st.Beta(alpha=1.5, beta=3.0, low=ends[0], high=ends[1])
+    ...     field = st.RandomField(ends, spectrum, quantity=quantity)
+    ...     prior = Prior(problem, as_random_interface(field), distributions_of(given))
+    ...     variable = "critical_stress" if of == "Pa" else "friction_coefficient"
+    ...     found = find_scaling(prior, method, variable)
+    ...     return found.keys, found.of(np.array([theta])).round(6).T.tolist()
+    >>> low, high = {"marginal.low": (2e5, 6e5)}, {"marginal.high": (1.4e6, 3.4e6)}
+    >>> scaling((4e5, 2.4e6), [6e5], low)
+    ((0,), [[240000.0, 0.9]])
+    >>> scaling((4e5, 2.4e6), [6e5], low, method=st.Equilibrium())[0]
+    ()
+    >>> scaling((0.0, 2.4e6), [3.6e6], high, method=st.Equilibrium())
+    ((0,), [[0.0, 1.5]])
+
+    An upper bound of 3.4 MPa gives 0.4 + 3 s = -0.2 + 1.5 (0.4 + 2 s). The
+    density of the solid and the length of the interface change nothing else:
+
+    >>> more = {"problem.solid.density": (900, 1300)} | high
+    >>> scaling((4e5, 2.4e6), [950.0, 3.4e6], more)
+    ((1,), [[-200000.0, 1.5]])
+    >>> scaling((4e5, 2.4e6), [3.4e6, 6e5], high | low)
+    ((1, 0), [[40000.0, 1.4]])
+
+    The keys of other marginals are `loc`, `scale` and `mean`:
+
+    >>> logistic = {"type": "logistic", "loc": 5e6, "scale": 1e5}
+    >>> given = {"marginal.scale": (5e4, 1.5e5), "marginal.loc": (4e6, 6e6)}
+    >>> scaling(logistic, [2e5, 4e6], given)  # 4 + 0.2 s = -6 + 2 (5 + 0.1 s)
+    ((1, 0), [[-6000000.0, 2.0]])
+    >>> scaling(st.Lognormal(mean=1e6, cv=0.2), [1.5e6], {"marginal.mean": (5e5, 1.5e6)})
+    ((0,), [[0.0, 1.5]])
+
+    A coefficient from 0.4 instead of 0.3 to 0.8 shifts by 0.16. At a
+    pressure of 2 MPa the shift is 0.32 MPa:
+
+    >>> low, load = {"marginal.low": (0.2, 0.4)}, st.Load(normal_pressure=2e6)
+    >>> mu = {"quantity": "friction_coefficient", "load": load}
+    >>> scaling((0.3, 0.8), [0.4], low, **mu), scaling((0.3, 0.8), [0.4], low, **mu, of="1")
+    (((0,), [[320000.0, 0.8]]), ((0,), [[0.16, 0.8]]))
+    >>> scaling((4e5, 2.4e6), [6e5], {"marginal.low": (2e5, 6e5)}, load=load, of="1")
+    ((0,), [[0.12, 0.9]])
+
+    If the pressure varies, or the load profile, no shift is possible. The
+    pressure must not be among the parameters, nor the area that carries a
+    force. A fracture energy excludes all scaling:
+
+    >>> crooked = 2e6 + 1e6 * np.cos(20.0 * np.pi * interface.x)
+    >>> varying = mu | {"load": st.Load(normal_pressure=crooked)}
+    >>> scaling((0.3, 0.8), [0.4], low, **varying)[0]
+    ()
+    >>> scaling((0.0, 0.8), [1.2], {"marginal.high": (0.4, 1.2)}, **varying)
+    ((0,), [[0.0, 1.5]])
+    >>> scaling((4e5, 2.4e6), [3.4e6], high, load=varying["load"])
+    ((0,), [[-200000.0, 1.5]])
+    >>> scaling((4e5, 2.4e6), [3.4e6], high, load=st.Load(profile=crooked / 2e6))[0]
+    ()
+    >>> scaling((0.3, 0.8), [0.4, 3e6], low | {"problem.load.normal_pressure": (1e6, 3e6)}, **mu)[0]
+    ()
+    >>> scaling((4e5, 2.4e6), [3.4e6], high, fracture_energy=1.0)[0]
+    ()
+
+    >>> width, force = {"problem.interface.width": (0.007, 0.009)}, st.Load(pressing_force=2e3)
+    >>> ends, new = (4e5, 2.4e6), [3.4e6, 0.008]
+    >>> [scaling(ends, new, high | width, load=load)[0] for load in (load, force)]
+    [(0,), ()]
+    >>> pressing = high | {"problem.load.pressing_force": (1e3, 3e3)}
+    >>> new[1] = 2e3
+    >>> [scaling(ends, new[:len(given)], given, load=force)[0] for given in (high, pressing)]
+    [(0,), ()]
     """
     middle, changed = prior.middle, [full_key(name) for name in prior.names]
     none = Scaling((), middle, np.zeros((0, 2)))
