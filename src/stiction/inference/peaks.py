@@ -122,11 +122,31 @@ class Peaks(Result):
 
         `stiction.inference.standards` has the formulas, which are from
         memory and not yet compared with the printed standards.
+
+        The slip loads count, not the means of specimens:
+
+        >>> loads = Peaks((0.1, 0.2), (np.array([3.0, 8.0]), np.array([4.0])), "N")
+        >>> means = replace(loads, values=(np.array([5.5]), np.array([4.0])), loads=loads)
+        >>> means.standards["mean"], round(loads.standards["standard deviation"] ** 2, 9)
+        (5.0, 7.0)
         """
         return standards_of(np.concatenate((self.loads or self).values))
 
     def refuse_far(self, predicted: Sequence[Array]) -> None:
-        """Refuse peaks that differ so much from predictions that their unit must be wrong."""
+        """Refuse peaks that differ so much from predictions that their unit must be wrong.
+
+        >>> peaks = Peaks((0.1, 0.2), (np.array([3.0, 4.0, 500.0]), np.array([60.0, 70.0])), "N")
+        >>> peaks.refuse_far([np.array([0.081, 0.081]), np.array([3200.0])])
+        >>> peaks.refuse_far([np.array([201.0, 199.0, 903.0]), np.array([65.0])])
+        ... # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: peaks: are about 4 N, but predictions are about 201 N. ...
+        >>> peaks.refuse_far([np.array([4.0]), np.array([1.2])])  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: peaks: are about 65 N, but predictions are about 1.2 N. ...
+        """
         for values, predictions in zip(self.values, predicted, strict=True):
             measured, expected = np.median(values), np.median(predictions)
             if not 1.0 / MAX_PEAK_RATIO < measured / expected < MAX_PEAK_RATIO:
@@ -137,10 +157,20 @@ class Peaks(Result):
 
     @property
     def variable(self) -> str:
-        """Name of the measured quantity in results."""
+        """Name of the measured quantity in results.
+
+        >>> [Peaks((), (), unit).variable for unit in ("1", "N", "Pa")]
+        ['friction_coefficient', 'critical_force', 'critical_stress']
+        """
         return VARIABLES[self.unit]
 
     def _summary(self) -> Summary:
+        """Return what is printed: peaks are counted for each length.
+
+        >>> peaks = Peaks((None, 0.25), (np.array([3.0, 8.0]), np.array([5.0])), "N")
+        >>> [(row[0], row[1]) for row in peaks._summary().rows]
+        [('peak 1', 3.0), ('peak 2', 8.0), ('peak 1 at 0.25 m', 5.0)]
+        """
         kinds = zip(self.lengths, self.values, strict=True)
         rows = [
             Row(f"peak {i + 1}" + (f" at {length:g} m" if length else ""), peak, (), self.unit)
@@ -151,7 +181,15 @@ class Peaks(Result):
 
 
 def title_of(peaks: Peaks) -> str:
-    """Return how many peaks there are, by specimen length."""
+    """Return how many peaks there are, by specimen length.
+
+    >>> three, two = np.array([3.0, 4.0, 8.0]), np.array([5.0, 7.0])
+    >>> title_of(Peaks((None, 0.25), (three, two), "N"))
+    '3 peaks, 2 peaks at 0.25 m'
+    >>> loads = Peaks((0.1, 0.2), (three, two), "N")
+    >>> title_of(Peaks((0.1, 0.2), (two, two), "N", loads=loads))
+    '2 peaks at 0.1 m, 2 peaks at 0.2 m, means of 5 slip loads'
+    """
     pairs = zip(peaks.lengths, peaks.values, strict=True)
     kinds = [f"{v.size} peaks" + (f" at {length:g} m" if length else "") for length, v in pairs]
     if peaks.loads is not None:
@@ -168,6 +206,35 @@ def peaks_and_error(
     specimens differ. Their pooled coefficient of variation gives the
     error of a mean, computed for the harmonic mean of the numbers of
     slip loads.
+
+    Without names of specimens, the error is the error of the load cell:
+
+    >>> peaks, error = peaks_and_error([3.0, 4.0, 8.0], "kN", 0.2)
+    >>> peaks.values[0].tolist(), error
+    ([3000.0, 4000.0, 8000.0], 200.0)
+    >>> peaks_and_error([3.0, 4.0, 8.0], "N", 7.0)[1], peaks_and_error(peaks, "kN", 7.0)[1]
+    (7.0, 7.0)
+
+    Two slip loads, 19 and 21, differ by 5 % from their mean, and so do 38
+    and 42, on specimens with another length. Five loads and three means leave
+    two degrees of freedom. The mean of 1/n is (1/2 + 1/2 + 1)/3, and the mean
+    of the means is 30:
+
+    >>> values = np.array([19.0, 30.0, 21.0]), np.array([42.0, 38.0])
+    >>> names = np.array(["a", "c", "a"]), np.array(["b", "b"])
+    >>> loads = Peaks((0.1, 0.2), values, "N", specimens=names)
+    >>> means, error = peaks_and_error(loads, None, 0.7)
+    >>> [mean.tolist() for mean in means.values], means.specimens, means.loads is loads
+    ([[20.0, 30.0], [40.0]], None, True)
+    >>> of_means = math.sqrt(4 * 0.05**2 / (5 - 3) * (0.5 + 0.5 + 1.0) / 3) * 30.0
+    >>> round(error - math.hypot(0.7, of_means), 12)
+    0.0
+
+    If each specimen has a single slip load, the result is as without names:
+
+    >>> single = replace(loads, specimens=(np.array(["a", "b", "c"]), np.array(["d", "e"])))
+    >>> peaks_and_error(single, None, 0.7)[1]
+    0.7
     """
     measured, error = make_peaks(peaks, unit), load_cell_error * factor_of(unit, peaks)
     if error > np.concatenate(measured.values).max():
@@ -191,7 +258,18 @@ def peaks_and_error(
 
 
 def make_peaks(peaks: Any, unit: str | None = None) -> Peaks:
-    """Return valid peaks, given an array, a mapping from lengths to arrays, a table or curves."""
+    """Return valid peaks, given an array, a mapping from lengths to arrays, a table or curves.
+
+    >>> peaks = make_peaks({0.1: [3.0, 4.0], 0.2: [5.0, 3.0, 4.0]}, "kN")
+    >>> peaks.lengths, [values.tolist() for values in peaks.values], peaks.unit
+    ((0.1, 0.2), [[3000.0, 4000.0], [5000.0, 3000.0, 4000.0]], 'N')
+    >>> make_peaks(peaks) is peaks
+    True
+    >>> import pandas
+    >>> table = pandas.DataFrame({"specimen": [1, 2, 3], "peak [MPa]": [0.5, 0.7, 0.6]})
+    >>> make_peaks(table).values[0].tolist(), make_peaks(table).unit
+    ([500000.0, 700000.0, 600000.0], 'Pa')
+    """
     if isinstance(peaks, Peaks):
         return peaks
     if isinstance(peaks, Curves):
@@ -221,12 +299,22 @@ def make_peaks(peaks: Any, unit: str | None = None) -> Peaks:
 
 
 def si_of(unit: str) -> str:
-    """Return the SI unit for a unit: "1", "N", or otherwise "Pa"."""
+    """Return the SI unit for a unit: "1", "N", or otherwise "Pa".
+
+    >>> [si_of(unit) for unit in ("kN", "MPa", "-", "%", "nonsense")]
+    ['N', 'Pa', '1', '1', 'Pa']
+    """
     return next((one for one in VARIABLES if is_in(unit, one)), "Pa")
 
 
 def factor_of(unit: str | None, peaks: Any = None) -> float:
-    """Return the factor that converts a unit of peaks to SI, or 1 for peaks in SI."""
+    """Return the factor that converts a unit of peaks to SI, or 1 for peaks in SI.
+
+    >>> factor_of("kN"), factor_of("MPa"), factor_of("%"), factor_of(None)
+    (1000.0, 1000000.0, 0.01, 1.0)
+    >>> factor_of("kN", Peaks((), (), "N"))  # already in SI
+    1.0
+    """
     if unit is None or isinstance(peaks, Peaks | Curves):
         return 1.0
     with prefixed("unit"):
@@ -234,7 +322,16 @@ def factor_of(unit: str | None, peaks: Any = None) -> float:
 
 
 def _in_si(given: Any, unit: str | None) -> tuple[Array, str]:
-    """Return peaks for a specimen type in SI, and this unit, stated by the values or given."""
+    """Return peaks for a specimen type in SI, and this unit, stated by the values or given.
+
+    >>> values, unit = _in_si([0.5, 2.0], "kPa")
+    >>> values.tolist(), unit
+    ([500.0, 2000.0], 'Pa')
+    >>> import xarray as xr
+    >>> in_kn = xr.DataArray([0.5, 2.0], attrs={"units": "kN"})
+    >>> _in_si(in_kn, None)[0].tolist(), _in_si(in_kn, "N")[0].tolist(), _in_si(in_kn, "N")[1]
+    ([500.0, 2000.0], [500.0, 2000.0], 'N')
+    """
     with prefixed("peaks"):
         numbers, stated = with_stated_unit(given, VARIABLES)
     if not (stated or unit):
@@ -339,7 +436,91 @@ def _of_table(
     table: Table, options: Options, value: Wanted = None, unit: str | None = None,
     normal: float | str | None = None, surfaces: int = 1,
 ) -> Peaks:  # fmt: skip
-    """Return the peaks in a table of tests."""
+    """Return the peaks in a table of tests.
+
+    Specimens, their lengths (mm), and loads that two surfaces carry:
+
+    >>> from stiction.problem.reading.tables import Options
+    >>> def read(lines, *given, **options):
+    ...     import pathlib, tempfile
+    ...     path = pathlib.Path(tempfile.mkdtemp()) / "tests.csv"
+    ...     _ = path.write_text(lines.replace("|", chr(10)))
+    ...     known = {"missing": None, "decimal": None} | options
+    ...     options = Options(0, 0, known["missing"], known["decimal"])
+    ...     return _of_table(read_table(path, options), options, *given)
+    >>> peaks = read("specimen, length [mm], shear force [kN], clamping force [kN]|"
+    ...              "1, 200, 8, 10|1, 200, 9, 10|2, 100, 6, 10|3, 200, 4, 5", None, None,
+    ...              "clamping force", 2)
+    >>> peaks.lengths, [values.round(3).tolist() for values in peaks.values], peaks.unit
+    ((0.1, 0.2), [[0.3], [0.4, 0.45, 0.4]], '1')
+    >>> [forces.tolist() for forces in peaks.normal_forces], peaks.surfaces
+    ([[10000.0], [10000.0, 10000.0, 5000.0]], 2)
+    >>> [names.tolist() for names in peaks.specimens]
+    [['2'], ['1', '1', '3']]
+
+    An empty cell, if stated, marks a test without a peak, whose force is left
+    out too.
+    Letters behind the numbers count the slip loads of a specimen:
+
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     peaks = read("specimen;slip load (kN);load (kN)|1A;8;10|1B;;9|2-A;6;8|2 b;7;12|3A;4;5",
+    ...                  None, None, "load", missing=("",))
+    >>> peaks.normal_forces[0].tolist(), peaks.specimens[0].tolist(), len(caught)
+    ([10000.0, 8000.0, 12000.0, 5000.0], ['1', '2', '2', '3'], 1)
+
+    The lengths of tests without a peak are left out as well. Here the peaks
+    are in N:
+
+    >>> peaks = read("specimen length (cm);specimen;peak|30;a;8|20;b;x|20;c;6|30;d;5", None, "N",
+    ...              missing=("x",))
+    >>> peaks.lengths, [values.tolist() for values in peaks.values]
+    ((0.2, 0.3), [[6.0], [8.0, 5.0]])
+    >>> [names.tolist() for names in peaks.specimens], peaks.read.unit
+    ([['c'], ['a', 'd']], 'N, which is assumed')
+
+    Names that all differ without their letters are the names of specimens:
+
+    >>> peaks = read("specimen;slip load (kN)|1A;8|2B;7|3A;4")
+    >>> peaks.specimens[0].tolist(), peaks.read.unit
+    (['1A', '2B', '3A'], 'kN')
+
+    A number is the normal force of each test. Two specimens are too few:
+
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore")
+    ...     read("slip load (kN)|2|3|5", None, None, 1e4).values[0].tolist()
+    [0.2, 0.3, 0.5]
+    >>> read("specimen;slip load (kN)|1;8|2;7|2;4", None, None)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: holds 2 specimens in column 0 'specimen', but at least ...
+    >>> read("specimen;slip load (kN)|1;8|2.5;7|3;4", None, None)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ... must be whole, got 2.5 in line 3. Are columns swapped?
+    >>> read("slip load (kN)|8|7|4", None, None, None, 2)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: surfaces: needs normal=, the normal force. ...
+
+    A long column of times that only rises belongs to a curve:
+
+    >>> rows = "|".join(f"{n // 2};{2 + n % 3}" for n in range(100))
+    >>> read("time (s);force (kN)|" + rows)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: 'time (s)' only rises, as in the curve of a test. ...
+    >>> read("time (s);force (kN)|" + rows.rpartition("|")[0]).values[0].size
+    99
+    >>> read("test;force (kN)|" + rows).values[0].size
+    100
+    >>> read("peak (kN)|3.1|4.2|5.4||4.2")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: line 6 holds the mean or the deviation of the tests ...
+    """
     if table.begins:
         raise InputError(several_tables(table))
     columns = table.columns
@@ -426,6 +607,38 @@ def _refuse_statistics(table: Table, peak: Column) -> None:
 
     A row is apart if it has no number of a specimen, or if no column
     numbers the specimens and the row follows an empty line.
+
+    The mean of 3.1, 4.2 and 5.4 is 4.233, and their deviation is 1.150. The
+    last value is printed with one digit, and follows an empty line:
+
+    >>> def refused(*values, lines=(2, 3, 4, 6, 7, 8, 9), cells=()):
+    ...     columns = [Column("peak", "N", np.array(values), 1)]
+    ...     if cells:
+    ...         columns.insert(0, Column("specimen", "", np.zeros(len(values)), 0, cells=cells))
+    ...     table = Table(tuple(columns), "", np.array(lines[:len(values)]))
+    ...     try:
+    ...         _refuse_statistics(table, columns[-1])
+    ...     except InputError as error:
+    ...         return str(error)[:15]
+    >>> [refused(3.1, 4.2, 5.4, last) is not None for last in (4.1, 4.2, 4.3, 1.1, 1.2)]
+    [False, True, False, False, True]
+    >>> refused(3.1, 4.2, 5.4, 4.2)
+    'line 6 holds th'
+    >>> refused(3.1, 4.2, 5.4, 4.2, lines=(2, 3, 4, 5))  # no empty line
+    >>> refused(3.1, 4.2, 4.2, 4.23)  # not their mean, 3.83
+    >>> refused(3.1, 5.4, 4.2, lines=(2, 3, 5))  # two tests only
+    >>> refused(3.15, 4.2, 5.4, 4.2)  # the mean would be printed as 4.25
+
+    Missing peaks do not count. At most four rows are apart:
+
+    >>> [refused(3.1, np.nan, 4.2, 5.4, *last, lines=(2, 3, 4, 5, 7, 8, 9, 10, 11))
+    ...  for last in ([4.2, 8.0, 8.1, 8.2], [4.2, 8.0, 8.1, 8.2, 8.3])]
+    ['line 7 holds th', None]
+
+    Only a row without a number is apart if a column numbers the specimens:
+
+    >>> [refused(3.1, 4.2, 5.4, 4.2, cells=("1", "2", "3", cell)) for cell in ("4", "", "nan")]
+    [None, 'line 6 holds th', 'line 6 holds th']
     """
     values, first = peak.values, table.columns[0]
     apart = np.diff(table.lines, prepend=table.lines[:1]) > 1
@@ -449,7 +662,24 @@ def _refuse_statistics(table: Table, peak: Column) -> None:
 def _normal_forces(
     column: Column | None, given: Any, si: str, table: Table, options: Options
 ) -> Array:
-    """Return the normal force (or stress) of each test, in the unit of the peaks."""
+    """Return the normal force (or stress) of each test, in the unit of the peaks.
+
+    >>> table = Table((), "", np.array([2, 3, 5]))
+    >>> column = Column("preload", "kN", np.array([2.0, 3.0, 7.0]), 1, "preload [kN]")
+    >>> _normal_forces(column, "preload", "N", table, Options()).tolist()
+    [2000.0, 3000.0, 7000.0]
+    >>> _normal_forces(None, 40, "N", table, Options()).tolist()
+    [40.0, 40.0, 40.0]
+    >>> lacking = replace(column, values=np.array([2.0, 0.0, -7.0]))
+    >>> _normal_forces(lacking, "preload", "N", table, Options())  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: normal: 'preload [kN]' ...in line 3 (2 such tests). ...
+    >>> _normal_forces(None, 40, "1", table, Options())
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: normal: the peaks are coefficients already. Leave normal out
+    """
     if si == "1":
         raise InputError("normal: the peaks are coefficients already. Leave normal out")
     if column is None:
@@ -465,7 +695,22 @@ def _normal_forces(
 
 
 def _coefficients(values: Array, forces: Array, si: str, surfaces: int) -> Array:
-    """Return friction coefficients, and refuse coefficients as from swapped columns or units."""
+    """Return friction coefficients, and refuse coefficients as from swapped columns or units.
+
+    >>> forces = np.array([10.0, 20.0, 10.0])
+    >>> _coefficients(np.array([6.0, 8.0, 9.0]), forces, "N", 2).tolist()
+    [0.3, 0.2, 0.45]
+    >>> _coefficients(np.array([1.0, 2.0, 0.5]), forces, "N", 2).tolist()  # the least median
+    [0.05, 0.05, 0.025]
+    >>> _coefficients(forces, np.array([6.0, 8.0, 9.0]), "N", 1)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: normal: the median friction coefficient would be 1.67, from ...
+    >>> _coefficients(np.array([0.9, 2.0, 0.5]), forces, "Pa", 2)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: normal: the median friction coefficient would be 0.045, ...
+    """
     coefficients = values / (surfaces * forces)
     typical = float(np.median(coefficients))
     if not SLIP_FACTORS[0] <= typical <= SLIP_FACTORS[1]:
