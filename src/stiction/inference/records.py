@@ -67,6 +67,35 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     """Return all profiles as records.
 
     See `stiction.fit_field`. Errors name the profile.
+
+    A list holds profiles, unless its members are numbers:
+
+    >>> from stiction import Interface
+    >>> interface = Interface(0.064, 64)
+    >>> rng = np.random.default_rng(0)
+    >>> first, second = 1e6 + 1e5 * rng.standard_normal((2, 64))
+    >>> records = records_of([first, second], interface, "strength")
+    >>> [record.values.tolist() == row.tolist() for record, row in zip(records, (first, second))]
+    [True, True]
+    >>> len(records_of(first.tolist(), interface, "strength"))
+    1
+    >>> records_of([first, first[:32]], interface, "strength")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: profiles[1]: must have shape (64,) or (samples, 64), ...
+    >>> records_of([], interface, "strength")
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: profiles: must not be empty
+
+    A repeated profile causes a warning:
+
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     _ = records_of(np.stack([first, second, first]), interface, "strength")
+    >>> str(caught[0].message)[:54]
+    '1 of 3 profiles repeat another profile, value by value'
     """
     several = isinstance(profiles, list | tuple)
     several = several and not (profiles and all(map(_is_scalar, profiles)))
@@ -95,7 +124,18 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
 
 
 def _doubt_lengths(records: Sequence[Record]) -> None:
-    """Warn about the first record whose length is probably in another unit than m."""
+    """Warn about the first record whose length is probably in another unit than m.
+
+    The longest side counts. Only the first doubtful record is named:
+
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     _doubt_lengths([Record(np.zeros((10, 20)), (5.0, 40.0)),
+    ...                     Record(np.zeros(400), (3.0,)), Record(np.zeros(500), (3.0,))])
+    >>> [str(warning.message)[:33] for warning in caught]
+    ['profiles: a record is 1.2e+03 m l']
+    """
     for record in records:
         length = max(n * h for n, h in zip(record.values.shape, record.spacings, strict=True))
         text = f"profiles: a record is {length:.3g} m long. Check the unit of x and y (m)"
@@ -104,11 +144,41 @@ def _doubt_lengths(records: Sequence[Record]) -> None:
 
 
 def _is_scalar(value: Any) -> bool:
-    """Return whether a value is a number, None, or a quantity with a single number."""
+    """Return whether a value is a number, None, or a quantity with a single number.
+
+    >>> [_is_scalar(value) for value in (3, 2.5, None, np.float64(3.0), np.array(3.0))]
+    [True, True, True, True, True]
+    >>> [_is_scalar(value) for value in ("3", [3], (3,), np.array([3.0]))]
+    [False, False, False, False]
+    """
     return not isinstance(value, list | tuple | str) and getattr(value, "shape", ()) == ()
 
 
 def _records(source: Any, interface: Interface | None, quantity: str) -> list[Record]:
+    """Points come in any order, and a missing point is NaN. Samples are rows:
+
+    >>> import xarray as xr
+    >>> at = xr.DataArray([3.0, 5.0, 1.0, 7.0], {"x": [0.03, 0.01, 0.02, 0.05]}, "x")
+    >>> (record,) = _records(at, None, "slip")
+    >>> record.values.tolist(), np.round(record.spacings, 9).tolist()
+    ([5.0, 1.0, 3.0, nan, 7.0], [0.01])
+    >>> both = xr.concat([at, 2.0 * at], "sample")
+    >>> [record.values.tolist() for record in _records(both, None, "slip")]
+    [[5.0, 1.0, 3.0, nan, 7.0], [10.0, 2.0, 6.0, nan, 14.0]]
+
+    Points on a plane, in steps of 2 mm along x and of 5 mm along y:
+
+    >>> import pandas
+    >>> points = pandas.DataFrame({
+    ...     "x (mm)": [0, 4, 2, 0], "y (mm)": [5, 0, 5, 0], "slip (m)": [3.0, 5.0, 1.0, 2.0]})
+    >>> (record,) = _records(points, None, "slip")
+    >>> record.values.tolist(), np.round(record.spacings, 9).tolist()
+    ([[2.0, 3.0], [nan, 1.0], [5.0, nan]], [0.002, 0.005])
+    >>> _records(pandas.concat([points, points[1:2]]), None, "slip")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: x and y repeat: a place of the map has two values. ...
+    """
     units = (QUANTITIES[quantity].units,)
     values: Any = profile_in_si(named(source, quantity), quantity, units)
     places: dict[str, Array] = {}
@@ -133,7 +203,24 @@ def _records(source: Any, interface: Interface | None, quantity: str) -> list[Re
 
 
 def _of_array(array: Array, interface: Interface | None) -> list[Record]:
-    """Return records from values (*shape) or (samples, *shape) at the nodes of an interface."""
+    """Return records from values (*shape) or (samples, *shape) at the nodes of an interface.
+
+    >>> plane = Interface((0.3, 0.2), (10, 8))
+    >>> values = np.arange(160.0).reshape(2, 10, 8)
+    >>> second = _of_array(values, plane)[1]
+    >>> float(second.values[3, 2]), np.round(second.spacings, 9).tolist()
+    (106.0, [0.03, 0.025])
+    >>> len(_of_array(values[0], plane)), _of_array(np.arange(8.0), Interface(0.4, 8))[0].spacings
+    (1, (0.05,))
+    >>> _of_array(values[:, :2], plane)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must have shape (10, 8) or (samples, 10, 8), got (2, 2, 8)
+    >>> _of_array(values, None)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: an array has no spacing. Give interface=, or ...
+    """
     if interface is None:
         raise InputError("an array has no spacing. Give interface=, or a DataArray over x (m)")
     shape = interface.shape
@@ -144,7 +231,25 @@ def _of_array(array: Array, interface: Interface | None) -> list[Record]:
 
 
 def _spacing(x: Array, name: str) -> float:
-    """Return the distance (m) between equidistant points in order, or raise an error (step 1)."""
+    """Return the distance (m) between equidistant points in order, or raise an error (step 1).
+
+    A missing point and rounded digits do no harm. Thirds, printed with two
+    digits, are a spacing of 1/3:
+
+    >>> _spacing(np.array([0.5, 0.7, 0.9, 1.3]), "x").__round__(9)
+    0.2
+    >>> _spacing(np.array([0.0, 0.33, 0.67, 1.0, 1.33, 2.0]), "x").__round__(9)
+    0.333333333
+    >>> for x in ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 2.0, 3.3, 4.0], [2.0], [0.0, np.inf]):
+    ...     try:
+    ...         _spacing(np.array(x), "y")
+    ...     except InputError as error:
+    ...         print(str(error).split(". ")[0])
+    y repeats: there are two values at 1 m
+    y is not equally spaced at 3.3 m
+    y: must be finite and have more than one point
+    y: must be finite and have more than one point
+    """
     if not np.all(np.isfinite(x)) or x.size < 2:
         raise InputError(f"{name}: must be finite and have more than one point")
     steps = np.diff(x)
@@ -166,7 +271,33 @@ def _spacing(x: Array, name: str) -> float:
 
 
 def _checked(record: Record, quantity: str) -> Record:
-    """Refuse a record that cannot be fitted, and warn about outliers (step 3)."""
+    """Refuse a record that cannot be fitted, and warn about outliers (step 3).
+
+    >>> def check(values, shape=-1):
+    ...     import warnings
+    ...     with warnings.catch_warnings(record=True) as caught:
+    ...         warnings.simplefilter("always")
+    ...         try:
+    ...             _checked(Record(np.reshape(values, shape), (1.0, 1.0)), "slip")
+    ...         except InputError as error:
+    ...             return str(error)[:38]
+    ...     return [str(warning.message)[:38] for warning in caught]
+    >>> check([*range(63), 63]), check([*range(63), np.nan]), check([*range(63), np.inf])
+    ([], 'holds 63 measured points, too few for ', 'must be finite, but entry 63 is not')
+    >>> check(range(64), (8, 8)), check(range(70), (10, 7)), check([7.0] * 70)
+    ([], 'holds 70 measured points, too few for ', 'is constant (7). A fit needs values th')
+
+    Values 1, 2 and 3 have the median 2 and the median deviation 1. An outlier
+    is farther than 8 x 1.4826 = 11.9 from the median:
+
+    >>> even = np.arange(99.0) % 3 + 1
+    >>> check([*even, 13.8]), check([*even, 13.9, 14.5])
+    ([], ['2 of 101 values are outliers, such as '])
+    >>> check([*np.cumsum(even[:80]), 7.0, *(np.cumsum(even[:80]) + 160.0)])  # a dropout
+    ['1 of 161 values differ from their neig']
+    >>> check([*even, 0.0, *[2.0] * 150])  # the median deviation is zero
+    []
+    """
     values = record.values[~np.isnan(record.values)]
     if np.isinf(values).any():
         first = int(np.argmax(np.isinf(record.values.ravel())))
@@ -200,6 +331,31 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     divided by the variance. For white noise it has mean 0, and a
     variance equal to the number of products. The test takes k = 1, 2,
     4, ..., and pools records and directions (step 4).
+
+    A sawtooth with a period of 16 points is correlated, and white noise is
+    not. Records are pooled:
+
+    >>> window = RecordWindow((1.0,), np.ones(64, dtype=bool))
+    >>> row, white = np.arange(64.0) % 16, np.random.default_rng(1).standard_normal((9, 64))
+    >>> refuse_uncorrelated([window], [row])
+    >>> refuse_uncorrelated([window] * 9, white)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: profiles: neighbouring points are not correlated: ...
+
+    At lag 1, three records have 3 x 63 pairs, whose products sum to 3 (63 v²)
+    if the values alternate between v and -v:
+
+    >>> refuse_uncorrelated([window] * 3, [(-1.0) ** np.arange(64)] * 3)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: profiles: ... are not correlated: -1 +- 0.073. ...
+
+    On a plane, a correlation along the second direction alone is enough:
+
+    >>> plane = RecordWindow((1.0, 1.0), np.ones((24, 24), dtype=bool))
+    >>> signs = np.random.default_rng(1).choice([-1.0, 1.0], 24)
+    >>> refuse_uncorrelated([plane], [np.repeat(signs, 24)])
     """
     lags = 2 ** np.arange(max(int(np.log2(max(windows[0].measured.shape) / 4)), 1))
     # A short correlation length shows at few lags, and a long length at
@@ -225,6 +381,26 @@ def _doubt_jumps(record: Record) -> None:
 
     A dropout in a smooth record is far from its neighbours, but may be
     near the median.
+
+    In a parabola all differences from the mean of both neighbours are equal.
+    A value that is too low by 11 differences counts once, and not its
+    neighbours:
+
+    >>> import warnings
+    >>> def doubt(*changes, shape=(30,)):
+    ...     values = 3.0 * np.arange(30.0) ** 2
+    ...     for entry, change in changes:
+    ...         values[entry] += change
+    ...     with warnings.catch_warnings(record=True) as caught:
+    ...         warnings.simplefilter("always")
+    ...         _doubt_jumps(Record(values.reshape(shape), (1.0,) * len(shape)))
+    ...     return [str(warning.message).partition(". Set")[0] for warning in caught]
+    >>> doubt(), doubt((12, 47.0))  # 47 - 3 < 10 x 1.4826 x 3
+    ([], [])
+    >>> doubt((12, 48.0), (20, 700.0))
+    ['2 of 30 values differ from their neighbours far more than usual, such as 1900']
+    >>> doubt((12, np.nan), (20, 48.0), shape=(30, 1))
+    ['1 of 30 values differ from their neighbours far more than usual, such as 1248']
     """
     middle = record.values[1:-1]
     jumps = middle - 0.5 * (record.values[:-2] + record.values[2:])

@@ -72,6 +72,33 @@ class RecordWindow:
 
     Lags in each direction are 0, 1, ..., n - 1, -n, ..., -1. A real
     transform has shape (*half).
+
+    Five points, with a gap at point 1. The cosine taper rises over a quarter
+    of the record, from 0 at 0 to 1 at 5/4. Point 0 lies at 1/2:
+
+    >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1, 1], dtype=bool))
+    >>> (window.taper / window.taper[2]).round(4).tolist()  # (1 - cos(0.4 pi))/2
+    [0.3455, 0.0, 1.0, 1.0, 0.3455]
+    >>> float(np.sum(window.taper**2).round(9))
+    1.0
+
+    Pairs at lags 0 to 4, and then -5 to -1:
+
+    >>> np.abs(window.pairs).round(9).tolist()
+    [4.0, 2.0, 2.0, 1.0, 1.0, 0.0, 1.0, 1.0, 2.0, 2.0]
+
+    The weights of wavenumbers 0, 1, 2 (of five points) and 0, 1, 2, 3 (of six):
+
+    >>> window.weights.tolist(), RecordWindow((0.5,), np.ones(6, dtype=bool)).weights.tolist()
+    ([0.0, 1.0, 1.0], [0.0, 1.0, 1.0, 0.5])
+
+    The expected periodogram of white noise with variance 1 is 1, but the mean
+    of 64 points takes a part of low wavenumbers:
+
+    >>> window = RecordWindow((0.5,), np.ones(64, dtype=bool))
+    >>> lost = 1.0 - window.white
+    >>> round(float(lost[0] * 64 / window.taper.sum() ** 2), 9), abs(float(lost[20].round(9)))
+    (1.0, 0.0)
     """
 
     def __init__(
@@ -113,13 +140,32 @@ class RecordWindow:
         self.weights.flat[0] = 0.0
 
     def products(self, weights: Array) -> Array:
-        """Return, for each lag, the sum of w_i w_j over measured pairs."""
+        """Return, for each lag, the sum of w_i w_j over measured pairs.
+
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1], dtype=bool))
+        >>> window.products(np.array([2.0, 3.0, 5.0])).round(9).tolist()  # 2, 0, 3, 5
+        [38.0, 15.0, 6.0, 10.0, 0.0, 10.0, 6.0, 15.0]
+        """
         field, lags = np.zeros(self.shape), tuple(2 * n for n in self.shape)
         field[self.measured] = weights
         return fft.irfftn(np.abs(fft.rfftn(field, lags)) ** 2, lags)
 
     def _autocorrelation(self, wave: NDArray[np.int64]) -> Array:
-        """Return a_k at all lags, flattened (step 3)."""
+        """Return a_k at all lags, flattened (step 3).
+
+        At lag 0 it is the sum of squares |u|², with the trend taken out, and at
+        other lags the sum of u(m) conj(u(m + l)):
+
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1, 1], dtype=bool), degree=1)
+        >>> at = np.array([0, 2, 3, 4])
+        >>> carried = window.taper[at] * np.exp(-2j * np.pi * 2 * at / 5)
+        >>> trend = np.polyfit(at, carried.real, 1), np.polyfit(at, carried.imag, 1)
+        >>> u = np.zeros(5, complex)
+        >>> u[at] = carried - np.polyval(trend[0], at) - 1j * np.polyval(trend[1], at)
+        >>> expected = [(u[: 5 - lag] * u[lag:].conj()).sum().real for lag in range(5)]
+        >>> bool(np.allclose(window._autocorrelation(np.array([2]))[:5], expected))
+        True
+        """
         turns = [number * np.arange(n) / n for number, n in zip(wave, self.shape, strict=True)]
         phase = 2.0 * np.pi * sum(np.ix_(*turns))
         carried = (self.taper * np.exp(-1j * phase))[self.measured]
@@ -130,25 +176,63 @@ class RecordWindow:
 
     @property
     def wave_vectors(self) -> tuple[Array, ...]:
-        """Components of the wave vectors in `periodogram`, rad/m, in shapes that broadcast."""
+        """Components of the wave vectors in `periodogram`, rad/m, in shapes that broadcast.
+
+        >>> plane = RecordWindow((0.5, 0.25), np.ones((9, 8), dtype=bool))
+        >>> x, y = plane.wave_vectors
+        >>> x.shape, y.shape, (x.ravel()[[1, -1]] * 4.5 / np.pi).round(9).tolist()
+        ((9, 1), (1, 5), [2.0, -2.0])
+        >>> (y.ravel() / np.pi).round(9).tolist()
+        [0.0, 1.0, 2.0, 3.0, 4.0]
+        """
         axes = [fft.fftfreq(n, d) for n, d in zip(self.shape, self.spacings, strict=True)]
         axes[-1] = fft.rfftfreq(self.shape[-1], self.spacings[-1])
         return tuple(2.0 * np.pi * axis for axis in np.ix_(*axes))
 
     def without_trend(self, values: Array) -> Array:
-        """Remove the trend of measured values (points,), and keep their mean."""
+        """Remove the trend of measured values (points,), and keep their mean.
+
+        >>> measured = np.array([1, 0, 1, 1, 1], dtype=bool)
+        >>> values = np.array([3.0, 7.0, 9.0, 11.0])  # 3 + 2 x
+        >>> RecordWindow((0.5,), measured, degree=1).without_trend(values).round(9).tolist()
+        [7.5, 7.5, 7.5, 7.5]
+        >>> RecordWindow((0.5,), measured).without_trend(values).tolist()
+        [3.0, 7.0, 9.0, 11.0]
+        """
         if self.basis.shape[1] == 1:
             return values
         return values - self.basis @ (self.basis.T @ values) + values.mean()
 
     def periodogram(self, values: Array) -> Array:
-        """Return |sum h (y - trend) exp(-i k x)|^2 as (*half), from measured values (points,)."""
+        """Return |sum h (y - trend) exp(-i k x)|^2 as (*half), from measured values (points,).
+
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1, 1], dtype=bool))
+        >>> values = np.array([3.0, 6.0, 1.0, 6.0])  # with mean 4
+        >>> wave = np.exp(-2j * np.pi * 2 * np.array([0, 2, 3, 4]) / 5)
+        >>> by_hand = np.abs(np.sum(window.taper[[0, 2, 3, 4]] * (values - 4.0) * wave)) ** 2
+        >>> powers = window.periodogram(values)
+        >>> powers.shape, round(float(powers[2] / by_hand), 9)
+        ((3,), 1.0)
+        """
         field = np.zeros(self.shape)
         field[self.measured] = values - self.basis @ (self.basis.T @ values)
         return np.abs(fft.rfftn(self.taper * field)) ** 2
 
     def expectation(self, covariance: Array) -> Array:
-        """Return the expected periodogram (*half) from the covariance at all lags (steps 2, 3)."""
+        """Return the expected periodogram (*half) from the covariance at all lags (steps 2, 3).
+
+        The covariance of a wave with a random phase depends on the lag alone:
+
+        >>> window = RecordWindow((0.5,), np.ones(90, dtype=bool))
+        >>> lags, at = np.r_[:90, -90:0], np.arange(90)
+        >>> waves = [np.cos(0.9 * at + phase) for phase in np.linspace(0.0, np.pi, 8, endpoint=False)]
+        >>> mean = np.mean([window.periodogram(wave) for wave in waves], axis=0)
+        >>> expected = window.expectation(0.5 * np.cos(0.9 * lags))
+        >>> bool(np.allclose(mean, expected, atol=1e-3 * mean.max())), int(expected.argmax())
+        (True, 13)
+        >>> bool(np.allclose(mean[:17], expected[:17]))  # exact, with the mean taken out
+        True
+        """
         every_other = tuple(slice(None, None, 2) for _ in self.shape)
         result = fft.rfftn(self._spread * covariance).real[every_other].copy()
         result[self._low] = self._exact @ covariance.ravel()
@@ -162,6 +246,30 @@ class RecordWindow:
         Power above `FOLDS` sampling wavenumbers is spread evenly. The
         spectrum is not truncated, because the missing power of a rough
         spectrum would be mistaken for noise.
+
+        >>> from stiction import PowerLawSpectrum
+        >>> window = RecordWindow((0.5,), np.ones(64, dtype=bool))
+        >>> power = window.power(PowerLawSpectrum(correlation_length=3.0, exponent=4.0))
+        >>> both = 2.0 * power.sum() - power[0] - power[-1]  # 256 is even
+        >>> power.size, round(float(both), 9)
+        (129, 1.0)
+
+        The variance in each mode is proportional to (k² + lambda²)^-4, with its
+        aliases:
+
+        >>> k, fold = 2.0 * np.pi * np.arange(129) / 128.0, 4.0 * np.pi * np.arange(-6, 7)[:, None]
+        >>> density = ((k + fold) ** 2 + (2.0 * np.pi / 3.0) ** 2) ** -4.0
+        >>> ratio = power / density.sum(axis=0)
+        >>> bool(np.allclose(ratio, ratio[0], rtol=1e-3))
+        True
+
+        On a plane, an anisotropy of 2 doubles the wavenumbers along y:
+
+        >>> plane = RecordWindow((0.5, 0.5), np.ones((16, 16), dtype=bool))
+        >>> spectrum = PowerLawSpectrum(correlation_length=3.0, exponent=4.0)
+        >>> power = plane.power(spectrum, 2.0)
+        >>> power.shape, round(float(power[0, 3] / power[6, 0]), 3)
+        ((32, 17), 1.0)
         """
         dimensions = len(self.shape)
         stretch = (1.0, anisotropy)[:dimensions]
@@ -193,27 +301,77 @@ class RecordWindow:
         return total
 
     def variance_of_mean(self, covariance: Array) -> float:
-        """Return the variance of the measured mean, from the covariance."""
+        """Return the variance of the measured mean, from the covariance.
+
+        The mean of three values, with a correlation of 0.5 between neighbours and
+        0.2 at lag 2. Point 1 is a gap:
+
+        >>> covariance = np.array([1.0, 0.5, 0.2, 0.0, 0.0, 0.0, 0.2, 0.5])
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1], dtype=bool))
+        >>> round(window.variance_of_mean(covariance), 9)  # (3 + 2 x 0.5 + 2 x 0.2) / 9
+        0.488888889
+        """
         return float(np.sum(self.pairs * covariance) / np.sum(self.measured) ** 2)
 
     def taken_by_trend(self, covariance: Array) -> float:
-        """Return the expected sum of squares that `without_trend` removes from the field."""
+        """Return the expected sum of squares that `without_trend` removes from the field.
+
+        A field that is perfectly correlated has no trend. White noise loses one
+        degree of freedom for each degree of the trend:
+
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1, 1], dtype=bool), degree=2)
+        >>> white = np.eye(1, 10)[0]
+        >>> taken = window.taken_by_trend(white), window.taken_by_trend(np.ones(10))
+        >>> round(taken[0], 9), abs(round(taken[1], 9))
+        (2.0, 0.0)
+        """
         return float(np.sum(self._of_trend * covariance))
 
     def correlation(self, power: Array) -> Array:
-        """Return the correlation at all lags."""
+        """Return the correlation at all lags.
+
+        >>> window = RecordWindow((0.5,), np.ones(5, dtype=bool))  # a period of 20 points
+        >>> power = np.zeros(11)
+        >>> power[3] = 0.5  # at wavenumbers 3 and -3
+        >>> lags = np.r_[:5, -5:0]
+        >>> bool(np.allclose(window.correlation(power), np.cos(2.0 * np.pi * 3 * lags / 20)))
+        True
+        """
         whole: Array = fft.irfftn(power, self._period) * math.prod(self._period)
         return whole[self._lags]
 
     def sample(self, power: Array, rng: np.random.Generator) -> Array:
-        """Sample z at the measured points (points,), as a piece of a period."""
+        """Sample z at the measured points (points,), as a piece of a period.
+
+        >>> window = RecordWindow((0.5,), np.array([1, 0, 1, 1, 1], dtype=bool))
+        >>> power = np.zeros(11)
+        >>> power[3] = 0.5
+        >>> z = window.sample(power, np.random.default_rng(0))
+        >>> z.size, abs(round(float(z[1] + z[3] - 2.0 * np.cos(0.3 * np.pi) * z[2]), 9))  # a wave
+        (4, 0.0)
+        >>> rng = np.random.default_rng(0)
+        >>> squares = np.mean([window.sample(power, rng) ** 2 for _ in range(4000)])
+        >>> bool(0.95 < squares < 1.05)
+        True
+        """
         white = fft.rfftn(rng.standard_normal(self._period))
         whole = fft.irfftn(white * np.sqrt(power * math.prod(self._period)), self._period)
         return whole[tuple(slice(n) for n in self.shape)][self.measured]
 
 
 def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
-    """Return orthonormal polynomials (points, terms) up to a total degree, at measured points."""
+    """Return orthonormal polynomials (points, terms) up to a total degree, at measured points.
+
+    >>> measured = np.array([1, 1, 0, 1, 1, 1], dtype=bool)
+    >>> basis = _polynomials(measured, 2)
+    >>> basis.shape, bool(np.allclose(basis.T @ basis, np.eye(3)))
+    ((5, 3), True)
+    >>> x = np.flatnonzero(measured) ** 2.0 - 3.0 * np.flatnonzero(measured)
+    >>> float(np.abs(x - basis @ (basis.T @ x)).max().round(9))
+    0.0
+    >>> [_polynomials(np.ones((4, 5), dtype=bool), degree).shape[1] for degree in (0, 1, 2)]
+    [1, 3, 6]
+    """
     axes = np.ix_(*[np.linspace(-1.0, 1.0, n) for n in measured.shape])
     terms = [
         np.prod(np.broadcast_arrays(*[x**p for x, p in zip(axes, powers, strict=True)]), axis=0)
@@ -226,7 +384,20 @@ def _polynomials(measured: NDArray[np.bool_], degree: int) -> Array:
 def _folded_line(
     density: Density, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
-    """Return the sum of the density over all wavenumbers with the same alias on the grid."""
+    """Return the sum of the density over all wavenumbers with the same alias on the grid.
+
+    The density 1/k² has the aliases k + 8 m. Five multiples give 1/2² + 1/6² +
+    1/10² + ... at k = 2:
+
+    >>> axis = np.linspace(0.0, 4.0, 129)
+    >>> line = _folded_line(lambda k: 1.0 / np.maximum(k, 0.1) ** 2, [axis], [2], [8.0], 9.0)
+    >>> expected = sum((2.0 + 8.0 * m) ** -2.0 for m in range(-2, 3))
+    >>> round(float(line[64] / expected), 5)
+    1.0
+    >>> line = _folded_line(lambda k: 1.0 / np.maximum(k, 0.1) ** 2, [axis], [0], [8.0], 9.0)
+    >>> float(line[64].round(9))
+    0.25
+    """
 
     def added(at: Array, multiples: Array) -> Array:
         return density(np.abs(at + multiples[:, None] * sampling[0])).sum(axis=0)
@@ -243,6 +414,24 @@ def _folded_line(
 def _folded_plane(
     density: Density, axes: list[Array], folds: list[int], sampling: list[float], end: float
 ) -> Array:
+    """Return the same sum on a plane, over multiples in both directions.
+
+    >>> axes = [np.linspace(-4.0, 3.875, 64), np.linspace(0.0, 5.0, 41)]
+    >>> def density(k):
+    ...     return np.exp(-k / 3.0)
+    >>> near = _folded_plane(density, axes, [1, 0], [8.0, 10.0], 1e9)
+    >>> k = [np.hypot(axes[0][9] + p, axes[1][7]) for p in (-8.0, 0.0, 8.0)]
+    >>> round(float(near[9, 7] / sum(np.exp(-np.array(k) / 3.0))), 9)
+    1.0
+    >>> far = _folded_plane(density, axes, [1, 2], [8.0, 10.0], 1e9)
+    >>> k = [np.hypot(axes[0][9] + p, axes[1][7] + q)
+    ...      for p in (-8.0, 0.0, 8.0) for q in (-20.0, -10.0, 0.0, 10.0, 20.0)]
+    >>> round(float(far[9, 7] / sum(np.exp(-np.array(k) / 3.0))), 3)
+    1.0
+    >>> reached = _folded_plane(density, axes, [1, 2], [8.0, 10.0], 14.0)  # not beyond 14
+    >>> bool(reached[9, 7] < far[9, 7])
+    True
+    """
     few = [np.linspace(axis.min(), axis.max(), FEW[2]) for axis in axes]
     near, far = np.zeros((axes[0].size, axes[1].size)), np.zeros((FEW[2], FEW[2]))
     for p, q in itertools.product(*(range(-fold, fold + 1) for fold in folds)):
