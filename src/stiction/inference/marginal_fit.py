@@ -69,6 +69,26 @@ HIGHEST = 1e8
 
 
 def _positive(u: Array) -> Array:
+    """Return u, or the least number of the table of families.
+
+    The distribution functions and log densities are as in scipy, except for
+    a term log(2 pi)/2, and they accept values beyond a bound:
+
+    >>> from scipy import stats
+    >>> usual = {"lognormal": stats.lognorm(0.5), "weibull": stats.weibull_min(2.5),
+    ...          "gamma": stats.gamma(3.2), "beta": stats.beta(1.5, 3.0)}
+    >>> for name, (distribution, log_density) in KINDS.items():
+    ...     known, u = usual[name], 0.3
+    ...     aside = distribution(u, *known.args) - known.cdf(u)
+    ...     of_log = log_density(u, *known.args) - known.logpdf(u)
+    ...     print(*np.abs([aside, of_log]).round(6), distribution(-1.0, *known.args) == 0.0)
+    0.0 0.918939 True
+    0.0 0.0 True
+    0.0 0.0 True
+    0.0 0.0 True
+    >>> float(KINDS["beta"][0](1.5, 2.0, 3.0))
+    1.0
+    """
     return np.maximum(u, 1e-300)
 
 
@@ -112,12 +132,61 @@ class Family:
 
     @property
     def label(self) -> str:
-        """Name with the fixed parameters."""
+        """Name with the fixed parameters.
+
+        >>> Family("lognormal", {"low": 0.0}).label, Family("lognormal", {"low": 3.0}).label
+        ('lognormal', 'lognormal, low 3')
+        >>> Family("beta", {"low": 0.0, "high": 5.0}).label
+        'beta, high 5'
+        """
         fixed = {k: v for k, v in self.fixed.items() if (k, v) != ("low", 0.0)}
         return ", ".join([self.name, *(f"{key} {value:g}" for key, value in fixed.items())])
 
     def fit(self, values: Array, noise: float = 0.0, start: Any = None) -> Any:
-        """Fit the marginal to values with noise of this standard deviation (steps 1 to 4)."""
+        """Fit the marginal to values with noise of this standard deviation (steps 1 to 4).
+
+        Values 1, 2, 4, 8 have logarithms with mean 1.5 ln 2 and variance 1.25
+        (ln 2)². A lower bound of 3 shifts them:
+
+        >>> values = np.array([1.0, 2.0, 4.0, 8.0])
+        >>> known = 2.0**1.5 * math.exp(0.625 * math.log(2.0) ** 2)
+        >>> found = Family("lognormal", {"low": 0.0}).fit(values)
+        >>> round(found.mean / known, 1), round(math.log1p(found.cv**2) / math.log(2.0) ** 2, 1)
+        (1.0, 1.2)
+        >>> found = Family("lognormal", {"low": 3.0}).fit(values + 3.0)
+        >>> round((found.mean - 3.0) / known, 1), found.low
+        (1.0, 3.0)
+
+        Fits return the marginal of the values without noise, for each family:
+
+        >>> share = (np.arange(200) + 0.5) / 200
+        >>> z = normal_of(0.0, 1.0).distribution.ppf((np.arange(40) + 0.5) / 40)
+        >>> gamma, weibull = MARGINALS["gamma"], MARGINALS["weibull"]
+        >>> bounds = {"low": 2.0, "high": 9.0}
+        >>> for family, marginal in (
+        ...     (Family("gamma", {"low": 1.0}), gamma(mean=5.0, cv=0.2, low=1.0)),
+        ...     (Family("weibull", {"low": 0.0}), weibull(mean=5.0, cv=0.3)),
+        ...     (Family("beta", bounds), Beta(alpha=2.0, beta=3.0, **bounds)),
+        ... ):
+        ...     true = marginal.distribution
+        ...     for noise in (0.0, 0.6):
+        ...         values = np.add.outer(true.ppf(share), noise * z).ravel()
+        ...         found = family.fit(values, noise).distribution
+        ...         print(round(float(found.mean()), 1), round(float(found.std() / true.std()), 1))
+        5.0 1.0
+        5.0 1.0
+        5.0 1.0
+        5.0 1.0
+        4.8 1.0
+        4.8 1.0
+
+        A normal marginal keeps the mean, with the variance 3.5 - 1.26 = 2.24:
+
+        >>> values = np.array([1.0, 2.0, 3.0, 6.0])
+        >>> found = Family(NORMAL, {}).fit(values, math.sqrt(1.26)).distribution
+        >>> round(float(found.mean()), 9), round(float(found.var()), 9)
+        (3.0, 2.24)
+        """
         quiet = self.quiet(values, noise)
         if self.name == NORMAL:  # 4.
             return normal_of(float(quiet.mean()), float(quiet.std()))
@@ -163,7 +232,21 @@ class Family:
         return family(mean=mean, cv=math.sqrt(variance) / mean, **self.fixed)
 
     def quiet(self, values: Array, noise: float) -> Array:
-        """Return values shrunk to their variance without noise, within the bounds."""
+        """Return values shrunk to their variance without noise, within the bounds.
+
+        The values have mean 3 and variance 3.5. A noise with variance 1.26 is 36 %,
+        and shrinks deviations to 80 %. Values beyond a bound are moved inside it by
+        1 % of the range:
+
+        >>> values, noise = np.array([1.0, 2.0, 3.0, 6.0]), math.sqrt(1.26)
+        >>> Family("beta", {}).quiet(values, noise).round(9).tolist()
+        [1.4, 2.2, 3.0, 5.4]
+        >>> Family("beta", {"low": 1.5, "high": 5.0}).quiet(values, noise).round(9).tolist()
+        [1.55, 2.2, 3.0, 4.95]
+        >>> loud = Family("beta", {}).quiet(values, 9.0)
+        >>> round(float(loud.var() / 3.5), 9)  # at least 5 % is left
+        0.05
+        """
         mean, variance = float(values.mean()), float(values.var())
         share = min(noise**2 / variance, MOST_NOISE)
         low, high = self.bounds
@@ -174,13 +257,38 @@ class Family:
         return np.where(values >= high, high - margin, values)
 
     def parameters(self, marginal: Any) -> dict[str, float]:
-        """Return the estimated parameters by name."""
+        """Return the estimated parameters by name.
+
+        >>> marginal = MARGINALS["lognormal"](mean=5.0, cv=0.2, low=1.0)
+        >>> Family("lognormal", {"low": 1.0}).parameters(marginal)
+        {'mean': 5.0, 'cv': 0.2}
+        """
         return {n: v for n, v in _all_parameters(marginal).items() if n not in self.fixed}
 
     def widened(self, marginal: Any, factor: float) -> Any:
         """Return the marginal with the same mean and `factor` times the standard deviation.
 
         Fixed parameters do not change.
+
+        The beta distribution has mean 3 and standard deviation 1. Its bounds move
+        away from the mean, but not below zero, and not if they are fixed:
+
+        >>> beta = Beta(alpha=2.0, beta=3.0, low=1.0, high=6.0)
+        >>> def widened(marginal, factor, **fixed):
+        ...     wide = Family("beta", fixed).widened(marginal, factor)
+        ...     moments = wide.distribution.mean(), wide.distribution.std()
+        ...     return [round(float(part), 6) for part in (wide.low, wide.high, *moments)]
+        >>> widened(beta, 1.2), widened(beta, 2.0), widened(beta, 1.2, low=1.0)
+        ([0.6, 6.6, 3.0, 1.2], [0.0, 9.0, 3.0, 2.0], [1.0, 6.6, 3.0, 1.2])
+        >>> widened(Beta(alpha=2.0, beta=3.0, low=-1.0, high=4.0), 2.0)
+        [-3.0, 7.0, 1.0, 2.0]
+        >>> gamma = MARGINALS["gamma"](mean=5.0, cv=0.2, low=1.0)
+        >>> found = Family("gamma", {"low": 1.0}).widened(gamma, 1.5)
+        >>> found.mean, round(found.cv, 9), found.low
+        (5.0, 0.3, 1.0)
+        >>> found = Family(NORMAL, {}).widened(normal_of(2.0, 3.0), 1.5).distribution
+        >>> float(found.mean()), float(found.std())
+        (2.0, 4.5)
         """
         mean = float(marginal.distribution.mean())
         deviation = factor * float(marginal.distribution.std())
@@ -196,18 +304,35 @@ class Family:
 
     @property
     def limited_shapes(self) -> tuple[str, ...]:
-        """Keys of the shapes that are at least `LEAST_SHAPE`, because their bounds are free."""
+        """Keys of the shapes that are at least `LEAST_SHAPE`, because their bounds are free.
+
+        >>> [Family(*family).limited_shapes for family in (("beta", {}), ("beta", {"low": 0.0}),
+        ...                                                ("beta", {"high": 5.0}), ("gamma", {}))]
+        [('marginal.alpha', 'marginal.beta'), ('marginal.beta',), ('marginal.alpha',), ()]
+        """
         shapes = {"low": "marginal.alpha", "high": "marginal.beta"}
         free = shapes.keys() - self.fixed.keys() if self.name == "beta" else ()
         return tuple(shapes[bound] for bound in sorted(free, reverse=True))
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Support of the family with its fixed parameters, before any fit."""
+        """Support of the family with its fixed parameters, before any fit.
+
+        >>> Family("beta", {"high": 5.0}).bounds, Family("gamma", {"low": 1.0}).bounds
+        ((-inf, 5.0), (1.0, inf))
+        """
         return self.fixed.get("low", -math.inf), self.fixed.get("high", math.inf)
 
     def check(self, values: Array) -> None:
-        """Refuse values that are impossible in the family."""
+        """Refuse values that are impossible in the family.
+
+        >>> Family("beta", {"low": 1.0, "high": 5.0}).check(np.array([1.1, 4.9]))
+        >>> Family("beta", {"low": 1.0, "high": 5.0}).check(np.array([1.0, 3.0, 5.0, 6.0]))
+        ... # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: marginal: 3 of 4 values lie outside the bounds ...
+        """
         low, high = self.bounds
         if outside := int(((values <= low) | (values >= high)).sum()):
             raise InputError(
@@ -220,6 +345,13 @@ def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
     """Return the beta distribution with these moments.
 
     The bounds limit its standard deviation.
+
+    >>> found = beta_of(3.0, 1.0, 1.0, 6.0)  # u = 0.4, and 0.24/0.2² - 1 = 5
+    >>> round(found.alpha, 9), round(found.beta, 9), found.low, found.high
+    (2.0, 3.0, 1.0, 6.0)
+    >>> found = beta_of(3.0, 100.0, 1.0, 6.0)  # the shapes sum to 0.2 at least
+    >>> round(found.alpha, 9), round(found.beta, 9)
+    (0.08, 0.12)
     """
     u, extent = (mean - low) / (high - low), high - low
     total = max(u * (1.0 - u) / (deviation / extent) ** 2 - 1.0, LEAST_TOTAL)
@@ -227,25 +359,52 @@ def beta_of(mean: float, deviation: float, low: float, high: float) -> Beta:
 
 
 def normal_of(mean: float, deviation: float) -> Any:
-    """Return the normal distribution with these moments."""
+    """Return the normal distribution with these moments.
+
+    >>> found = normal_of(2.0, 3.0).distribution
+    >>> float(found.mean()), float(found.std())
+    (2.0, 3.0)
+    """
     return marginal_of({"type": "norm", "loc": mean, "scale": deviation})
 
 
 def _all_parameters(marginal: Any) -> dict[str, float]:
+    """Return the parameters of a marginal by name, if they are set.
+
+    >>> _all_parameters(MARGINALS["truncated_normal"](mean=2.0, cv=0.3, low=1.0))
+    {'mean': 2.0, 'cv': 0.3, 'low': 1.0}
+    >>> sorted(_all_parameters(normal_of(2.0, 3.0)).items())
+    [('loc', 2.0), ('scale', 3.0)]
+    """
     named = marginal.parameters if isinstance(marginal, ScipyMarginal) else vars(marginal)
     names = {"type", "distribution"}
     return {n: float(v) for n, v in dict(named).items() if v is not None and n not in names}
 
 
 def multiplied(marginal: Any, factor: float) -> Any:
-    """Return the marginal for values that are multiplied by a factor."""
+    """Return the marginal for values that are multiplied by a factor.
+
+    >>> found = multiplied(MARGINALS["lognormal"](mean=2.0, cv=0.3, low=1.0), 3.0)
+    >>> found.mean, found.cv, found.low
+    (6.0, 0.3, 3.0)
+    >>> found = multiplied(Beta(alpha=1.5, beta=3.0, low=1.0, high=2.0), 3.0)
+    >>> found.alpha, found.beta, found.low, found.high
+    (1.5, 3.0, 3.0, 6.0)
+    >>> found = multiplied(normal_of(2.0, 0.5), 3.0).distribution
+    >>> float(found.mean()), float(found.std())
+    (6.0, 1.5)
+    """
     parameters = _all_parameters(marginal)
     larger = {name: factor * parameters[name] for name in parameters.keys() & SCALED}
     return marginal_of(with_values(marginal, larger))
 
 
 def family_table(given: Any) -> dict[str, Any]:
-    """Return a table {type, ...} for a name or a table."""
+    """Return a table {type, ...} for a name or a table.
+
+    >>> family_table("gamma"), family_table({"type": "beta", "low": 1.0})
+    ({'type': 'gamma'}, {'type': 'beta', 'low': 1.0})
+    """
     if isinstance(given, Mapping):
         return dict(given)
     if not isinstance(given, str):
@@ -256,7 +415,17 @@ def family_table(given: Any) -> dict[str, Any]:
 
 
 def family_of(given: Any) -> Family:
-    """Return the family for a name, or for a table with some parameters."""
+    """Return the family for a name, or for a table with some parameters.
+
+    >>> family_of("gamma").fixed, family_of("beta").fixed, family_of("normal").fixed
+    ({'low': 0.0}, {}, {})
+    >>> family_of({"type": "beta", "high": 5}), family_of({"type": "gamma", "low": 2}).fixed
+    (Family(name='beta', fixed={'high': 5.0}), {'low': 2.0})
+    >>> family_of({"type": "gamma", "high": 5})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ...high...
+    """
     fixed = family_table(given)
     name = str(fixed.pop("type", None))
     if name not in (*KINDS, NORMAL):
@@ -269,7 +438,20 @@ def family_of(given: Any) -> Family:
 
 
 def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search over scale and shape above a known lower bound (step 2)."""
+    """Return the search over scale and shape above a known lower bound (step 2).
+
+    Above the bound 1 the mean is 2, and the variance 3.5. A lognormal
+    distribution has exp(s²) = 1 + 3.5/4 and the scale 2 exp(-s²/2):
+
+    >>> values = np.array([1.0, 2.0, 3.0, 6.0])
+    >>> search = _by_scale(Family("lognormal", {"low": 1.0}), values, values, 0.0, None)
+    >>> shape, low, scale = search.parameters(search.start)
+    >>> round(math.exp(shape**2), 9), low, round(scale * math.exp(shape**2 / 2.0), 9)
+    (1.875, 1.0, 2.0)
+    >>> gamma = _by_scale(Family("gamma", {"low": 0.0}), values, values, 0.0, None)
+    >>> search.limits[1], gamma.limits[1], gamma.limits[0]
+    ((-5.0, 5.0), (-1.6, 7.0), (-700.0, 700.0))
+    """
     low, mean = family.fixed["low"], float(quiet.mean())
     first = start or MARGINALS[family.name](mean=mean, cv=float(quiet.std()) / mean, low=low)
     shape, _, scale = first.distribution.args
@@ -279,7 +461,38 @@ def _by_scale(family: Family, values: Array, quiet: Array, noise: float, start: 
 
 
 def _beta(family: Family, values: Array, quiet: Array, noise: float, start: Any) -> Search:
-    """Return the search over shapes and distances of free bounds from the mean (step 2)."""
+    """Return the search over shapes and distances of free bounds from the mean (step 2).
+
+    The upper bound is free. The first guess is 10 % farther than the largest
+    value from the mean, 3, at 6.3:
+
+    >>> values, unit = np.array([1.0, 2.0, 3.0, 6.0]), math.sqrt(3.5)
+    >>> search = _beta(Family("beta", {"low": 0.0}), values, values, 0.0, None)
+    >>> a, b, low, width = search.parameters(search.start)
+    >>> low, round(width, 9), round(width * a / (a + b), 9)
+    (0.0, 6.3, 3.0)
+    >>> [round(math.exp(end) * unit, 6) for end in search.limits[2]]  # 3, and 10 ranges more
+    [3.0, 53.0]
+    >>> [round(math.exp(least), 9) for least, _ in search.limits[:2]], search.limits[1][1]
+    ([0.05, 1.0], 12.0)
+
+    With noise, a bound may lie within the values. The lower bound of positive
+    values is positive, and otherwise it may lie 10 ranges below them:
+
+    >>> search = _beta(Family("beta", {"high": 9.0}), values, values, 0.1, None)
+    >>> [round(math.exp(end) * k, 6) for end, k in zip(search.limits[2], (1.0, unit))]
+    [0.5, 3.0]
+    >>> search = _beta(Family("beta", {"high": 9.0}), values - 1.0, values - 1.0, 0.0, None)
+    >>> [round(math.exp(end) * unit, 6) for end in search.limits[2]], search.limits[0][0]
+    ([2.0, 52.0], 0.0)
+    >>> a, b, low, width = search.parameters(search.start)
+    >>> round(low, 9), round(low + width, 9)  # 2 - 1.1 x 2
+    (-0.2, 9.0)
+    >>> start = Beta(alpha=1.5, beta=2.5, low=-1.0, high=9.0)
+    >>> search = _beta(Family("beta", {"high": 9.0}), values, values, 0.0, start)
+    >>> [round(part, 9) for part in search.parameters(search.start)]
+    [1.5, 2.5, -1.0, 10.0]
+    """
     fixed = family.fixed
     mean, unit = float(values.mean()), float(values.std())
     sides = {name: side for name, side in (("low", -1.0), ("high", 1.0)) if name not in fixed}
@@ -317,6 +530,23 @@ def _bins(values: Array, noise: float) -> tuple[Array, Array, Callable[[Array], 
 
     The convolution with the noise is a sum in steps of half a standard
     deviation or less (step 1).
+
+    >>> counts, at, probabilities = _bins(np.arange(161.0), 0.1)  # noise far below the width, 1
+    >>> counts[[0, 80, -1]].tolist(), at[[0, 80, -1]].tolist()
+    ([1, 1, 2], [0.0, 80.0, 160.0])
+    >>> probabilities(np.sqrt(at))[[0, 8, 15]].round(6).tolist()  # sqrt(9) - sqrt(8), ...
+    [1.0, 0.171573, 0.127017]
+    >>> float(probabilities(0.0 * at).max())
+    1e-12
+
+    A normal distribution with the variance 9 and noise with the variance 0.25:
+
+    >>> counts, at, probabilities = _bins(np.arange(161.0), 0.5)
+    >>> at[[0, 1, -1]].tolist()  # 5 x 0.5 beyond the values, in quarters
+    [-2.5, -2.25, 162.5]
+    >>> expected = np.diff(ndtr((np.arange(161.0) - 78.0) / math.sqrt(9.25)))
+    >>> bool(np.abs(probabilities(ndtr((at - 78.0) / 3.0)) - expected).max() < 1e-6)
+    True
     """
     counts, edges = np.histogram(values, bins=BINS)
     width = float(edges[1] - edges[0])
@@ -342,6 +572,22 @@ def mean_log_likelihood(marginal: Any, values: Array, noise: float) -> float:
     With noise, the density is the probability of
     a bin over its width. The result stays finite
     if a value is almost impossible in the family.
+
+    The density is 0.5 between 0 and 2. An impossible value has the density
+    1e-12 over the range of the values, 2.5:
+
+    >>> uniform = marginal_of({"type": "uniform", "loc": 0.0, "scale": 2.0})
+    >>> found = mean_log_likelihood(uniform, np.array([0.5, 1.0, 3.0]), 0.0)
+    >>> round(found - (2.0 * math.log(0.5) + math.log(1e-12 / 2.5)) / 3.0, 9)
+    0.0
+
+    With noise the variance is 1 + 0.25, and the mean log density of a normal
+    variable is -log(2 pi e 1.25)/2:
+
+    >>> values = normal_of(0.0, math.sqrt(1.25)).distribution.ppf((np.arange(4000) + 0.5) / 4000)
+    >>> found = mean_log_likelihood(normal_of(0.0, 1.0), values, 0.5)
+    >>> round(found + 0.5 * math.log(2.0 * math.pi * math.e * 1.25), 2) + 0.0
+    0.0
     """
     if noise**2 <= NEGLIGIBLE_NOISE * values.var():
         least = math.log(LEAST / float(np.ptp(values)))
@@ -365,6 +611,34 @@ def climb(
     Steps are at most `longest`. `value_of` returns the log likelihood,
     and a state from which `derivatives` returns score and information.
     A gain below `settled` ends the search.
+
+    The likelihood -r A r/2 has its maximum at r = v - (1, 2) = 0. If v_2 is at
+    most 1.5, the maximum over v_1 is where 2 (v_1 - 1) + (1.5 - 2) = 0:
+
+    >>> A, visited = np.array([[2.0, 1.0], [1.0, 3.0]]), []
+    >>> def value_of(v):
+    ...     visited.append(v)
+    ...     return -0.5 * float((v - [1.0, 2.0]) @ A @ (v - [1.0, 2.0])), v
+    >>> def derivatives(v, state):
+    ...     return -A @ (state - [1.0, 2.0]), A
+    >>> wide, narrow = np.array([[-9.0, 9.0], [-9.0, 9.0]]), np.array([[-9.0, 9.0], [-9.0, 1.5]])
+    >>> best, state = climb(np.zeros(2), wide, value_of, derivatives, longest=0.5, settled=1e-9)
+    >>> best.round(4).tolist(), state is best
+    ([1.0, 2.0], True)
+    >>> round(float(np.abs(np.diff(visited, axis=0)).max()), 9)
+    0.5
+    >>> start, options = np.array([20.0, 0.0]), {"longest": 99.0, "settled": 1e-9}
+    >>> best, _ = climb(start, narrow, value_of, derivatives, **options)
+    >>> best.round(4).tolist()
+    [1.25, 1.5]
+
+    Damping shortens steps if the information is far too small:
+
+    >>> def too_little(v, state):
+    ...     return -A @ (state - [1.0, 2.0]), 0.05 * A
+    >>> best, _ = climb(np.zeros(2), wide, value_of, too_little, **options)
+    >>> best.round(2).tolist()
+    [1.0, 2.0]
     """
     at = np.clip(at, limits[:, 0], limits[:, 1])
     value, state = value_of(at)
