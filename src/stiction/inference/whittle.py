@@ -92,7 +92,18 @@ LONGEST = 1.5
 
 
 def hermite_shares(marginal: Any) -> Array:
-    """Return the fractions of the variance in Hermite orders 0, 1, ..., and the rest."""
+    """Return the fractions of the variance in Hermite orders 0, 1, ..., and the rest.
+
+    A lognormal field exp(s z) has the fractions s^(2n)/n! over exp(s²) - 1:
+
+    >>> from stiction import Lognormal
+    >>> square = math.log(1.0 + 0.5**2)
+    >>> shares = hermite_shares(Lognormal(mean=3.0, cv=0.5))
+    >>> [round(float(share), 4) for share in shares[:4]]
+    [0.0, 0.8926, 0.0996, 0.0074]
+    >>> [round(square**n / math.factorial(n) / 0.25, 4) for n in (1, 2, 3)]
+    [0.8926, 0.0996, 0.0074]
+    """
     shares = hermite_coefficients(marginal, MAP_STEP, MAP_ORDERS) ** 2
     shares[0] = 0.0
     return shares / shares.sum()
@@ -108,7 +119,26 @@ class Observed(NamedTuple):
 
 
 def periodograms_of(rows: Sequence[Array], windows: Sequence[RecordWindow]) -> list[Observed]:
-    """Return the periodograms of measured values (points,) by geometry (step 1)."""
+    """Return the periodograms of measured values (points,) by geometry (step 1).
+
+    Two records share a window, in the first and the last place:
+
+    >>> short, long = (RecordWindow((0.5,), np.ones(n, dtype=bool)) for n in (16, 32))
+    >>> rows = [np.arange(16.0) ** 2, np.arange(32.0) % 5, np.arange(16.0) % 3]
+    >>> first, second = periodograms_of(rows, [short, long, short])
+    >>> first.records, second.records, first.window is short
+    (2, 1, True)
+    >>> mean = 0.5 * (short.periodogram(rows[0]) + short.periodogram(rows[2]))
+    >>> bool(np.allclose(first.average, mean))
+    True
+
+    The floor is a thousandth of the highest average over five neighbours:
+
+    >>> padded = np.pad(mean, 2, mode="edge")
+    >>> highest = max(padded[k : k + 5].mean() for k in range(mean.size))
+    >>> round(first.floor / float(highest), 9)
+    0.001
+    """
     powers: dict[RecordWindow, list[Array]] = {}
     for row, window in zip(rows, windows, strict=True):
         powers.setdefault(window, []).append(window.periodogram(row))
@@ -127,6 +157,9 @@ class Model(NamedTuple):
     The truncation of the spectrum is left out: it lies at a multiple of
     1/xi_0, and would determine the correlation length if it fell among
     the wavenumbers of a record.
+
+    >>> Model(None, 1.0, 0.25, 16.0, None).noise  # a quarter of the variance, 16
+    2.0
     """
 
     spectrum: Any
@@ -141,32 +174,72 @@ class Model(NamedTuple):
         return math.sqrt(self.noise_share * self.variance)
 
     def power(self, window: RecordWindow) -> Array:
-        """Return the variance of z in each mode on the periodic grid of a window."""
+        """Return the variance of z in each mode on the periodic grid of a window.
+
+        >>> from types import SimpleNamespace
+        >>> window = SimpleNamespace(power=lambda *given: given)
+        >>> Model("spectrum", 2.0, 0.0, 1.0, None).power(window)
+        ('spectrum', 2.0)
+        """
         return window.power(self.spectrum, self.anisotropy)
 
     def correlation(self, window: RecordWindow) -> Array:
-        """Return the correlation of values without noise at all lags (step 2)."""
+        """Return the correlation of values without noise at all lags (step 2).
+
+        A half of the variance is linear in z, and a quarter each is quadratic and
+        cubic: 0.5 rho + 0.25 rho² + 0.25 rho³.
+
+        >>> from types import SimpleNamespace
+        >>> rho = np.array([1.0, 0.6, -0.2])
+        >>> window = SimpleNamespace(power=lambda *given: 7.0, correlation=lambda power: rho * power / 7)
+        >>> model = Model(None, 1.0, 0.0, 1.0, [0.0, 0.5, 0.25, 0.25])
+        >>> model.correlation(window).round(6).tolist()
+        [1.0, 0.444, -0.092]
+        """
         rho = window.correlation(self.power(window))
         return np.polynomial.polynomial.polyval(rho, self.shares)
 
     def signal(self, window: RecordWindow) -> Array:
-        """Return the expected periodogram (*half) for values without noise, with variance 1."""
+        """Return the expected periodogram (*half) for values without noise, with variance 1.
+
+        >>> from types import SimpleNamespace
+        >>> window = SimpleNamespace(power=lambda *given: 7.0, correlation=lambda power: power,
+        ...                          expectation=lambda covariance: 3.0 * covariance)
+        >>> float(Model(None, 1.0, 0.0, 1.0, [0.0, 1.0]).signal(window))
+        21.0
+        """
         return window.expectation(self.correlation(window))
 
     def expectation(self, window: RecordWindow, signal: Array | None = None) -> Array:
-        """Return the expected periodogram (*half), from the `signal` if it is known (step 3)."""
+        """Return the expected periodogram (*half), from the `signal` if it is known (step 3).
+
+        >>> from types import SimpleNamespace
+        >>> window = SimpleNamespace(white=np.array([1.0, 2.0]))
+        >>> Model(None, 1.0, 0.25, 4.0, None).expectation(window, np.array([3.0, 5.0])).tolist()
+        [10.0, 17.0]
+        """
         signal = self.signal(window) if signal is None else signal
         share = self.noise_share
         return self.variance * ((1.0 - share) * signal + share * window.white)
 
 
 def offset(name: str) -> float:
-    """Return the origin for the logarithm of a parameter, so that its error is about normal."""
+    """Return the origin for the logarithm of a parameter, so that its error is about normal.
+
+    >>> offset("exponent"), offset("spectrum.exponent"), offset("correlation_length")
+    (0.5, 0.5, 0.0)
+    """
     return 0.5 if name.endswith("exponent") else 0.0
 
 
 def spectrum_family(given: Any) -> tuple[str, dict[str, float]]:
-    """Return the name and the fixed parameters of a spectrum family, after checks."""
+    """Return the name and the fixed parameters of a spectrum family, after checks.
+
+    >>> spectrum_family("exponential")
+    ('exponential', {})
+    >>> spectrum_family({"type": "power_law", "exponent": 2})
+    ('power_law', {'exponent': 2.0})
+    """
     table = family_table(given)
     if "power_kept" in table:
         raise InputError("power_kept: a fit covers the whole spectrum. Leave it out")
@@ -179,6 +252,21 @@ class SpectrumFamily:
     """A family of spectra with fixed parameters.
 
     Parameters with the value None are estimated.
+
+    Parameters that are not given are free. Only a power law has an exponent:
+
+    >>> SpectrumFamily("power_law", {}, None, None, (0.01, 4.0)).free
+    ('variance', 'correlation_length', 'exponent', 'anisotropy', 'noise_share')
+    >>> SpectrumFamily("power_law", {"exponent": 2.0}, 1.0, None, (0.01, 4.0)).free
+    ('variance', 'correlation_length', 'noise_share')
+    >>> family = SpectrumFamily("exponential", {}, None, 0.0, (0.01, 4.0))
+    >>> family.free
+    ('variance', 'correlation_length', 'anisotropy')
+    >>> np.exp(family.limits[1:]).round(9).tolist()
+    [[0.01, 4.0], [0.05, 20.0]]
+    >>> limits = SpectrumFamily("power_law", {}, 1.0, None, (0.01, 4.0)).limits
+    >>> np.exp(limits[2]).round(9).tolist(), limits[3].tolist()  # exponents less 0.5
+    ([0.15, 15.5], [-0.5, 0.95])
     """
 
     name: str
@@ -204,7 +292,23 @@ class SpectrumFamily:
         return np.transpose([self.vector(end) for end in ends])
 
     def model(self, vector: Array, shares: Array) -> Model:
-        """Return the model for a vector of free parameters."""
+        """Return the model for a vector of free parameters.
+
+        >>> family = SpectrumFamily("power_law", {}, None, None, (0.01, 4.0))
+        >>> logs = np.log([9.0, 0.2, 1.5 - 0.5, 3.0]).tolist()
+        >>> model = family.model(np.array([*logs, -0.2]), "h")
+        >>> model.spectrum.correlation_length, model.spectrum.exponent, model.shares
+        (0.2, 1.5, 'h')
+        >>> round(model.variance, 9), round(model.anisotropy, 9), model.noise_share
+        (9.0, 3.0, -0.2)
+
+        A noise that is known, 3, is a quarter of the variance 36, and at most 95 %:
+
+        >>> family = SpectrumFamily("exponential", {}, 2.0, 3.0, (0.01, 4.0))
+        >>> models = [family.model(family.vector([v, 0.2]), None) for v in (36.0, 4.0)]
+        >>> [(round(model.noise_share, 9), model.anisotropy) for model in models]
+        [(0.25, 2.0), (0.95, 2.0)]
+        """
         values = {
             n: float(v) if n == "noise_share" else offset(n) + math.exp(v)
             for n, v in zip(self.free, vector, strict=True)
@@ -219,22 +323,50 @@ class SpectrumFamily:
         return Model(spectrum, anisotropy, noise, variance, shares)
 
     def vector(self, values: Sequence[float]) -> Array:
-        """Return free parameters on the scale of the search."""
+        """Return free parameters on the scale of the search.
+
+        >>> family = SpectrumFamily("power_law", {}, 1.0, None, (0.01, 4.0))
+        >>> vector = family.vector([9.0, 0.2, 1.5, -0.2])
+        >>> np.exp(vector[:3]).round(9).tolist(), float(vector[3])
+        ([9.0, 0.2, 1.0], -0.2)
+        """
         pairs = zip(self.free, values, strict=True)
         logs = [v if n == "noise_share" else math.log(v - offset(n)) for n, v in pairs]
         return np.array(logs)
 
     def vector_of(self, model: Model) -> Array:
-        """Return the vector for a model."""
+        """Return the vector for a model.
+
+        >>> family = SpectrumFamily("power_law", {}, 1.0, None, (0.01, 4.0))
+        >>> vector = family.vector([9.0, 0.2, 1.5, -0.2])
+        >>> bool(np.allclose(family.vector_of(family.model(vector, None)), vector))
+        True
+        """
         return self.vector(list(self.of(model).values()))
 
     def of(self, model: Model) -> dict[str, float]:
-        """Return the free parameters of a model."""
+        """Return the free parameters of a model.
+
+        >>> fixed = {"correlation_length": 0.2}
+        >>> family = SpectrumFamily("power_law", fixed, None, None, (0.01, 4.0))
+        >>> found = family.of(family.model(family.vector([9.0, 1.5, 3.0, -0.2]), None))
+        >>> {name: round(value, 9) for name, value in found.items()}
+        {'variance': 9.0, 'exponent': 1.5, 'anisotropy': 3.0, 'noise_share': -0.2}
+        """
         owners = {name: model.spectrum for name in ("correlation_length", "exponent")}
         return {name: float(getattr(owners.get(name, model), name)) for name in self.free}
 
     def at_end(self, model: Model) -> dict[str, float]:
-        """Return the spectrum parameters that lie at an end of their range."""
+        """Return the spectrum parameters that lie at an end of their range.
+
+        >>> family = SpectrumFamily("power_law", {}, None, None, (0.01, 4.0))
+        >>> def at_end(*values):
+        ...     return sorted(family.at_end(family.model(family.vector(values), None)))
+        >>> at_end(9.0, 0.0101, 1.5, 3.0, 0.1), at_end(9.0, 0.01001, 15.999, 3.0, 0.1)
+        ([], ['correlation_length', 'exponent'])
+        >>> at_end(1e200, 0.2, 1.5, 20.0, 0.95)  # only parameters of the spectrum count
+        ['anisotropy']
+        """
         # The scale of the search is logarithmic, so both ends count alike.
         aside = np.abs(self.limits - self.vector_of(model)[:, None]).min(axis=1)
         near = aside < AT_END * np.ptp(self.limits, axis=1)
@@ -250,7 +382,20 @@ class Whittle(NamedTuple):
     observed: Sequence[Observed]
 
     def of(self, expected: Sequence[Array]) -> float:
-        """Return the log likelihood, -inf if an expectation is negative (step 4)."""
+        """Return the log likelihood, -inf if an expectation is negative (step 4).
+
+        >>> from types import SimpleNamespace
+        >>> def observed(weights, *others):
+        ...     return Observed(SimpleNamespace(weights=np.array(weights)), *others)
+        >>> both = [observed([1.0, 0.5], 2, np.array([3.0, 7.0]), 1.0),
+        ...         observed([1.0], 1, np.array([0.0]), 2.0)]
+        >>> value = Whittle(None, None, both).of([np.array([1.0, 3.0]), np.array([-1.0])])
+        >>> by_hand = 2.0 * (math.log(2.0) + 4.0 / 2.0 + 0.5 * (math.log(4.0) + 8.0 / 4.0)) + 2.0
+        >>> round(value + by_hand, 9)
+        0.0
+        >>> Whittle(None, None, both).of([np.array([1.0, 3.0]), np.array([-2.0])])
+        -inf
+        """
         value = 0.0
         for group, e in zip(self.observed, expected, strict=True):
             lifted = e + group.floor
@@ -261,7 +406,20 @@ class Whittle(NamedTuple):
         return value
 
     def coarse(self) -> Array:
-        """Return the best point on a coarse parameter grid (step 5)."""
+        """Return the best point on a coarse parameter grid (step 5).
+
+        If the periodogram equals its expectation at a point of the grid, this
+        point is the best. The lengths 1, 2, 4, ... are tried:
+
+        >>> family = SpectrumFamily("power_law", {}, 1.0, None, (1.0, 2.0**16))
+        >>> shares, truth = np.array([0.0, 0.75, 0.25]), [9.0, 4.0, 2.0, 0.1]
+        >>> windows = [RecordWindow((0.5,), np.ones(n, dtype=bool)) for n in (48, 32)]
+        >>> model = family.model(family.vector(truth), shares)
+        >>> seen = [Observed(window, 1, model.expectation(window), 1e-9) for window in windows]
+        >>> best = Whittle(family, shares, seen).coarse()
+        >>> bool(np.allclose(best, family.vector(truth)))
+        True
+        """
         lengths = np.geomspace(*self.family.lengths, 17)[:-2].tolist()
         tried = TRIED | {"correlation_length": lengths}
         windows = [group.window for group in self.observed]
@@ -285,12 +443,34 @@ class Whittle(NamedTuple):
         return best
 
     def fit(self, start: Array) -> tuple[Array, tuple[Model, list[Array]]]:
-        """Return the vector with the greatest likelihood, from a start, and the state there."""
+        """Return the vector with the greatest likelihood, from a start, and the state there.
+
+        >>> family = SpectrumFamily("power_law", {"exponent": 2.0}, 1.0, None, (1.0, 64.0))
+        >>> shares, truth = np.array([0.0, 0.75, 0.25]), [9.0, 4.4, 0.15]
+        >>> window = RecordWindow((0.5,), np.ones(48, dtype=bool))
+        >>> expected = family.model(family.vector(truth), shares).expectation(window)
+        >>> whittle = Whittle(family, shares, [Observed(window, 100, expected, 1e-9)])
+        >>> best, (model, _) = whittle.fit(family.vector([7.0, 6.0, 0.1]))
+        >>> [round(value, 1) for value in family.of(model).values()]
+        [9.0, 4.4, 0.1]
+        """
         limits = self.family.limits
         return climb(start, limits, self.value, self.score, longest=LONGEST, settled=SETTLED)
 
     def value(self, at: Array) -> tuple[float, tuple[Model, list[Array]]]:
-        """Return the log likelihood, and model and signals for its derivatives."""
+        """Return the log likelihood, and model and signals for its derivatives.
+
+        >>> family = SpectrumFamily("exponential", {}, 1.0, None, (1.0, 64.0))
+        >>> window = RecordWindow((0.5,), np.ones(48, dtype=bool))
+        >>> whittle = Whittle(family, [0.0, 1.0], [Observed(window, 3, window.white, 0.5)])
+        >>> value, (model, signals) = whittle.value(family.vector([9.0, 4.4, 0.15]))
+        >>> round(value - whittle.of([model.expectation(window)]), 9)
+        0.0
+        >>> round(model.spectrum.correlation_length, 9)
+        4.4
+        >>> bool(np.allclose(signals[0], model.signal(window)))
+        True
+        """
         model = self.family.model(at, self.shares)
         signals = [model.signal(one.window) for one in self.observed]
         pairs = zip(self.observed, signals, strict=True)
@@ -298,7 +478,42 @@ class Whittle(NamedTuple):
         return value, (model, signals)
 
     def score(self, at: Array, state: tuple[Model, list[Array]]) -> tuple[Array, Array]:
-        """Return the score sum w d (I/E - 1) and Fisher's information sum w d d^T (step 5)."""
+        """Return the score sum w d (I/E - 1) and Fisher's information sum w d d^T (step 5).
+
+        The score is the slope of the likelihood, here on a plane, and with a known
+        noise on a line:
+
+        >>> shares = np.array([0.0, 0.75, 0.25])
+        >>> def slopes(family, window, values):
+        ...     power = window.periodogram(np.arange(float(window.measured.sum())) % 7)
+        ...     whittle = Whittle(family, shares, [Observed(window, 3, power, 0.01)])
+        ...     at = family.vector(values)
+        ...     score, _ = whittle.score(at, whittle.value(at)[1])
+        ...     differences = [
+        ...         (whittle.value(at + step)[0] - whittle.value(at - step)[0]) / 2e-4
+        ...         for step in 1e-4 * np.eye(at.size)
+        ...     ]
+        ...     return bool(np.allclose(score, differences, rtol=0.01, atol=0.01))
+        >>> plane = RecordWindow((0.5, 0.4), np.ones((12, 10), dtype=bool))
+        >>> family = SpectrumFamily("power_law", {}, None, None, (0.1, 9.0))
+        >>> slopes(family, plane, [5.0, 2.0, 1.7, 1.3, 0.2])
+        True
+        >>> line = RecordWindow((0.5,), np.ones(48, dtype=bool))
+        >>> slopes(SpectrumFamily("exponential", {}, 1.0, 1.1, (0.1, 9.0)), line, [5.0, 2.0])
+        True
+        >>> slopes(SpectrumFamily("exponential", {}, 1.0, 1.1, (0.1, 2.0)), line, [5.0, 2.0])
+        True
+
+        The information is the mean square of the score. For the logarithm of the
+        variance alone, without a floor, each record counts once for each ordinate:
+
+        >>> fixed = {"correlation_length": 2.0}
+        >>> family = SpectrumFamily("exponential", fixed, 1.0, 0.0, (0.1, 9.0))
+        >>> whittle = Whittle(family, [0.0, 1.0], [Observed(line, 3, line.white, 0.0)])
+        >>> _, information = whittle.score(np.zeros(1), whittle.value(np.zeros(1))[1])
+        >>> round(float(information[0, 0]), 9), 3 * float(line.weights.sum())
+        (70.5, 70.5)
+        """
         family, limits = self.family, self.family.limits
         model, signals = state
         moved = {}
@@ -334,6 +549,17 @@ class Whittle(NamedTuple):
 
         The error assumes independent ordinates, and is too small, but
         proportional to the true error.
+
+        >>> family = SpectrumFamily("exponential", {}, 1.0, None, (0.1, 9.0))
+        >>> window = RecordWindow((0.5,), np.ones(48, dtype=bool))
+        >>> at = family.vector([5.0, 2.0, 0.2])
+        >>> whittle = Whittle(family, [0.0, 1.0], [Observed(window, 3, window.white, 0.01)])
+        >>> state = whittle.value(at)[1]
+        >>> noise, error = whittle.noise_variance(at, state)
+        >>> inverse = np.linalg.inv(whittle.score(at, state)[1])
+        >>> slope = np.array([5.0 * 0.2, 0.0, 5.0])  # by log variance and by the fraction
+        >>> round(noise, 9), round(float(error / math.sqrt(slope @ inverse @ slope)), 6)
+        (1.0, 1.0)
         """
         model, (_, information) = state[0], self.score(at, state)
         # The noise variance is the product of two parameters, whose
