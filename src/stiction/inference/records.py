@@ -74,7 +74,7 @@ def records_of(profiles: Any, interface: Interface | None, quantity: str) -> lis
     >>> interface = Interface(0.064, 64)
     >>> rng = np.random.default_rng(0)
     >>> first, second = 1e6 + 1e5 * rng.standard_normal((2, 64))
-    >>> records = records_of([first, second], interface, "strength")
+    >>> records = records_of((first, second), interface, "strength")
     >>> [record.values.tolist() == row.tolist() for record, row in zip(records, (first, second))]
     [True, True]
     >>> len(records_of(first.tolist(), interface, "strength"))
@@ -131,8 +131,8 @@ def _doubt_lengths(records: Sequence[Record]) -> None:
     >>> import warnings
     >>> with warnings.catch_warnings(record=True) as caught:
     ...     warnings.simplefilter("always")
-    ...     _doubt_lengths([Record(np.zeros((10, 20)), (5.0, 40.0)),
-    ...                     Record(np.zeros(400), (3.0,)), Record(np.zeros(500), (3.0,))])
+    ...     _doubt_lengths([Record(np.zeros((10, 20)), (5.0, 60.0)),
+    ...                     Record(np.zeros(500), (3.0,)), Record(np.zeros(600), (3.0,))])
     >>> [str(warning.message)[:33] for warning in caught]
     ['profiles: a record is 1.2e+03 m l']
     """
@@ -240,13 +240,17 @@ def _spacing(x: Array, name: str) -> float:
     0.2
     >>> _spacing(np.array([0.0, 0.33, 0.67, 1.0, 1.33, 2.0]), "x").__round__(9)
     0.333333333
-    >>> for x in ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 2.0, 3.3, 4.0], [2.0], [0.0, np.inf]):
+    >>> _spacing(np.array([0.0, 1.0, 2.0, 3.1, 4.0, 5.0]), "x")  # a single point is a little off
+    1.0
+    >>> for x in ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 2.0, 3.3, 4.0], [0.0, 1.04, 2.05, 3.04, 4.0],
+    ...           [2.0], [0.0, np.inf]):
     ...     try:
     ...         _spacing(np.array(x), "y")
     ...     except InputError as error:
     ...         print(str(error).split(". ")[0])
     y repeats: there are two values at 1 m
     y is not equally spaced at 3.3 m
+    y is not equally spaced at 2.05 m
     y: must be finite and have more than one point
     y: must be finite and have more than one point
     """
@@ -338,7 +342,7 @@ def refuse_uncorrelated(windows: Sequence[RecordWindow], rows: Sequence[Array]) 
     >>> window = RecordWindow((1.0,), np.ones(64, dtype=bool))
     >>> row, white = np.arange(64.0) % 16, np.random.default_rng(1).standard_normal((9, 64))
     >>> refuse_uncorrelated([window], [row])
-    >>> refuse_uncorrelated([window] * 9, white)  # doctest: +ELLIPSIS
+    >>> refuse_uncorrelated([window] * 9, 9.0 + white)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
     stiction.base.errors.InputError: profiles: neighbouring points are not correlated: ...

@@ -191,7 +191,7 @@ class Model(NamedTuple):
 
         >>> from types import SimpleNamespace
         >>> rho = np.array([1.0, 0.6, -0.2])
-        >>> window = SimpleNamespace(power=lambda *given: 7.0, correlation=lambda power: rho * power / 7)
+        >>> window = SimpleNamespace(power=lambda *given: 7.0, correlation=lambda p: p / 7.0 * rho)
         >>> model = Model(None, 1.0, 0.0, 1.0, [0.0, 0.5, 0.25, 0.25])
         >>> model.correlation(window).round(6).tolist()
         [1.0, 0.444, -0.092]

@@ -225,7 +225,7 @@ class RecordWindow:
 
         >>> window = RecordWindow((0.5,), np.ones(90, dtype=bool))
         >>> lags, at = np.r_[:90, -90:0], np.arange(90)
-        >>> waves = [np.cos(0.9 * at + phase) for phase in np.linspace(0.0, np.pi, 8, endpoint=False)]
+        >>> waves = [np.cos(0.9 * at + phase) for phase in np.pi * np.arange(8) / 8]
         >>> mean = np.mean([window.periodogram(wave) for wave in waves], axis=0)
         >>> expected = window.expectation(0.5 * np.cos(0.9 * lags))
         >>> bool(np.allclose(mean, expected, atol=1e-3 * mean.max())), int(expected.argmax())
