@@ -153,6 +153,32 @@ class Answer(Result):
         `ends` is the interval of the probability, or of the stress of a
         design. `more` contains further attributes, or replaces the
         attributes of the point.
+
+        >>> from types import SimpleNamespace
+        >>> problem = SimpleNamespace(area=3.0)
+        >>> experiment = SimpleNamespace(pressure=4.0, problem=problem)
+        >>> repetitions = [SimpleNamespace(first_stage_evaluations=count) for count in (5, 6)]
+        >>> tail = SimpleNamespace(
+        ...     repetitions=repetitions, spent=80, algorithm="subset", reason="rare", survived=0.25
+        ... )
+        >>> point = SimpleNamespace(
+        ...     state=SimpleNamespace(experiment=experiment, bounds=(0.5, 9.0)), tail=tail,
+        ...     stress=1.5, probability=0.01, cv=0.3, members_cv=0.1, members=np.zeros(0),
+        ... )
+        >>> answer = Answer.at(point, (0.004, 0.02))
+        >>> answer.interval, answer.stress, answer.probability, answer.cv, answer.members_cv
+        ({'probability': (0.004, 0.02)}, 1.5, 0.01, 0.3, 0.1)
+        >>> answer.first_stage_evaluations, answer.evaluations, answer.lower_bound, answer.survived
+        (11, 80, 0.5, 0.25)
+        >>> design = Answer.at(point, (1.0, 2.0), of_stress=True, cv=0.2)
+        >>> design.interval, design.cv
+        ({'stress': (1.0, 2.0), 'force': (3.0, 6.0), 'friction_coefficient': (0.25, 0.5)}, 0.2)
+
+        Without an area and a pressure:
+
+        >>> problem.area, experiment.pressure = None, math.nan
+        >>> Answer.at(point, (1.0, 2.0), of_stress=True).interval
+        {'stress': (1.0, 2.0)}
         """
         for text in doubts:
             warn_accuracy(text)
@@ -291,6 +317,49 @@ class Answer(Result):
         return ("Pa", 1.0) if math.isnan(self.area) else ("N", self.area)
 
     def _summary(self) -> Summary:
+        """>>> sensitivities = xr.Dataset(attrs={"stress by normal": 2.6, "stress": 2.5})
+        >>> design = Answer(
+        ...     stress=2.5, probability=0.001, interval={"stress": (2.25, 2.75)}, cv=0.5,
+        ...     evaluations=70, lower_bound=0.5, algorithm="subset", reason="rare",
+        ...     normal_pressure=5.0, of_stress=True, characteristic_stress=4.0, experiment=None,
+        ...     sensitivities=sensitivities, warnings=("careful",), doubts=("few tests",),
+        ...     members=np.array([0.0, 0.002, 0.001]),
+        ... )
+        >>> print(design)  # doctest: +NORMALIZE_WHITESPACE
+        Design value
+                                          value    90 % interval     unit
+          stress                          2.5      2.25 to 2.75      Pa
+          friction coefficient            0.5
+          probability                     0.001
+          coefficient of variation        0.5
+          90 % of interfaces are between  0.0001   0.0001 to 0.0019
+          reliability index               3.09023
+          lower bound of the stress       0.5                        Pa
+          5 % value, confidence 75 %      4                          Pa
+          partial factor                  1.6
+          subset, 70 evaluations: rare
+          careful
+          few tests
+        >>> design.stress_above_bound, design.by_family, math.isnan(design.force)
+        (2.0, {'normal': 2.6}, True)
+
+        With an area, in order of the requested quantity. An exact answer has
+        no interval.
+
+        >>> from dataclasses import replace
+        >>> force = replace(design, area=4.0, quantity="force")
+        >>> force.force, [row.name for row in force._summary().rows][:4]
+        (10.0, ['force', 'stress', 'friction coefficient', 'probability'])
+        >>> [row.value for row in force._summary().rows if row.name.startswith("5 %")]
+        [16.0]
+        >>> chance = replace(force, of_stress=False, cv=0.0, algorithm="exact", survived=0.125)
+        >>> [(row.name, row.value, row.interval) for row in chance._summary().rows][:2]
+        [('probability', 0.001, ()), ('force', 10.0, ())]
+        >>> [row.value for row in chance._summary().rows if row.name.startswith("fraction")]
+        [0.125]
+        >>> chance._summary().title, replace(chance, stress=math.inf)._summary().title
+        ('Probability of sliding', 'No stress has this probability')
+        """
         values = {
             "probability": (self.probability, ""),
             "stress": (self.stress, "Pa"),
@@ -340,6 +409,22 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
     """Return the sensitivities of a design in words: source, ends, and the design at both ends.
 
     A distribution between specimens has a single design.
+
+    >>> from types import SimpleNamespace
+    >>> columns = {"low": ["0.6", "none"], "high": ["0.8", "as stated"]}
+    >>> columns |= {"stress_at_low": [10.0, 15.0], "stress_at_high": [20.0, 12.0]}
+    >>> effects = xr.Dataset({name: ("source", values) for name, values in columns.items()})
+    >>> effects = effects.assign_coords(source=["ratio", "field"])
+    >>> design = SimpleNamespace(sensitivities=effects, _demand=("N", 3.0))
+    >>> design.by_family = {"normal": 7.0}
+    >>> for row in moves_of(design):
+    ...     print(row)
+    ('ratio', '0.6', '0.8', '30 N', '60 N')
+    ('field', 'none', 'as stated', '45 N', '36 N')
+    ('scatter of specimens', 'normal', '', '21 N', '')
+    >>> design.sensitivities = xr.Dataset()
+    >>> moves_of(design)
+    []
     """
     effects, (unit, scale) = design.sensitivities, design._demand
     if not effects.sizes.get("source"):
@@ -357,7 +442,16 @@ def moves_of(design: Answer) -> list[tuple[str, str, str, str, str]]:
 
 
 def unseen_batch(specimens: int) -> list[str]:
-    """Return a sentence on the weak batch that some specimens cannot exclude (95 %)."""
+    """Return a sentence on the weak batch that some specimens cannot exclude (95 %).
+
+    If a quarter of all specimens were weak, 10 specimens would show none
+    with a probability of 0.75^10 = 0.056.
+
+    >>> unseen_batch(10)
+    ['10 specimens cannot exclude a weaker batch of up to 26% of all specimens']
+    >>> unseen_batch(0)
+    []
+    """
     if not specimens:
         return []
     unseen = 1.0 - (1.0 - UNSEEN_CONFIDENCE) ** (1.0 / specimens)
@@ -371,6 +465,26 @@ def band_of(members: Array) -> tuple[float, float]:
     """Return the 90 % band over equally likely interfaces.
 
     An end is NaN if its value is NaN.
+
+    >>> low, high = band_of(np.array([0.4, 0.0, 0.2]))  # a tenth of a rank from both ends
+    >>> round(low, 6), round(high, 6), band_of(np.zeros(0))
+    (0.02, 0.38, (nan, nan))
+
+    An unknown probability is below 0.2, but above an exact zero:
+
+    >>> low, high = band_of(np.array([0.4, math.nan, 0.2]))
+    >>> low, round(high, 6)
+    (nan, 0.38)
+    >>> band_of(np.array([0.4, math.nan, 0.0]))
+    (nan, nan)
+
+    With 21 interfaces the ends are the values of ranks 1 and 19:
+
+    >>> for least in ([math.nan, 0.0, 0.0], [0.0, math.nan, 0.3], [math.nan, 0.3, 0.5]):
+    ...     print(band_of(np.array([*least, *18 * [0.4]])))
+    (0.0, 0.4)
+    (nan, 0.4)
+    (0.3, 0.4)
     """
     if not members.size:
         return math.nan, math.nan

@@ -168,14 +168,31 @@ def failure_curve(
 
 
 def curve_doubts(end: TailPoint, smallest: float, target_cv: float = CURVE_CV) -> list[str]:
-    """Return the reasons not to trust the end of a curve (step 2)."""
+    """Return the reasons not to trust the end of a curve (step 2).
+
+    >>> from types import SimpleNamespace
+    >>> tail = SimpleNamespace(complete=False, short_of=lambda goal: f"samples do not reach {goal}")
+    >>> curve_doubts(SimpleNamespace(tail=tail), 1e-3)
+    ['samples do not reach P = 0.001. The curve ends there']
+    """
     if not end.tail.complete:
         return [f"{end.tail.short_of(f'P = {smallest:g}')}. The curve ends there"]
     return few_members(end.state.experiment.random, end, target_cv) + exact_doubts(end)
 
 
 def chances(smallest: float) -> Array:
-    """Return the probability at each point on a curve."""
+    """Return the probability at each point on a curve.
+
+    A decade takes three steps. The steps are shorter if the last point is
+    no whole number of steps away.
+
+    >>> chances(0.05).round(6).tolist()
+    [0.5, 0.232079, 0.107722, 0.05]
+    >>> len(chances(0.02)), round(float(chances(0.02)[-1]), 6)  # 4.19 thirds of a decade
+    (6, 0.02)
+    >>> chances(0.5).tolist(), chances(0.7).tolist()
+    ([0.5], [0.5])
+    """
     # The last point lies at the smallest probability, also if it is no
     # power of ten.
     decades = max(np.log10(COMMONEST / smallest), 0.0)
@@ -186,7 +203,46 @@ def chances(smallest: float) -> Array:
 def curve_of(
     tail: Tail, state: LimitState, wanted: Array, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the labelled curve of a tail at given probabilities (step 3)."""
+    """Return the labelled curve of a tail at given probabilities (step 3).
+
+    Four plain samples give the stresses at P = 0.5 and 0.25. One of four
+    survives, so that no stress has the probability 0.8.
+
+    >>> import math
+    >>> from types import SimpleNamespace
+    >>> from stiction.reliability.subset import Descent, Population
+    >>> numbers = np.arange(4)
+    >>> level = Population(math.inf, 0.0, np.array([3.0, 1.0, math.inf, 2.0]), numbers, numbers)
+    >>> tail = Tail([Descent(4, [level], 0.0, 4, complete=True)], spent=70)
+    >>> problem, method = SimpleNamespace(area=10.0), SimpleNamespace(type="own")
+    >>> experiment = SimpleNamespace(problem=problem, pressure=5.0, method=method)
+    >>> state = SimpleNamespace(bounds=(0.75, 9.0), several=False, experiment=experiment)
+    >>> curve = curve_of(tail, state, np.array([0.8, 0.5, 0.25]), {"seed": 3})
+    >>> for name in ("stress", "stress_above_bound", "friction_coefficient", "force"):
+    ...     print(name, curve[name].values.round(6).tolist())
+    stress [nan, 2.0, 1.0]
+    stress_above_bound [nan, 1.25, 0.25]
+    friction_coefficient [nan, 0.4, 0.2]
+    force [nan, 20.0, 10.0]
+    >>> curve.probability.values.tolist(), (curve.cv.values[1:] ** 2).round(6).tolist()
+    ([nan, 0.5, 0.25], [0.333333, 3.0])
+    >>> ends = lognormal_interval(0.5, 3.0**-0.5)
+    >>> (float(curve.probability_low[1]), float(curve.probability_high[1])) == ends
+    True
+    >>> bool(curve.stress_low[1] == 0.75), round(float(curve.stress_high[1]), 6)
+    (True, inf)
+    >>> [curve.attrs[name] for name in ("seed", "evaluations", "repetitions", "survived", "method")]
+    [3, 70, 1, 0.25, 'own']
+    >>> curve.attrs["lower_bound"], [name for name in OF_A_LIST if name in curve]
+    (0.75, [])
+
+    Without an area and a pressure, the curve has no forces and no coefficients:
+
+    >>> problem.area, experiment.pressure = None, math.nan
+    >>> curve = curve_of(tail, state, np.array([0.5]), {})
+    >>> "force" in curve, "friction_coefficient" in curve, "stress_above_bound" in curve
+    (False, False, True)
+    """
     lowest, pressure = state.bounds[0], state.experiment.pressure
     area = state.experiment.problem.area or np.nan
     rows, members = [], []

@@ -230,7 +230,38 @@ def _quantile(
 
 
 def ranges_of(problem: Any, source: Any, stated: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the range of each constant that may be an assumption, by full key."""
+    """Return the range of each constant that may be an assumption, by full key.
+
+    The constants of a problem, by 10 % on either side. Zero, a field and a missing
+    value have no range.
+
+    >>> from types import SimpleNamespace
+    >>> friction = SimpleNamespace(residual_ratio=0.5, residual_strength=0.0)
+    >>> friction.weakening_rate, friction.critical_slip = np.ones(3), None
+    >>> problem = SimpleNamespace(friction=friction, load=SimpleNamespace(pressing_force=20.0))
+    >>> def shown(ranges):
+    ...     for key, ends in ranges.items():
+    ...         print(key, *(round(end, 6) for end in ends))
+    >>> shown(ranges_of(problem, None, {}))
+    problem.friction.residual_ratio 0.45 0.55
+    problem.load.pressing_force 18.0 22.0
+
+    Assumptions of a fit are added, and stated ranges replace the usual ones:
+
+    >>> source = SimpleNamespace(assumed={"random.correlation_length": 2.0})
+    >>> stated = {"random.correlation_length": [1.0, 4.0]}
+    >>> stated["problem.friction.residual_strength"] = 0.0, 2.0
+    >>> shown(ranges_of(problem, source, stated))
+    problem.friction.residual_ratio 0.45 0.55
+    problem.load.pressing_force 18.0 22.0
+    random.correlation_length 1.0 4.0
+    problem.friction.residual_strength 0.0 2.0
+    >>> key = "problem.friction.critical_slip"
+    >>> ranges_of(problem, None, {key: (1.0, 2.0)})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: sensitivities: ...critical_slip: is not a constant ...
+    """
     values = {f"problem.{key}": value_at(problem, key) for key in CONSTANTS}
     values |= getattr(source, "assumed", {})
     ranges = {
@@ -247,7 +278,19 @@ def ranges_of(problem: Any, source: Any, stated: Mapping[str, Any]) -> dict[str,
 
 
 class _Counted(NamedTuple):
-    """Prediction from samples, for interfaces without a prediction of their own."""
+    """Prediction from samples, for interfaces without a prediction of their own.
+
+    >>> from types import SimpleNamespace
+    >>> counts = SimpleNamespace(
+    ...     members=np.array([[0, 1], [2, 0]]), values=np.array([[1.0, 2.0], [4.0, 5.0]]),
+    ...     tail=SimpleNamespace(quantile=lambda probability: 9.0),
+    ... )
+    >>> counted = _Counted(counts, np.array(["normal", "weibull", "weibull", "lognormal"]))
+    >>> counted.families
+    ['normal', 'weibull']
+    >>> counted.quantile(0.25), counted.quantile(0.25, "weibull"), counted.quantile(0.5, "normal")
+    (9.0, 2.5, 3.0)
+    """
 
     counts: Counts
     kinds: Array  # family of the factor of each interface
@@ -277,7 +320,66 @@ class _Counted(NamedTuple):
 def sensitivities_of(
     state: LimitState, probability: float, stress: float, stated: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the design stress at both ends of each source, with the largest effect first."""
+    """Return the design stress at both ends of each source, with the largest effect first.
+
+    Here the quantile of the prediction is 4 Pa, divided by the ratio 0.5 and
+    times the force of 20 N, and times 0.5 for the lognormal family. The design is
+    6 Pa at an area of 3 m².
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.base.progress import SILENT
+    >>> class Source:
+    ...     notes = doubts = ()
+    ...     assumed = {}
+    ...     def interfaces(self, count, seed):
+    ...         return []
+    ...     def prediction(self, problem, method, changes, workers):
+    ...         ratio = changes.get("problem.friction.residual_ratio", 0.5)
+    ...         force = changes.get("problem.load.pressing_force", 20.0)
+    ...         if force > 25.0:
+    ...             raise InputError("too large")
+    ...         factors = {None: 1.0, "normal": 1.0, "lognormal": 0.5}
+    ...         def quantile(probability, family=None):
+    ...             return 4.0 * ratio / 0.5 * (force / 20.0) ** 2 * factors[family]
+    ...         return SimpleNamespace(families=["normal", "lognormal"], quantile=quantile)
+    ...     def without_field(self, problem, method):
+    ...         return SimpleNamespace(quantile=lambda probability: 5.0)
+    >>> problem = SimpleNamespace(
+    ...     friction=SimpleNamespace(residual_ratio=0.5), area=3.0,
+    ...     load=SimpleNamespace(pressing_force=20.0),
+    ... )
+    >>> source = Source()
+    >>> experiment = SimpleNamespace(
+    ...     problem=problem, method=None, random=SimpleNamespace(source=source)
+    ... )
+    >>> state = SimpleNamespace(experiment=experiment, workers=1, meter=SILENT)
+    >>> def shown(stated):
+    ...     effects = sensitivities_of(state, 0.01, 6.0, stated)
+    ...     for row in effects.to_dataframe().round(4).itertuples():
+    ...         print(*row[:5])
+    ...     return effects
+    >>> effects = shown({})
+    distribution between specimens lognormal normal 3.0 6.0
+    problem.load.pressing_force 18 22 4.86 7.26
+    problem.friction.residual_ratio 0.45 0.55 5.4 6.6
+    >>> effects.force_at_low.values.round(4).tolist()
+    [9.0, 14.58, 16.2]
+    >>> effects.force_at_high.values.round(4).tolist()
+    [18.0, 21.78, 19.8]
+    >>> effects.attrs["stress by lognormal"], effects.attrs["stress by normal"]
+    (3.0, 6.0)
+    >>> effects.attrs["probability"], effects.attrs["stress"]
+    (0.01, 6.0)
+
+    The field of a specimen, if it is an assumption, and a value that is not possible:
+
+    >>> source.assumed = {"random.correlation_length": 2.0}
+    >>> _ = shown({"problem.load.pressing_force": (10.0, 30.0)})
+    distribution between specimens lognormal normal 3.0 6.0
+    variation along a specimen none as stated 7.5 6.0
+    problem.friction.residual_ratio 0.45 0.55 5.4 6.6
+    random.correlation_length 1.8 2.2 6.0 6.0
+    """
     experiment = state.experiment
     problem, source = experiment.problem, experiment.random.source
 

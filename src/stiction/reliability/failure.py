@@ -203,6 +203,41 @@ def demanded(state: LimitState, name: str, given: float) -> float:
 
     Warn about a demand far from the mean strength. Refuse it if the
     ratio is a thousand.
+
+    The mean strength is 2 MPa, the area 3 m², and the mean pressure 4 MPa.
+
+    >>> from types import SimpleNamespace
+    >>> problem = SimpleNamespace(area=3.0, specimen=None)
+    >>> experiment = SimpleNamespace(problem=problem, pressure=4e6, mean_strength=2e6)
+    >>> state = SimpleNamespace(experiment=experiment, bounds=(0.0, 9e6))
+    >>> demanded(state, "stress", 1e6), demanded(state, "force", 6e6)
+    (1000000.0, 2000000.0)
+    >>> demanded(state, "friction_coefficient", 0.25)
+    1000000.0
+    >>> demanded(state, "force", 1e3)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: force: 1000 N is 0.00017 times the mean strength, 6 MN...
+
+    A stress below a fiftieth of the strength is unusual, unless it is at most
+    the lower bound:
+
+    >>> from stiction.base.errors import collect_warnings
+    >>> for stress, bound in (1e4, 0.0), (1e4, 1e4), (4e4, 0.0), (2e8, 0.0), (1e8, 0.0):
+    ...     state.bounds = bound, 9e9
+    ...     with collect_warnings() as warned:
+    ...         _ = demanded(state, "stress", stress)
+    ...     print(stress, len(warned))
+    10000.0 1
+    10000.0 0
+    40000.0 0
+    200000000.0 1
+    100000000.0 0
+    >>> experiment.pressure = math.nan
+    >>> demanded(state, "friction_coefficient", 0.25)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: friction_coefficient: needs a normal pressure...
     """
     experiment, stress = state.experiment, given
     if name == "force":
@@ -277,7 +312,37 @@ def _probability(
 
 
 def _certain(state: LimitState, stress: float, likely: tuple[float, float]) -> Answer:
-    """Return an answer that needs no samples (step 1)."""
+    """Return an answer that needs no samples (step 1).
+
+    >>> from types import SimpleNamespace
+    >>> problem, random = SimpleNamespace(area=None), SimpleNamespace(members=range(5))
+    >>> experiment = SimpleNamespace(problem=problem, pressure=math.nan, random=random)
+    >>> state = SimpleNamespace(experiment=experiment, bounds=(1.0, 8.0), several=False)
+    >>> def shown(stress, likely=(2.0, 6.0)):
+    ...     answer = _certain(state, stress, likely)
+    ...     low, high = answer.interval["probability"]
+    ...     print(answer.probability, low, high, answer.members.tolist())
+    ...     print(answer.reason)
+    >>> shown(1.0)
+    0.0 0.0 0.0 []
+    no interface slides at or below 1 Pa
+    >>> shown(8.0)
+    1.0 1.0 1.0 []
+    no interface carries more than 8 Pa
+    >>> shown(2.0)
+    0.0 0.0 1e-15 []
+    no interface slides at or below 2 Pa, except with a probability below 1e-15
+
+    Another list of 5 might have other bounds: at 95 % confidence, p is at most
+    1 - 0.05^(1/5) = 0.4507.
+
+    >>> state.several = True
+    >>> answer = _certain(state, 9.0, (2.0, 6.0))
+    >>> [round(end, 4) for end in answer.interval["probability"]], answer.members.tolist()
+    ([0.5493, 1.0], [1.0, 1.0, 1.0, 1.0, 1.0])
+    >>> [round(end, 4) for end in _certain(state, 1.5, (2.0, 6.0)).interval["probability"]]
+    [0.0, 0.4507]
+    """
     certain = not state.bounds[0] < stress < state.bounds[1]
     low, high = state.bounds if certain else likely
     doubt = 0.0 if certain else NEGLIGIBLE_PROBABILITY
@@ -325,7 +390,41 @@ def _by_counting(
 
 
 def _by_tail(point: TailPoint, target_cv: float) -> Answer:
-    """Return the answer for a point of an estimated tail."""
+    """Return the answer for a point of an estimated tail.
+
+    A tail that ends at 2 Pa, below which lie 40 of 80 samples. A smaller stress is less
+    probable. The interval has the factor exp(`log_width`).
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.base.errors import collect_warnings
+    >>> from stiction.reliability.subset import Descent, Population
+    >>> from stiction.reliability.tail import log_width
+    >>> numbers, values = np.arange(80), np.arange(80.0) / 20.0
+    >>> level = Population(math.inf, 0.0, values, numbers, numbers, np.zeros((80, 0)))
+    >>> problem = SimpleNamespace(area=None)
+    >>> method = SimpleNamespace(label="own", exact_method=None)
+    >>> experiment = SimpleNamespace(problem=problem, pressure=math.nan, method=method, seed=0)
+    >>> state = SimpleNamespace(experiment=experiment, bounds=(-1.0, 8.0), several=False)
+    >>> state.guide = "no guide"
+    >>> def answer(stress, tail):
+    ...     with collect_warnings() as warned:
+    ...         found = _by_tail(TailPoint(state, tail, stress), 9.0)
+    ...     return found, [text.text for text in warned]
+    >>> tail = Tail([Descent(80, [level], 1.999, 80, complete=False)], spent=90)
+    >>> found, doubts = answer(-0.5, tail)
+    >>> round(found.interval["probability"][1] / math.exp(log_width(tail.cv(1.999))), 6)
+    0.5
+    >>> found.probability, doubts[0][-23:]
+    (0.0, 'The interval ends there')
+
+    With two levels, no failure leaves the probability of the guide's level:
+
+    >>> rare = level._replace(log_probability=math.log(0.125))
+    >>> tail = Tail([Descent(80, [rare], -0.5, 80, complete=True)], "two_level", spent=40)
+    >>> found, doubts = answer(-0.5, tail)
+    >>> round(found.interval["probability"][1], 6), doubts[0][-43:]
+    (0.125, 'The interval ends at the level of the guide')
+    """
     tail, probability = point.tail, point.probability
     interval = lognormal_interval(probability, point.cv)
     doubts = imprecise(point.sampling_cv, target_cv, tail.spent)
@@ -354,7 +453,19 @@ def _by_tail(point: TailPoint, target_cv: float) -> Answer:
 
 
 def _failing_profiles(point: TailPoint) -> xr.Dataset:
-    """Return labelled profiles and onsets of some samples that fail."""
+    """Return labelled profiles and onsets of some samples that fail.
+
+    No failure gives an empty dataset.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.reliability.subset import Descent, Population
+    >>> none = np.zeros(0, int)
+    >>> level = Population(math.inf, 0.0, np.array([3.0, 2.0]), none, none, np.zeros((2, 1)))
+    >>> tail = Tail([Descent(2, [level], 2.0, 2, complete=True)])
+    >>> state = SimpleNamespace(experiment=SimpleNamespace(seed=0))
+    >>> len(_failing_profiles(TailPoint(state, tail, 2.0)))
+    0
+    """
     experiment, last = point.state.experiment, point.tail.repetitions[-1]
     draws, stresses = last.failing
     failed = np.flatnonzero(stresses < point.stress)

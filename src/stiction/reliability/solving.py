@@ -96,13 +96,36 @@ def prepare(
 
 
 def exact_law(state: LimitState) -> Any:
-    """Return the distribution of the onset if no samples are needed, else None."""
+    """Return the distribution of the onset if no samples are needed, else None.
+
+    >>> from types import SimpleNamespace
+    >>> source = SimpleNamespace(law=lambda problem, method: (problem, method))
+    >>> random = SimpleNamespace(source=source)
+    >>> experiment = SimpleNamespace(problem="joint", method="exact", random=random)
+    >>> exact_law(SimpleNamespace(experiment=experiment))
+    ('joint', 'exact')
+    >>> random.source = None
+    >>> exact_law(SimpleNamespace(experiment=experiment)) is None
+    True
+    """
     experiment, law = state.experiment, getattr(state.experiment.random.source, "law", None)
     return law(experiment.problem, experiment.method) if law else None
 
 
 def exact_tail(state: LimitState) -> Tail:
-    """Return an empty tail with the reason why no samples are needed."""
+    """Return an empty tail with the reason why no samples are needed.
+
+    >>> from types import SimpleNamespace
+    >>> source, method = SimpleNamespace(problem="plate"), SimpleNamespace(label="local criterion")
+    >>> experiment = SimpleNamespace(problem="plate", method=method)
+    >>> experiment.random = SimpleNamespace(source=source)
+    >>> exact_tail(SimpleNamespace(experiment=experiment)).reason
+    'specimens differ only as a whole, so the answer is an average over families'
+    >>> experiment.problem = "joint"
+    >>> tail = exact_tail(SimpleNamespace(experiment=experiment))
+    >>> tail.algorithm, tail.spent, tail.reason[-52:]
+    ('exact', 0, ' and local criterion computes the onset of the joint')
+    """
     experiment = state.experiment
     reason = "specimens differ only as a whole, so the answer is an average over families"
     if experiment.problem != getattr(experiment.random.source, "problem", None):
@@ -119,6 +142,32 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
     The doubt states the number of specimens for which the likelihoods
     of the two families differ by `ODDS` on average. It follows from the
     divergence of one family from the other.
+
+    The stresses at P = 1e-4 are 3 and 1 MPa, times the area of 2 m². The
+    likelihoods differ by 20 after log(20)/0.1 = 29.96 specimens. A ratio
+    of 1.5 is the least that leads to a doubt.
+
+    >>> from types import SimpleNamespace
+    >>> problem = SimpleNamespace(area=2.0)
+    >>> state = SimpleNamespace(experiment=SimpleNamespace(problem=problem))
+    >>> stresses = {"normal": 2e6, "weibull": 1e6, "lognormal": 3e6}
+    >>> law = SimpleNamespace(families=list(stresses), quantile=lambda p, name: stresses[name])
+    >>> law.divergence = lambda low, high: 0.1 if (low, high) == ("weibull", "lognormal") else 9.0
+    >>> [text] = undetermined(state, law, 1e-4)
+    >>> print(text.replace(". ", ".\\n").replace(" and", "\\nand"))
+    the tests do not determine P = 0.0001: the lognormal family leads to 6 MN
+    and the weibull family to 2 MN.
+    About 30 specimens would tell these two apart, with odds of 20 to 1.
+    Without a family about 3e+04 specimens are needed
+    >>> problem.area, stresses["lognormal"] = None, 2.5e6
+    >>> "to 2.5 MPa and the weibull family to 1 MPa. " in undetermined(state, law, 1e-4)[0]
+    True
+    >>> stresses["normal"], stresses["lognormal"] = 1.49e6, 1.49e6
+    >>> undetermined(state, law, 1e-4)
+    []
+    >>> stresses["lognormal"] = 1.5e6
+    >>> len(undetermined(state, law, 1e-4))
+    1
     """
     stresses = {name: law.quantile(probability, name) for name in law.families}
     low, high = (pick(stresses, key=stresses.__getitem__) for pick in (min, max))
@@ -137,7 +186,20 @@ def undetermined(state: LimitState, law: Any, probability: float) -> list[str]:
 
 
 def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
-    """Return the most evaluations in all rounds of a call."""
+    """Return the most evaluations in all rounds of a call.
+
+    Evaluations take 900 s, or 100 s if 20,000 of them would take longer than
+    900 s. They are at least 1,000 and at most 2,000,000.
+
+    >>> from types import SimpleNamespace
+    >>> for seconds in 0.03, 0.05, 2.0, 1e-6:
+    ...     experiment = SimpleNamespace(seconds=seconds, method=SimpleNamespace(type="own"))
+    ...     print(allowed(experiment, None), allowed(experiment, 300))
+    30000 300
+    2000 300
+    1000 300
+    2000000 300
+    """
     seconds = COUNTING_SECONDS if too_slow(experiment, max_evaluations) else PATIENCE_SECONDS
     return max_evaluations or int(
         min(MOST_EVALUATIONS, max(FEWEST_EVALUATIONS, seconds / experiment.seconds))
@@ -145,7 +207,22 @@ def allowed(experiment: Experiment, max_evaluations: int | None) -> int:
 
 
 def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
-    """Return a message if chains of samples take too long with this method, or None."""
+    """Return a message if chains of samples take too long with this method, or None.
+
+    >>> from types import SimpleNamespace
+    >>> method = SimpleNamespace(type="own")
+    >>> slow = SimpleNamespace(seconds=0.09, method=method)
+    >>> fast = SimpleNamespace(seconds=0.045, method=method)
+    >>> print(too_slow(slow, None).replace(" take", "\\ntake").replace(". ", ".\\n"))
+    20,000 evaluations of subset simulation by 'own'
+    take about 0.5 h.
+    Allow so many with max_evaluations, or pass algorithm='plain'
+    >>> too_slow(fast, None), too_slow(slow, 20_000), too_slow(slow, 19_999) is None
+    (None, None, False)
+    >>> method.counted_only = True
+    >>> too_slow(fast, None) is None, too_slow(fast, 30_000) is None
+    (False, True)
+    """
     seconds, method = CHAIN_EVALUATIONS * experiment.seconds, experiment.method
     fast = seconds <= PATIENCE_SECONDS and not optional_member(method, "counted_only")
     if fast or (max_evaluations or 0) >= CHAIN_EVALUATIONS:
@@ -157,12 +234,31 @@ def too_slow(experiment: Experiment, max_evaluations: int | None) -> str | None:
 
 
 def sampling_target(state: LimitState, target_cv: float) -> float:
-    """Return the target that is left for the sampling error."""
+    """Return the target that is left for the sampling error.
+
+    >>> from types import SimpleNamespace
+    >>> [round(sampling_target(SimpleNamespace(several=several), 0.3), 6) for several in (0, 1)]
+    [0.3, 0.24]
+    """
     return target_cv * (SAMPLING_SHARE if state.several else 1.0)
 
 
 def wanted_members(random: Any, cv: float, target_cv: float) -> int:
-    """Return the number of members to draw from a source, 0 if there are enough."""
+    """Return the number of members to draw from a source, 0 if there are enough.
+
+    A cv of 0.12 is twice the part 0.6 * 0.1 for the interfaces. So 4 times as many
+    are needed, with a margin of 1.2. At least twice as many are drawn.
+
+    >>> from types import SimpleNamespace
+    >>> random = SimpleNamespace(members=range(900), source="posterior")
+    >>> [wanted_members(random, cv, 0.1) for cv in (0.12, 0.066, 0.05, 0.6)]
+    [4320, 1800, 0, 8000]
+    >>> random.source = None
+    >>> wanted_members(random, 0.12, 0.1)
+    0
+    >>> wanted_members(SimpleNamespace(members=range(8000), source="posterior"), 0.12, 0.1)
+    0
+    """
     least = cv / (LIST_SHARE * target_cv)  # the error falls with the root of the number
     count = len(random.members)
     if random.source is None or least <= 1.0 or count >= MAX_MEMBERS:
@@ -197,7 +293,20 @@ def answered(
 
 
 def warn_of_field(experiment: Experiment) -> None:
-    """Warn about the field of a fit in place of a fit with scatter between specimens."""
+    """Warn about the field of a fit in place of a fit with scatter between specimens.
+
+    >>> from types import SimpleNamespace
+    >>> with collect_warnings() as warned:
+    ...     for between, specimens in (None, 8), (None, None), ("lognormal", 8):
+    ...         strength = SimpleNamespace(specimens_of_fit=specimens)
+    ...         member = SimpleNamespace(between=between, strength=strength)
+    ...         random = SimpleNamespace(several=False, members=[member])
+    ...         warn_of_field(SimpleNamespace(random=random))
+    ...         print(len(warned))
+    1
+    1
+    1
+    """
     if specimens_of_fit(experiment.random):
         warn_accuracy(
             "random: is the field of a fit, without the scatter between specimens. Pass the fit"
@@ -216,6 +325,47 @@ def with_enough_members(
 
     A source draws more members until the error is small enough, or
     another round would need more evaluations than are left.
+
+    Each solution costs 400 evaluations. The error by the choice of n
+    interfaces is 0.38/sqrt(n). A target of 0.1 allows 0.06, so that 10
+    interfaces are too few, and 48 are enough.
+
+    >>> from dataclasses import make_dataclass
+    >>> from types import SimpleNamespace
+    >>> import stiction as st
+    >>> from stiction.base.progress import SILENT
+    >>> problem = st.paper.problem(nodes=256)
+    >>> class Source:
+    ...     def __init__(self, different):
+    ...         self.different = different
+    ...     def interfaces(self, count, seed):
+    ...         kinds = [1.0 + number % self.different for number in range(count)]
+    ...         return [st.paper.strength(problem, kind) for kind in kinds]
+    >>> def solve(experiment, meter, spent):
+    ...     count = len(experiment.random.members)
+    ...     print(count, "interfaces", spent)
+    ...     return SimpleNamespace(members_cv=0.38 * count**-0.5, tail=SimpleNamespace(spent=400))
+    >>> def spent(different, budget):
+    ...     random = SimpleNamespace(
+    ...         members=range(10), kinds=np.arange(10), source=Source(different)
+    ...     )
+    ...     case = make_dataclass("Case", ["random", "seed", "seconds", "method"])
+    ...     case, warned = case(random, 0, 0.01, None), ["a warning"]
+    ...     print(with_enough_members(case, 0.1, SILENT, warned, budget, solve)[2], warned)
+    >>> spent(15, 800)
+    10 interfaces 0
+    48 interfaces 400
+    800 []
+
+    A list without half as many more different interfaces, or a smaller
+    budget, ends the search:
+
+    >>> spent(14, 800)
+    10 interfaces 0
+    400 ['a warning']
+    >>> spent(15, 799)
+    10 interfaces 0
+    400 ['a warning']
     """
     spent, budget = 0, allowed(experiment, max_evaluations)
     while True:
@@ -236,7 +386,35 @@ def with_enough_members(
 
 
 def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> list[str]:
-    """Return a warning if the choice of interfaces leaves the estimate above `target_cv`."""
+    """Return a warning if the choice of interfaces leaves the estimate above `target_cv`.
+
+    The first two members are equal. The different ones carry 0.3, 0.6 and 0
+    of the mean, and the two largest carry 90 % of it.
+
+    >>> from types import SimpleNamespace
+    >>> random = SimpleNamespace(kinds=np.array([0, 0, 1, 2]), source=None)
+    >>> members = np.array([0.1, 0.2, 0.6, math.nan])
+    >>> estimate = SimpleNamespace(cv=0.25, members_cv=0.15, members=members)
+    >>> [text] = few_members(random, estimate, 0.2)
+    >>> print(text.replace(". ", ".\\n").replace("), ", "),\\n").replace("list, ", "list,\\n"))
+    the interfaces are a sample, and 2 of 3 different ones carry 90% of the mean.
+    The coefficient of variation is 0.25 (target 0.2),
+    of which this choice makes 0.15.
+    Pass the fit or posterior itself, which gives more interfaces, pass a longer list,
+    or measure more
+    >>> random.source, estimate.members = "fit", np.full(4, math.nan)
+    >>> print(few_members(random, estimate, 0.2)[0].replace(". ", ".\\n"))
+    the interfaces are a sample.
+    The coefficient of variation is 0.25 (target 0.2), of which this choice makes 0.15.
+    Use more repetitions of the fit (bootstrap=), or measure more
+
+    Both the error and the part by the choice must be too large:
+
+    >>> few_members(random, SimpleNamespace(cv=0.2, members_cv=0.15), 0.2)
+    []
+    >>> few_members(random, SimpleNamespace(cv=0.25, members_cv=0.12), 0.2)
+    []
+    """
     by_list = estimate.members_cv
     if not (estimate.cv > target_cv and by_list > LIST_SHARE * target_cv):
         return []
@@ -257,7 +435,21 @@ def few_members(random: Any, estimate: Answer | TailPoint, target_cv: float) -> 
 
 
 def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
-    """Return a warning if the estimate is less precise than `target_cv`."""
+    """Return a warning if the estimate is less precise than `target_cv`.
+
+    Four times 1,100 evaluations halve the error, with a margin of 1.2:
+
+    >>> print(imprecise(0.2, 0.1, 1100)[0].replace(", ", ",\\n").replace(". ", ".\\n"))
+    the coefficient of variation by sampling is 0.2 after 1100 evaluations,
+    but 0.1 was wanted.
+    To reach it,
+    raise max_evaluations to about 5e+03,
+    or accept a larger target_cv
+    >>> imprecise(math.inf, 0.1, 70)[0][-64:]
+    'To reach it, raise max_evaluations, or accept a larger target_cv'
+    >>> imprecise(0.1, 0.1, 70)
+    []
+    """
     advice = "raise max_evaluations"
     if math.isfinite(cv):
         advice += f" to about {REQUEST_MARGIN * evaluations * (cv / target_cv) ** 2:.1g}"
@@ -269,7 +461,12 @@ def imprecise(cv: float, target_cv: float, evaluations: int) -> list[str]:
 
 
 def different(values: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Return up to `count` positions of distinct values, in random order."""
+    """Return up to `count` positions of distinct values, in random order.
+
+    >>> values, rng = np.array([3.0, 1.0, 3.0, 2.0]), np.random.default_rng(1)
+    >>> sorted(different(values, 5, rng).tolist()), different(values, 2, rng).size
+    ([0, 1, 3], 2)
+    """
     _, first = np.unique(values, return_index=True)  # chains repeat states
     return rng.permutation(first)[:count]
 
@@ -282,6 +479,36 @@ def exact_doubts(point: TailPoint) -> list[str]:
     The checked samples are low samples on both sides of the stress.
     Failures are counted, because in a tail a small change of stress may
     multiply the probability.
+
+    Of the 20 lowest of 40 samples, 10 are below the stress 10. By the
+    exact method 4 are, so that 6 samples change sides. This is more than
+    twice the square root of 6.
+
+    >>> import stiction as st
+    >>> from types import SimpleNamespace
+    >>> from stiction.base.progress import SILENT
+    >>> from stiction.reliability.subset import Descent, Population
+    >>> method = SimpleNamespace(exact_method="equilibrium", label="guess")
+    >>> experiment = SimpleNamespace(problem=st.paper.problem(nodes=256), method=method)
+    >>> def doubts(limit, chance=0.3):
+    ...     values = np.arange(40.0)
+    ...     level = Population(math.inf, 0.0, values, values, values, values[:, None])
+    ...     tail = SimpleNamespace(repetitions=[Descent(40, [level], 10.0, 40, complete=True)])
+    ...     state = SimpleNamespace(experiment=experiment, meter=SILENT)
+    ...     state.by = lambda exact: lambda draws: np.where(draws[:, 0] < limit, 9.0, 10.0)
+    ...     point = SimpleNamespace(state=state, tail=tail, stress=10.0, probability=chance)
+    ...     return exact_doubts(point)
+    >>> print(doubts(4.0)[0].replace(". ", ".\\n"))
+    of 20 samples in the tail 10 fail by the guess and 4 by equilibrium.
+    The probability by st.Equilibrium() is about 0.12, not 0.3.
+    Use the exact method
+    >>> doubts(6.0), doubts(14.0)  # 4 samples on the same side
+    ([], [])
+    >>> "is below 0.03, not" in doubts(0.0)[0], "is about 1, not 0.8" in doubts(16.0, 0.8)[0]
+    (True, True)
+    >>> method.exact_method = None
+    >>> doubts(4.0)
+    []
     """
     state, stress = point.state, point.stress
     experiment, (population, near) = state.experiment, point.tail.repetitions[-1].around(stress)

@@ -86,6 +86,18 @@ def ancestral_variance(ancestors: NDArray[np.int64], samples: int) -> float:
        binomial distribution does.
     3. With k families of equal size, v is 1/k, but the variance of a
        mean over k values needs 1/(k - 1). Therefore return v/(1 - v).
+
+    Two families of equal size have v = 1/2 - 1/5, and a single family has
+    1 - 1/5. If all four of 4 samples fail, v is (2/4)^2.
+
+    >>> round(ancestral_variance(np.array([0, 2]), 5), 6)  # 0.3/0.7
+    0.428571
+    >>> round(ancestral_variance(np.array([3, 3, 3]), 5), 6)
+    4.0
+    >>> round(ancestral_variance(np.arange(4), 4), 6)
+    0.333333
+    >>> ancestral_variance(np.array([], int), 5), ancestral_variance(np.array([1]), 2)
+    (inf, inf)
     """
     if ancestors.size == 0:
         return math.inf
@@ -100,6 +112,14 @@ def generator(seed: int, *key: int) -> np.random.Generator:
 
     The first number of the spawn key separates this generator from the
     streams of random fields.
+
+    >>> first, again, second = generator(4, 1, 2), generator(4, 1, 2), generator(4, 2, 1)
+    >>> number = first.random()
+    >>> number == again.random(), number == second.random()
+    (True, False)
+    >>> sequence = np.random.SeedSequence(4, spawn_key=(7_000_000, 1, 2))
+    >>> number == np.random.Generator(np.random.PCG64DXSM(sequence)).random()
+    True
     """
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(7_000_000, *key))
     return np.random.Generator(np.random.PCG64DXSM(sequence))
@@ -139,6 +159,48 @@ class Descent(NamedTuple):
     requested probability. With two levels, it has one population: the
     samples to which the guide leads, with their exact values. `last`
     and `walked` describe walks among failures (see `two_level`).
+
+    The second level has the probability 0.4. The guide leads to 80 % of the
+    failures.
+
+    >>> top = Population(
+    ...     math.inf, 0.0, np.array([5.0, 1.0, 3.0, math.inf, 2.0]), np.arange(5),
+    ...     np.array([0, 1, 0, 1, 1]), np.ones((5, 2)),
+    ... )
+    >>> rare = Population(
+    ...     3.0, math.log(0.4), np.array([1.0, 2.0, 0.5, 0.5]), np.array([1, 4, 1, 1]),
+    ...     np.array([1, 1, 0, 0]), np.zeros((4, 2)),
+    ... )
+    >>> descent = Descent(5, [top, rare], 0.75, 9, complete=True, last=0.8, last_variance=0.1)
+    >>> descent.extent, descent.survived
+    ((0.5, 5.0), 0.2)
+    >>> Descent(1, [top._replace(values=np.array([math.inf]))], 0.75, 1, complete=False).extent
+    (inf, -inf)
+
+    The ceiling itself belongs to the second level:
+
+    >>> [round(descent.probability(value), 6) for value in (3.5, 3.0, 1.0, 0.5)]
+    [0.75, 0.5, 0.25, 0.0]
+    >>> descent.below(3.0).members.size
+    4
+    >>> round(descent.relative_variance(1.5), 6), round(descent.relative_variance(2.5), 6)
+    (4.1, 0.83913)
+    >>> below = descent.below(1.5)
+    >>> round(below.probability, 6), below.members.tolist(), below.ancestors.tolist()
+    (0.125, [1, 0, 0], [1, 1, 1])
+    >>> below.drawn is None
+    True
+    >>> below = descent.below(4.0)
+    >>> round(below.probability, 6), below.members.tolist(), below.ancestors.tolist()
+    (0.25, [1, 0, 1], [1, 2, 4])
+    >>> below.drawn.tolist()
+    [0, 1, 0, 1, 1]
+    >>> descent.failing[1].tolist(), descent.failing[0].shape
+    ([1.0, 2.0, 0.5, 0.5], (4, 2))
+    >>> descent._replace(walked=(np.ones((1, 2)), np.array([0.6]))).failing[1].tolist()
+    [0.6]
+    >>> [len(level.draws) for level in descent.light().populations]
+    [0, 0]
     """
 
     samples: int  # N, of the first level and, within a few, of each other
@@ -202,6 +264,19 @@ class Descent(NamedTuple):
         The samples are the lowest of the population, twice as many as
         lie below the value. If more than half of a population lies
         below the value, a less rare population is used.
+
+        Half of the second level is below 0.75, and three of four samples are
+        below 1.5. The first level has one sample below 1.5.
+
+        >>> none, draws = np.zeros(0, int), np.zeros((5, 1))
+        >>> top = Population(math.inf, 0.0, np.array([5.0, 1.0, 3.0, 4.0, 2.0]), none, none, draws)
+        >>> rare = Population(3.0, -1.0, np.array([1.0, 2.0, 0.5, 0.5]), none, none, draws[:4])
+        >>> for value, first in (0.75, top), (1.5, top), (1.5, top.light()):
+        ...     holder, numbers = Descent(5, [first, rare], 0.75, 9, complete=True).around(value)
+        ...     print(holder.ceiling, numbers.tolist())
+        3.0 [2, 3, 0, 1]
+        inf [1, 4]
+        3.0 [2, 3, 0, 1]
         """
         holders = self._holders(value)
         while True:
@@ -214,6 +289,11 @@ class Descent(NamedTuple):
 
 
 def _share(which: NDArray[np.bool_]) -> float:
+    """Return the fraction of true values, or zero without values.
+
+    >>> _share(np.array([True, False, False, False])), _share(np.zeros(0, bool))
+    (0.25, 0.0)
+    """
     return float(which.sum() / max(which.size, 1))
 
 
@@ -230,6 +310,35 @@ def grow(
 
     All chains move together (step 5). The step size is adapted to their
     acceptance, with smaller and smaller changes.
+
+    Here the noise is always 0.5. With b = 0.6 the first candidates are
+    0.8 z + 0.3. The first chain moves, and the second one stays. b
+    is then 0.6 exp(0.13/sqrt(1)), and at last this times exp(0.13/sqrt(2)).
+
+    >>> from types import SimpleNamespace
+    >>> rng = SimpleNamespace(standard_normal=lambda shape: np.full(shape, 0.5))
+    >>> draws, values = np.array([[0.0], [2.0]]), np.array([0.0, 4.0])
+    >>> given = (lambda draws: draws[:, 0] * 2.0), draws, values
+    >>> states, values, acceptance, step = grow(*given, 2.0, 3, 0.6, rng)
+    >>> states[:, 0].round(4).tolist(), values.round(4).tolist()
+    ([0.0, 2.0, 0.3, 2.0, 0.5607, 2.0], [0.0, 4.0, 0.6, 4.0, 1.1214, 4.0])
+    >>> acceptance, round(step / 0.6, 6) == round(math.exp(0.13 + 0.13 / math.sqrt(2.0)), 6)
+    (0.5, True)
+
+    At a ceiling of 1 the second step to 1.1214 is refused, and the first chain
+    stays at 0.3.
+
+    >>> states, values, _, _ = grow(*given, 1.0, 3, 0.6, rng)
+    >>> states[4:, 0].round(4).tolist(), values[4:].round(4).tolist()
+    ([0.3, 2.0], [0.6, 4.0])
+
+    If all candidates are accepted, b grows up to 1. A value at the ceiling
+    is not below it.
+
+    >>> grow(*given, 9.0, 2, 0.95, rng)[2:]
+    (1.0, 1.0)
+    >>> grow(*given, 0.6, 2, 0.6, rng)[2]
+    0.0
     """
     chains, dimension = draws.shape
     states, chain_values = np.empty((steps, chains, dimension)), np.empty((steps, chains))
@@ -269,6 +378,62 @@ def descend(
     samples. A level begins only if it does not exceed
     `max_evaluations`. `label` returns, for each sample, the number of
     its equally likely interface.
+
+    Here the draws are the regular numbers -1.9, -1.7, ... 1.9, and the
+    lowest tenth lies below -1.5. The numbers of levels and evaluations
+    show how the walk ends: at a threshold, at a floor and at a
+    probability.
+
+    >>> from types import SimpleNamespace
+    >>> rng = SimpleNamespace(permutation=lambda numbers: numbers)
+    >>> rng.standard_normal = lambda shape: np.linspace(-1.9, 1.9, shape[0])[:, None]
+    >>> def end(function, **goal):
+    ...     found = descend(function, 1, rng=rng, samples=20, **goal)
+    ...     levels, stress = len(found.populations), round(found.threshold, 6)
+    ...     return levels, stress, found.evaluations, found.complete
+    >>> end(lambda draws: draws[:, 0], threshold=-1.0)
+    (1, -1.0, 20, True)
+    >>> end(lambda draws: draws[:, 0].clip(-1.5), floor=-1.5)
+    (1, -1.5, 20, True)
+    >>> end(lambda draws: draws[:, 0], probability=0.1)
+    (1, -1.5, 20, True)
+
+    The second level costs 18 evaluations. Equal values end the walk. If
+    the lowest values are equal, the ceiling is the next higher value.
+
+    >>> end(lambda draws: draws[:, 0], threshold=-1.6, max_evaluations=37)
+    (1, -1.5, 20, False)
+    >>> end(lambda draws: draws[:, 0], threshold=-1.6, max_evaluations=38)
+    (2, -1.6, 38, True)
+    >>> lowest = float(np.linspace(-1.9, 1.9, 20)[2])  # a threshold at the next ceiling
+    >>> end(lambda draws: draws[:, 0], threshold=lowest, max_evaluations=37)[3]
+    False
+    >>> end(lambda draws: np.full(len(draws), 3.0))
+    (1, 3.0, 20, False)
+    >>> end(lambda draws: draws[:, 0].round(), probability=0.2)  # -2, -2, -2, -1, ...
+    (1, -1.0, 20, True)
+
+    Two chains of 10 states descend from samples 0 and 1. Only the last three
+    levels keep their draws.
+
+    >>> found = descend(lambda draws: draws[:, 0], 1, rng=rng, samples=20, threshold=-1.6)
+    >>> found.populations[1].ancestors.tolist() == 10 * [0, 1]
+    True
+    >>> round(found.probability(-1.6), 6), round(found.populations[1].ceiling, 6)
+    (0.1, -1.5)
+    >>> found = descend(
+    ...     lambda draws: draws[:, 0], 1, rng=generator(0), samples=100, probability=1e-5,
+    ...     label=lambda draws: (draws[:, 0] < -2.0).astype(int),
+    ... )
+    >>> [len(level.draws) > 0 for level in found.populations[-5:]]
+    [False, False, True, True, True]
+    >>> first, last = found.populations[0], found.populations[-1]
+    >>> set(last.ancestors.tolist()) <= set(np.argsort(first.values)[:10].tolist())
+    True
+    >>> 0.3 < math.exp(last.log_probability) / 1e-5 < 30.0
+    True
+    >>> [bool(np.all(level.members == (level.values < -2.0))) for level in (first, last)]
+    [True, True]
     """
     count = max(2, round(samples * LEVEL_PROBABILITY))
     samples = count * max(2, round(samples / count))

@@ -99,6 +99,14 @@ def log_width(cv: float) -> float:
     The width uses Student's distribution, because
     the coefficient of variation is itself estimated
     from about 1/cv^2 independent families.
+
+    With cv = 0.5 there are 3 degrees of freedom, and Student's quantile is
+    2.3534. A large cv leaves 1 degree of freedom, with the quantile 6.3138.
+
+    >>> round(log_width(0.5) / math.sqrt(math.log(1.25)), 4)
+    2.3534
+    >>> round(log_width(2.0) / math.sqrt(math.log(5.0)), 4), log_width(0.0)
+    (6.3138, 0.0)
     """
     if cv == 0.0:
         return 0.0
@@ -107,7 +115,14 @@ def log_width(cv: float) -> float:
 
 
 def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
-    """Return an interval within [0, 1] for an estimate whose logarithm is roughly normal."""
+    """Return an interval within [0, 1] for an estimate whose logarithm is roughly normal.
+
+    >>> low, high = lognormal_interval(0.3, 0.5)  # the factor is exp(1.1117) = 3.0395
+    >>> round(low, 4), round(high, 4)
+    (0.0987, 0.9118)
+    >>> lognormal_interval(0.4, 0.5)[1], lognormal_interval(0.4, math.inf)
+    (1.0, (0.0, 1.0))
+    """
     if not math.isfinite(cv):
         return 0.0, 1.0
     factor = math.exp(log_width(cv))
@@ -115,7 +130,40 @@ def lognormal_interval(probability: float, cv: float) -> tuple[float, float]:
 
 
 class Tail(NamedTuple):
-    """The lower tail of the onset stress, from pooled repetitions."""
+    """The lower tail of the onset stress, from pooled repetitions.
+
+    Here a repetition with 3 plain samples and one with 5 have the weights
+    3/8 and 5/8. The event happens in 7 of 8 samples.
+
+    >>> from stiction.reliability.subset import Population
+    >>> def plain(*values):
+    ...     numbers = np.arange(len(values))
+    ...     level = Population(math.inf, 0.0, np.array(values), numbers, numbers % 2)
+    ...     return Descent(len(values), [level], 0.5, len(values), complete=True)
+    >>> tail = Tail([plain(3.0, 5.0, 7.0), plain(1.0, 4.0, 2.0, math.inf, 5.5)])
+    >>> tail.extent, tail.survived, tail.complete
+    ((1.0, 7.0), 0.125, True)
+
+    Below 2.5 are 0 of 3 and 2 of 5 samples, and below 3.5 1 of 3 and 2 of 5.
+    The relative variances are 2 and 3/7 (`ancestral_variance`).
+
+    >>> tail.probability(2.5), tail.probability(3.5)
+    (0.25, 0.375)
+    >>> round(tail.cv(2.5) ** 2, 6), round(tail.cv(3.5) ** 2, 6), tail.cv(0.9)
+    (0.428571, 0.412698, inf)
+
+    Stresses at a probability, and the ends of an interval with
+    the factor 1.4033. The lower end 0.15/1.4033 is rarer than all samples.
+
+    >>> [round(tail.quantile(p), 6) for p in (0.25, 0.26, 0.875, 0.876)]
+    [2.0, 3.0, 7.0, inf]
+    >>> [round(end, 6) for end in tail.stress_interval(0.375, 0.2, 0.5)]
+    [3.0, 5.0]
+    >>> [round(end, 6) for end in tail.stress_interval(0.15, 0.2, 0.5)]
+    [0.5, 2.0]
+    >>> tail.stress_interval(0.1, math.inf, 0.5)
+    (0.5, 7.0)
+    """
 
     repetitions: Sequence[Descent]
     algorithm: str = "subset"  # or 'two_level'
@@ -133,7 +181,18 @@ class Tail(NamedTuple):
         return float(np.nextafter(self.repetitions[0].threshold, math.inf))
 
     def short_of(self, goal: str) -> str:
-        """Return a message which says that the tail does not reach the requested level."""
+        """Return a message which says that the tail does not reach the requested level.
+
+        >>> from types import SimpleNamespace
+        >>> end = SimpleNamespace(samples=4, threshold=2.0, survived=0.5)
+        >>> end.probability = lambda stress: 0.25 * (stress > 2.0)
+        >>> print(Tail([end], spent=40).short_of("p"))
+        40 evaluations do not reach p, but come down to 2 Pa (P = 0.25). Raise max_evaluations
+        >>> Tail([end], "two_level", spent=40).short_of("P = 0.01")
+        '40 evaluations do not reach P = 0.01. Raise max_evaluations'
+        >>> Tail([SimpleNamespace(samples=4, survived=1.0)], spent=7).short_of("P = 0.01")
+        'the event happens in none of 7 samples'
+        """
         if self.survived == 1.0:
             return f"the event happens in none of {self.spent} samples"
         text = f"{self.spent} evaluations do not reach {goal}"
@@ -185,6 +244,27 @@ class Tail(NamedTuple):
         interface are below the stress. For plain samples, it is the
         fraction among the samples of the interface, because their number
         is random and causes most of the error near P = 1.
+
+        The first interface has 3 failures among 4 plain samples. The second
+        interface has 2 failures, too few. The plain samples of a second
+        repetition are added. The third repetition has chains, in which 4
+        samples of 1 % each are failures.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.reliability.subset import Below
+        >>> def repetition(failures, *of_all):
+        ...     ancestors = np.arange(len(failures))
+        ...     below = Below(0.01, np.array(failures), ancestors, *map(np.array, of_all))
+        ...     return SimpleNamespace(samples=9, below=lambda stress: below)
+        >>> plain = repetition([0, 1, 0, 0, 1], [0, 1, 0, 0, 1, 1, 1, 0, 1])
+        >>> Tail([plain]).of_members(1.0, 2).tolist()
+        [0.75, nan]
+        >>> more, chains = repetition([1, 0], [0, 1, 0]), repetition([1, 0, 1, 1])
+        >>> found = Tail([plain, more, chains]).of_members(1.0, 2)
+        >>> np.allclose(found, [0.02 / 3.0 + 2.0 / 3.0 * 4 / 6, 0.02 + 2.0 / 3.0 * 3 / 6])
+        True
+        >>> Tail([repetition(60 * [1])]).of_members(1.0, 2).tolist()  # an estimate of 1.2
+        [nan, 1.0]
         """
         in_chains, seen, low, plain = np.zeros((4, count))
         plain_weight = 0.0
@@ -213,6 +293,29 @@ class Tail(NamedTuple):
         list. An entry has the fraction w of the list and the fraction p of
         the failures. As in importance sampling, the square of the
         result is the sum of (p - w)^2 over the entries.
+
+        Members 0 and 1 are one entry with w = 2/3. The samples in the second
+        repetition count twice. The entries have 1 and 6 failures, and 49 - 9 - 4
+        pairs have different ancestors, of which 37 - 7 - 4 are alike. The spread
+        is 26/36 - 2 (2/21 + 6/21) + 5/9.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.reliability.subset import Below
+        >>> def repetition(chance, members, ancestors):
+        ...     below = Below(chance, np.array(members, int), np.array(ancestors, int))
+        ...     return SimpleNamespace(samples=4, below=lambda stress: below)
+        >>> first = repetition(0.25, [2, 2, 2, 1, 2], [0, 4, 4, 2, 2])
+        >>> tail = Tail([first, repetition(0.5, [2], [7])])
+        >>> round(tail.members_cv(1.0, np.array([0, 0, 1])) ** 2, 6)  # 0.515873/(1 - 5/9)
+        1.160714
+
+        The failures may follow the list more closely than chance would
+        allow, or there may be no failure:
+
+        >>> Tail([repetition(0.25, [0, 1, 0, 1], [0, 1, 2, 3])]).members_cv(1.0, np.array([0, 1]))
+        0.0
+        >>> Tail([repetition(0.25, [], [])]).members_cv(1.0, np.array([0, 1]))
+        0.0
         """
         entries = np.bincount(kinds)
         failures, pairs, alike = np.zeros(entries.size), 0.0, 0.0
@@ -269,7 +372,30 @@ class Tail(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TailPoint:
-    """A tail at a stress: the probability of a lower onset, and its errors."""
+    """A tail at a stress: the probability of a lower onset, and its errors.
+
+    The last interface cannot fail at this stress, and the first one must.
+
+    >>> from types import SimpleNamespace
+    >>> random = SimpleNamespace(kinds=np.array([0, 0, 1]))
+    >>> state = SimpleNamespace(several=True, experiment=SimpleNamespace(random=random))
+    >>> state.bounds_of_members = lambda: [(1.0, 2.0), (1.5, 4.0), (2.0, 5.0)]
+    >>> tail = SimpleNamespace(probability=lambda s: s / 8.0, cv=lambda s: 1.5 * s)
+    >>> tail.members_cv = lambda stress, kinds: stress * float(kinds.sum())
+    >>> tail.of_members = lambda stress, count: np.full(count, 0.3)
+    >>> point = TailPoint(state, tail, 2.0)
+    >>> point.probability, point.sampling_cv, point.members_cv, round(point.cv**2, 6)
+    (0.25, 3.0, 2.0, 13.0)
+    >>> point.members.tolist()
+    [1.0, 0.3, 0.0]
+
+    The error by the choice of interfaces is zero for a single interface.
+
+    >>> state.several = False
+    >>> alone = TailPoint(state, tail, 2.0)
+    >>> alone.members_cv, alone.cv, alone.members.size
+    (0.0, 3.0, 0)
+    """
 
     state: LimitState
     tail: Tail
@@ -308,7 +434,11 @@ class TailPoint:
 
 
 def _squares(*labels: Array) -> float:
-    """Count the samples with each label, and return the sum of the squared counts."""
+    """Count the samples with each label, and return the sum of the squared counts.
+
+    >>> _squares(np.array([3, 3, 5, 3])), _squares(np.array([3, 3, 5, 3]), np.array([1, 2, 1, 1]))
+    (10.0, 6.0)
+    """
     _, sizes = np.unique(np.stack(labels), axis=1, return_counts=True)
     return float(np.sum(sizes.astype(np.float64) ** 2))
 
@@ -330,6 +460,50 @@ def repeat_until_precise(
     remaining evaluations). `judge` returns the coefficient
     of variation, or zero to stop. Repetitions of moderate
     size, from `first` to `largest`, limit the memory.
+
+    Suppose that n samples have the cv 1/sqrt(n), and cost 2 evaluations
+    each. A cv of 0.08 needs 156.25 samples, and 10 % more are wanted. A
+    repetition has 20 to 90 samples. Its number and the remaining
+    evaluations are printed. Only the last one keeps its draws:
+
+    >>> from stiction.reliability.subset import Population
+    >>> level = Population(0.0, 0.0, *np.zeros((3, 1)), draws=np.zeros((1, 1)))
+    >>> def make(size, number, left):
+    ...     print(size, number, left)
+    ...     return Descent(size, [level], 0.0, 2 * size, complete=left > 99)
+    >>> def judge(repetitions):
+    ...     return sum(repetition.samples for repetition in repetitions) ** -0.5
+    >>> sizes = {"target_cv": 0.08, "first": 20, "largest": 90}
+    >>> found = repeat_until_precise(make, judge, max_evaluations=1000, **sizes)
+    20 0 1000
+    90 1 960
+    61 2 780
+    >>> [len(repetition.populations[0].draws) for repetition in found]
+    [0, 0, 1]
+    >>> len(repeat_until_precise(make, lambda _: 0.08, max_evaluations=1000, **sizes))
+    20 0 1000
+    1
+
+    A budget of 201 allows 80 samples after the first 20. The last repetition
+    is not used if it is incomplete, unless it is the only one. An
+    infinite cv doubles the samples.
+
+    >>> len(repeat_until_precise(make, judge, max_evaluations=201, **sizes))
+    20 0 201
+    80 1 161
+    2
+    >>> len(repeat_until_precise(make, judge, max_evaluations=139, **sizes))
+    20 0 139
+    49 1 99
+    1
+    >>> len(repeat_until_precise(make, judge, max_evaluations=99, **sizes))
+    20 0 99
+    1
+    >>> len(repeat_until_precise(make, lambda _: math.inf, max_evaluations=195, **sizes))
+    20 0 195
+    20 1 155
+    40 2 115
+    3
     """
     repetitions: list[Any] = []
     spent, size = 0, first
@@ -356,7 +530,18 @@ def repeat_until_precise(
 
 
 def share_picked(guide: Array, exact: Array) -> float:
-    """Return which fraction of the weakest fiftieth lies in the weakest tenth by the guide."""
+    """Return which fraction of the weakest fiftieth lies in the weakest tenth by the guide.
+
+    Of 400 samples the weakest 8 have the ranks 35 to 42 by the guide, which
+    picks ranks below 40. Of 20 samples the weakest 5 have the ranks 8 to 12,
+    and ranks below 10 are picked.
+
+    >>> exact = np.arange(400.0)
+    >>> share_picked((exact + 35.0) % 400.0, exact)
+    0.625
+    >>> share_picked((exact[:20] + 8.0) % 20.0, exact[:20])
+    0.4
+    """
     weakest = np.argsort(exact)[: max(5, exact.size // 50)]
     seen = np.argsort(guide)[: max(10, exact.size // 10)]
     return float(np.isin(weakest, seen).mean())
@@ -376,6 +561,61 @@ def sample_tail(
     With 'auto', two levels are used if the guide passes steps 1 and 5.
     `budget` includes the pilot, which holds (draws, stresses) of plain
     samples that are solved already.
+
+    Here the onset is a function of a standard normal number x. The first
+    tail is found by subset simulation, because there is no guide. A budget
+    of 1200 allows levels with 300 samples.
+
+    >>> from types import SimpleNamespace
+    >>> class State:
+    ...     dimension, bounds, meter = 1, (-9.0, 9.0), SILENT
+    ...     experiment = SimpleNamespace(seed=3, method=SimpleNamespace(label="guide"))
+    ...     def __init__(self, onset, guide="none"):
+    ...         self.onset, self.guide = onset, guide
+    ...     def __call__(self, draws):
+    ...         return self.onset(draws[:, 0])
+    ...     def draws(self, seed, first, count):
+    ...         return generator(seed).standard_normal((count, 1))
+    ...     def member(self, draws):
+    ...         return np.zeros(len(draws), int)
+    >>> state = State(lambda x: x)
+    >>> tail = sample_tail(state, Goal(0.5, -2.0), algorithm="auto", budget=1200)
+    >>> tail.algorithm, tail.reason, tail.repetitions[0].samples
+    ('subset', 'as requested', 300)
+    >>> tail.spent == sum(descent.evaluations for descent in tail.repetitions) <= 1200
+    True
+    >>> abs(tail.probability(-2.0) / 0.02275 - 1.0) < 3.0 * tail.cv(-2.0) < 1.5
+    True
+
+    A quantile needs levels down to 0.3 times the probability. The
+    probabilities are 1, 0.1, 0.01 and 0.001.
+
+    >>> tail = sample_curve(state, Goal(0.1, probability=0.0025), 25_000)
+    >>> [(len(descent.populations), descent.samples) for descent in tail.repetitions[:2]]
+    [(4, 2000), (4, 2000)]
+    >>> tail.spent == sum(descent.evaluations for descent in tail.repetitions)
+    True
+    >>> abs(tail.quantile(0.0025) + 2.807) < 0.1
+    True
+
+    A guide that ranks samples as the method does leads to two levels. The
+    opposite order does not. The last guide leads to samples that do not fail.
+
+    >>> def found(guide, onset, stress):
+    ...     state = State(onset, State(guide))
+    ...     tail = sample_tail(state, Goal(0.9, stress), algorithm="auto", budget=20_000)
+    ...     again = sum(descent.evaluations for descent in tail.repetitions)
+    ...     print(tail.algorithm, tail.reason.partition("; ")[2], tail.spent - again > 500)
+    ...     return tail.probability(stress)
+    >>> 0.6 < found(lambda x: x, lambda x: x - 0.1, -3.1) / 0.00135 < 1.6
+    two_level of 500 plain samples the guide picks 100% of the weakest False
+    True
+    >>> found(lambda x: -x, lambda x: x, -2.0) > 0.01
+    subset of 500 plain samples the guide picks 0% of the weakest False
+    True
+    >>> wrong = found(lambda x: x, lambda x: np.where(x < -3.0, 9.0, x), -2.998)
+    ... # doctest: +ELLIPSIS
+    subset ...weakest; only ...% of the failures by the guide are confirmed True
     """
     # 1.
     auto, seed = algorithm == "auto", state.experiment.seed
@@ -453,6 +693,16 @@ def _repetitions(
 
 
 def _share_failing(descent: Descent) -> float:
-    """Return the fraction of failures among samples that the guide selects, 1 without samples."""
+    """Return the fraction of failures among samples that the guide selects, 1 without samples.
+
+    >>> from stiction.reliability.subset import Population
+    >>> none, values = np.zeros(0, int), np.array([1.0, 3.0, 2.0, 4.0, 5.0])
+    >>> level = Population(math.inf, 0.0, values, none, none)
+    >>> early = level._replace(values=values - 3.0)
+    >>> _share_failing(Descent(5, [early, level], 2.0, 5, complete=True))
+    0.2
+    >>> _share_failing(Descent(5, [level], 2.0, 5, complete=False))
+    1.0
+    """
     values = descent.populations[-1].values
     return float(np.mean(values < descent.threshold)) if descent.complete else 1.0

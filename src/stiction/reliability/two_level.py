@@ -61,7 +61,29 @@ probability."""
 def _covered(
     states: Array, guide: Function, ceiling: float, families: NDArray[np.int64], samples: int
 ) -> tuple[float, float]:
-    """Return P(L < b | E < s) from walkers in the failure set, and its relative variance."""
+    """Return P(L < b | E < s) from walkers in the failure set, and its relative variance.
+
+    Three walkers take two steps. Three of six states are covered by the
+    level. The first two walkers are one family, so that the weights are
+    w = 2/3 and 1/3, and the families are off by 1/3 and -1/3 of the mean.
+    The variance 2/9 * 5/9 is divided by 0.197531, the sum of
+    w^2 (1 - 2 w + 5/9).
+
+    >>> states = np.array([[1.0], [1.0], [4.0], [2.0], [3.0], [4.0]])
+    >>> last, variance = _covered(states, lambda z: z[:, 0], 3.0, np.array([7, 7, 2]), 8)
+    >>> last, round(variance, 6)
+    (0.5, 0.625)
+
+    A single family tells nothing about the error, unless all states are
+    covered. At least one of the samples counts.
+
+    >>> _covered(states, lambda z: z[:, 0], 3.0, np.array([7, 7, 7]), 8)
+    (0.5, inf)
+    >>> _covered(states, lambda z: z[:, 0], 9.0, np.array([7, 7, 7]), 8)
+    (1.0, 0.0)
+    >>> _covered(states, lambda z: z[:, 0], 1.0, np.array([7, 7, 2]), 8)[0]
+    0.125
+    """
     walkers = families.size
     covered = (guide(states) < ceiling).reshape(-1, walkers)
     last = max(float(covered.mean()), 1.0 / samples)
@@ -99,6 +121,60 @@ def bridge(
     `max_evaluations` limits their sum. Without a failure the estimate
     is zero, because omitting this repetition would favour repetitions
     with a failure.
+
+    The guide is x, and the exact function is x + 0.1 y, so that the probability
+    of a value below -3 is Phi(-3/sqrt(1.01)) = 0.00142. The first levels of
+    the guide have 5 * 100 samples.
+
+    >>> from stiction.reliability.subset import generator
+    >>> def exact(draws):
+    ...     return draws[:, 0] + 0.1 * draws[:, 1]
+    >>> def found(limit, function=exact, **goal):
+    ...     rng = generator(0, 5)
+    ...     return bridge(lambda draws: draws[:, 0], function, 2, samples=100, rng=rng,
+    ...         max_evaluations=limit, **goal)
+    >>> descent, without = found(900, threshold=-3.0), found(109, threshold=-3.0)
+    >>> 0.5 < descent.probability(-3.0) / 0.00142 < 2.0, descent.complete
+    (True, True)
+    >>> [len(values) for values in (descent.populations[0].values, descent.walked[0].T)]
+    [100, 2]
+
+    Each failing sample walks 10 steps, of which the last 5 count for the
+    guide. All end at failures.
+
+    >>> walkers = int(np.sum(descent.populations[0].values < -3.0))
+    >>> descent.evaluations == 100 + 10 * walkers, len(descent.walked[1]) == walkers
+    (True, True)
+    >>> descent.first_stage_evaluations == without.first_stage_evaluations + 5 * walkers
+    True
+    >>> np.array_equal(exact(descent.walked[0]), descent.walked[1])
+    True
+    >>> bool((descent.walked[1] < -3.0).all())
+    True
+    >>> found(150, threshold=-3.0).evaluations  # room for 5 walkers
+    150
+
+    At a requested probability, the limit is the quantile -2.577 of the exact function:
+
+    >>> descent = found(900, probability=0.005)
+    >>> round(descent.probability(descent.threshold), 4), abs(descent.threshold + 2.589) < 0.2
+    (0.005, True)
+
+    Without room for a walk there is no exact sample. If no exact
+    sample fails, the probability is zero.
+
+    >>> without.complete, without.evaluations, without.probability(-3.0)
+    (False, 0, 0.0)
+    >>> descent = found(900, lambda draws: np.ones(len(draws)), threshold=-3.0)
+    >>> descent.complete, descent.probability(-3.0), descent.evaluations
+    (True, 0.0, 100)
+
+    A worse guide misses some failures at its rarest level, and P(x + y/2 < -3)
+    is 0.00365.
+
+    >>> descent = found(2000, lambda draws: draws[:, 0] + 0.5 * draws[:, 1], threshold=-3.0)
+    >>> 0.5 < descent.probability(-3.0) / 0.00365 < 2.0, descent.last < 1.0
+    (True, True)
     """
     # 1. levels of the guide
     descent = descend(
