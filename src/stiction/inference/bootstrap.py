@@ -86,6 +86,12 @@ class NotRepeated(InputError):
     """Error for a family that cannot be fitted to most records simulated from the family itself."""
 
     def __init__(self, family: Family, fits: int, count: int) -> None:
+        """>>> error = NotRepeated(Family("beta", {"high": 3.0}), 4, 25)
+        >>> error.reason, error.family.name  # doctest: +ELLIPSIS
+        ("marginal: 'beta, high 3' could be fitted to only 4 of 25 records ...", 'beta')
+        >>> str(error).removeprefix(error.reason)
+        '. Use another marginal'
+        """
         self.reason = (
             f"marginal: {family.label!r} could be fitted to only {fits} of {count} records"
             " that were simulated from its fit"
@@ -132,7 +138,30 @@ def bootstrapped(
 
 
 def at_ends(around: Refits) -> list[BestFit]:
-    """Return the field with its correlation length at both ends of a first interval (step 5)."""
+    """Return the field with its correlation length at both ends of a first interval (step 5).
+
+    Examples
+    --------
+    A correlation length of 1.5 m is fitted. One repetition has 4 times and one has a quarter of
+    it. The widths are proportional to the root of the length, so the first interval ends at
+    1.5/4^(1/2) and 1.5*4^2. The second end lies beyond the searched range.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.inference.estimate import FitSetting
+    >>> from stiction.inference.marginal_fit import family_of
+    >>> from stiction.inference.whittle import SpectrumFamily
+    >>> from stiction.random.marginals import Lognormal
+    >>> family = SpectrumFamily("exponential", {}, 1.0, 0.0, (0.1, 6.0))
+    >>> setting = FitSetting((), family_of("lognormal"), family)
+    >>> law = Lognormal(mean=5.0, cv=0.2)
+    >>> def fit(length):
+    ...     model = family.model(family.vector([2.0, length]), np.array([0.0, 1.0]))
+    ...     return BestFit(setting, law, law, model, 0.1, 0.1, (0.0, 0.0))
+    >>> fits = [fit(1.5 * factor) for factor in (4.0, 0.25, *[1.0] * 17)]
+    >>> models = [field.model for field in at_ends(Refits(fit(1.5), fits))]
+    >>> [round(model.spectrum.correlation_length, 6) for model in models], models[1].variance
+    ([0.75, 6.0], 2.0)
+    """
     fitted, family = around.truth, around.truth.setting.spectrum
     place = family.free.index("correlation_length")
     moved = []
@@ -151,6 +180,22 @@ class Scale(NamedTuple):
     distance from the mean. For noise, it is the variance. The variance
     may be negative, because estimates cut off at zero would seem to
     have no error.
+
+    Examples
+    --------
+    >>> values = {"mean": 5.0, "marginal.low": 2.0, "marginal.high": 9.0, "exponent": 2.5}
+    >>> scales = list(map(Scale, values))
+    >>> [f"{math.exp(scale.to(values)):.4f}" for scale in scales]  # low and high from the mean
+    ['5.0000', '3.0000', '4.0000', '2.0000']
+    >>> [f"{scale.back(math.log(0.7), values):.4f}" for scale in scales]
+    ['0.7000', '4.3000', '5.7000', '1.2000']
+    >>> Scale("mean", linear=True).to(values), Scale("mean", linear=True).back(-3.0, values)
+    (5.0, -3.0)
+    >>> noise = Scale("noise")
+    >>> noise.to({"noise": 3.0}), noise.back(16.0, {}), noise.back(-16.0, {})
+    (9.0, 4.0, 0.0)
+    >>> math.exp(Scale("marginal.low").to({"mean": 2.0, "marginal.low": 3.0})) > 0.0
+    True
     """
 
     name: str
@@ -171,13 +216,29 @@ class Scale(NamedTuple):
         return at if self.linear else origin + side * math.exp(at)
 
     def _origin(self, values: Mapping[str, float]) -> tuple[float, float]:
-        """Return the origin of the logarithm, and the side of it on which values lie."""
+        """Return the origin of the logarithm, and the side of it on which values lie.
+
+        >>> values = {"mean": 5.0}
+        >>> names = "marginal.low", "marginal.high", "exponent", "mean"
+        >>> [Scale(name)._origin(values) for name in names]
+        [(5.0, -1.0), (5.0, 1.0), (0.5, 1.0), (0.0, 1.0)]
+        """
         if self.name in SIDES:
             return values["mean"], SIDES[self.name]
         return offset(self.name), 1.0
 
     def of(self, fitted: BestFit) -> tuple[float, float]:
-        """Return an estimate on this scale, and the width of step 3."""
+        """Return an estimate on this scale, and the width of step 3.
+
+        The width grows with the root of the length, for a location also with the scatter.
+
+        >>> from types import SimpleNamespace
+        >>> numbers = {"efolding_length": 9.0, "standard_deviation": 2.0}
+        >>> numbers |= {"mean": 5.0, "exponent": 1.5}
+        >>> fit = SimpleNamespace(parameters=numbers, noise=(0.3, 0.1))
+        >>> Scale("mean", True).of(fit), Scale("exponent").of(fit), Scale("noise").of(fit)
+        ((5.0, 6.0), (0.0, 3.0), (0.3, 0.1))
+        """
         if self.name == "noise":
             return fitted.noise
         width = math.sqrt(fitted.parameters["efolding_length"])
@@ -186,7 +247,20 @@ class Scale(NamedTuple):
         return self.to(fitted.parameters), width
 
     def less(self, fitted: BestFit, repeated: Refits) -> Array:
-        """Return the estimate minus the error of each repetition (steps 3 and 7)."""
+        """Return the estimate minus the error of each repetition (steps 3 and 7).
+
+        The estimate is 10, with width 2*2. Refits to records with mean 8 give 9 with width 3*1,
+        and 6 with width 1*3.
+
+        >>> from types import SimpleNamespace
+        >>> def fit(mean, length, deviation):
+        ...     widths = {"efolding_length": length, "standard_deviation": deviation}
+        ...     return SimpleNamespace(parameters={"mean": mean} | widths)
+        >>> refits = Refits(fit(8.0, 1.0, 5.0), [fit(9.0, 9.0, 1.0), fit(6.0, 1.0, 3.0)])
+        >>> likely = Scale("mean", linear=True).less(fit(10.0, 4.0, 2.0), refits)
+        >>> bool(np.allclose(likely, [10 - 4 * 1 / 3, 10 + 4 * 2 / 3]))
+        True
+        """
         at, width = self.of(fitted)
         true = self.to(repeated.truth.parameters)
         refitted = np.array([self.of(fit) for fit in repeated.fits])
@@ -194,7 +268,19 @@ class Scale(NamedTuple):
 
 
 def scale_of(name: str, repeated: Sequence[Refits]) -> Scale:
-    """Return the scale of a parameter, which is linear if an estimate is negative."""
+    """Return the scale of a parameter, which is linear if an estimate is negative.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> def linear(name, *values):
+    ...     truth, *fits = [SimpleNamespace(parameters={name: value}) for value in values]
+    ...     return scale_of(name, [Refits(truth, fits[:1]), Refits(truth, fits[1:])]).linear
+    >>> linear("mean", 1, 2, 3), linear("marginal.cv", 1, 2, 0), linear("skew", 1, 2, -3)
+    (True, False, True)
+    >>> linear("skew", -1, 2, 3), linear("marginal.low", 1, -2, 3)
+    (True, False)
+    """
     least = min(one.parameters[name] for own in repeated for one in (own.truth, *own.fits))
     return Scale(name, name in LOCATION_PARAMETERS or (name not in SIDES and least < 0.0))
 
@@ -203,6 +289,61 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
     """Return the interval of each parameter (steps 2 to 6).
 
     `values` are measured, with noise.
+
+    Examples
+    --------
+    The weibull quantiles of 19 repetitions are the least and the largest one. Fields with the
+    shorter length have errors of log 3 (once) or log 2, and fields with the longer length have
+    -log 5 (once) or -log 4. The shape rises with the length here, and the ratio falls.
+
+    >>> from types import SimpleNamespace
+    >>> family = SimpleNamespace(limited_shapes=("shape",), quiet=lambda values, noise: values)
+    >>> law = SimpleNamespace(distribution=SimpleNamespace(support=lambda: (2.0, 9.0)))
+    >>> def fit(shape=10.0, ratio=5.0, length=1.0, **more):
+    ...     numbers = {"efolding_length": length, "shape": shape, "anisotropy": ratio}
+    ...     return SimpleNamespace(
+    ...         parameters=numbers | more, noise=(0.04, 0.01), model=SimpleNamespace(noise=0.0),
+    ...         setting=SimpleNamespace(marginal=family), marginal=law)
+    >>> around = Refits(fit(), [fit(10.0 * k, 5.0 / k, k) for k in np.linspace(0.9, 1.1, 19)])
+    >>> shorter = Refits(fit(), [fit(30.0, 15.0)] + [fit(20.0, 10.0)] * 18)
+    >>> longer = Refits(fit(), [fit(2.0, 1.0)] + [fit(2.5, 1.25)] * 18)
+    >>> ends = intervals([around, shorter, longer], np.array([2.5, 8.0]))
+    >>> np.round(ends["shape"], 6).tolist()  # 10/3 and 10*5
+    [3.333333, 50.0]
+    >>> np.round(ends["anisotropy"], 6).tolist()  # 5/2, and 5*4
+    [2.5, 20.0]
+
+    If a repetition reaches the limit of a shape, its interval contains the repetitions.
+
+    >>> around.fits[0].parameters["shape"] = 1.0
+    >>> shorter.fits[:2] = [fit(3.0), fit(4.0)]
+    >>> longer.fits[1:3] = [fit(60.0), fit(70.0)]
+    >>> ends = intervals([around, shorter, longer], np.array([2.5, 8.0]))
+    >>> np.round(ends["shape"], 6).tolist()  # from 3 + 0.9 to 60 + 0.1*10, for 10/2 to 10*5
+    [3.9, 61.0]
+
+    Without any error, the interval of a limited parameter is the whole range.
+
+    >>> intervals([Refits(fit(), [fit()] * 19)], np.array([2.5, 8.0]))["anisotropy"]
+    (0.05, 20.0)
+
+    The variance of the noise is 0.04 - 0.05 to 0.04 + 0.03 here. Bounds of the marginal lie
+    outside the values, and at most 10 ranges of the values away.
+
+    >>> def bounded(distance, variance):
+    ...     numbers = {"marginal.low": 4.0 - distance, "marginal.high": 4.0 + distance}
+    ...     numbers |= {"mean": 4.0, "standard_deviation": 1.0, "noise": math.sqrt(variance)}
+    ...     made = fit(**numbers)
+    ...     made.noise = variance, 0.01
+    ...     return made
+    >>> refits = [bounded(40.0, 0.09), bounded(0.1, 0.01), *[bounded(2.0, 0.04)] * 17]
+    >>> ends = intervals([Refits(bounded(2.0, 0.04), refits)], np.array([2.5, 6.0]))
+    >>> names = "noise", "marginal.low", "marginal.high"
+    >>> [np.round(ends[name], 4).tolist() for name in names]
+    [[0.0, 0.2646], [0.0, 2.5], [6.0, 41.0]]
+    >>> ends = intervals([Refits(bounded(2.0, 0.04), refits)], np.array([-2.5, 6.0]))
+    >>> [np.round(ends[name], 4).tolist() for name in names[1:]]
+    [[-36.0, 2.0], [6.0, 44.0]]
     """
     around, *moved = repeated
     fitted, estimated = around.truth, around.truth.parameters
@@ -255,7 +396,15 @@ def intervals(repeated: Sequence[Refits], values: Array) -> dict[str, tuple[floa
 
 
 def held(fit: BestFit, shapes: Sequence[str]) -> bool:
-    """Return whether a shape of a fit lies at its limit."""
+    """Return whether a shape of a fit lies at its limit.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> fit = SimpleNamespace(parameters={"a": 1.00001, "b": 1.0000001})  # the limit is 1
+    >>> held(fit, ["a"]), held(fit, ["a", "b"]), held(fit, [])
+    (False, True, False)
+    """
     return any(fit.parameters[name] <= LEAST_SHAPE * (1.0 + HELD_RTOL) for name in shapes)
 
 
@@ -263,6 +412,25 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
     """Return limits for parameters.
 
     Bounds of the marginal must lie outside all values.
+
+    Examples
+    --------
+    The values are 2, 4 and 9. Noise with a quarter of their variance, 26/3, leaves values from
+    5 - 3*0.866 to 5 + 4*0.866.
+
+    >>> from types import SimpleNamespace
+    >>> setting = SimpleNamespace(marginal=Family("beta", {}))
+    >>> def bounds(low, high, values=(2.0, 4.0, 9.0), noise=0.0):
+    ...     law = Beta(alpha=2.0, beta=3.0, low=low, high=high)
+    ...     fit = SimpleNamespace(setting=setting, marginal=law)
+    ...     limits = limits_of(fit, np.array(values), noise)
+    ...     return [np.round(limits[name], 4).tolist() for name in SIDES]
+    >>> bounds(3.0, 8.0), bounds(1.0, 12.0)
+    ([[0.0, 3.0], [8.0, inf]], [[0.0, 2.0], [9.0, inf]])
+    >>> bounds(1.0, 12.0, noise=math.sqrt(26 / 12))
+    [[0.0, 2.4019], [8.4641, inf]]
+    >>> bounds(-5.0, 12.0)[0], bounds(-5.0, 12.0, (-2.0, 4.0, 9.0))[0]
+    ([0.0, 2.0], [-inf, -2.0])
     """
     quiet = fitted.setting.marginal.quiet(values, noise)
     bottom, top = (float(end) for end in fitted.marginal.distribution.support())
@@ -280,13 +448,58 @@ def limits_of(fitted: BestFit, values: Array, noise: float) -> dict[str, tuple[f
 
 
 def in_field(values: Mapping[str, float]) -> dict[str, float]:
-    """Return parameters by their keys inside a field."""
+    """Return parameters by their keys inside a field.
+
+    Examples
+    --------
+    >>> in_field({"marginal.low": 3.0, "correlation_length": 4.0})
+    {'marginal.low': 3.0, 'spectrum.correlation_length': 4.0}
+    """
     begin = "random.strength."
     return {full_key(name).removeprefix(begin): value for name, value in values.items()}
 
 
 def likely(repeated: Refits, measured: Array, quantity: str) -> list[RandomField]:
-    """Return fields as likely as the estimate, one for each repetition (step 7)."""
+    """Return fields as likely as the estimate, one for each repetition (step 7).
+
+    Examples
+    --------
+    The widths are equal, so an error of 1 in the mean, or a factor in another parameter, is
+    subtracted from, or divides, the estimate.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.random.marginals import Lognormal
+    >>> from stiction.random.spectra import ExponentialSpectrum
+    >>> def fit(law, length, **parameters):
+    ...     numbers = {"efolding_length": 1.0, "standard_deviation": 1.0, "mean": 5.0}
+    ...     parameters |= {"correlation_length": length, "noise": 0.1}
+    ...     field = RandomField(law, ExponentialSpectrum(length))
+    ...     return SimpleNamespace(
+    ...         parameters=numbers | parameters, marginal=law, model=SimpleNamespace(noise=0.0),
+    ...         setting=SimpleNamespace(marginal=Family("lognormal", {"low": 0.0})),
+    ...         field=lambda quantity: field)
+    >>> law = Lognormal(mean=8.0, cv=0.2)
+    >>> truth = fit(law, 2.0, **{"marginal.mean": 8.0, "marginal.cv": 0.2})
+    >>> refit = fit(law, 4.0, **{"marginal.mean": 9.0, "marginal.cv": 0.25})
+    >>> (field,) = likely(Refits(truth, [refit]), np.array([2.0, 4.0, 9.0]), "strength")
+    >>> np.round([field.mean, field.marginal.cv, field.spectrum.correlation_length], 6).tolist()
+    [7.0, 0.16, 1.0]
+
+    The lower bound has the distance 4 from the mean, and 5 in the repetition. The likely bound,
+    5 - 4*4/5, would give the mean 5.48 and the standard deviation 1.84. Both stay, although the
+    bound must lie below the least value, 1.5.
+
+    >>> law = Beta(alpha=2.0, beta=3.0, low=1.0, high=11.0)
+    >>> keys = "alpha", "beta", "low", "high"
+    >>> truth, refit = (
+    ...     fit(law, 2.0, **{"marginal." + key: v for key, v in zip(keys, values, strict=True)})
+    ...     for values in ((2.0, 3.0, 1.0, 11.0), (2.0, 3.0, 0.0, 11.0)))
+    >>> (field,) = likely(Refits(truth, [refit]), np.array([1.5, 6.0, 12.0]), "strength")
+    >>> np.round([field.mean, field.standard_deviation], 6).tolist()
+    [5.48, 1.84]
+    >>> field.marginal.low, field.marginal.high
+    (1.5, 11.0)
+    """
     fitted = repeated.truth
     field, limits = fitted.field(quantity), limits_of(fitted, measured, fitted.model.noise)
     free: dict[str, list[float]] = {}
