@@ -401,7 +401,7 @@ def _with_posterior(
     ...     peaks=Peaks((0.1, 0.2), (np.array([4, 5.0]), np.array([40, 50.0])), "Pa"),
     ...     predicted=(np.linspace(2, 12, 1001), np.linspace(20, 120, 1001)),
     ...     u=np.zeros((5, 1)), likelihood=SimpleNamespace(of=lambda peaks, kinds: flat))
-    >>> measured = Peaks((0.2, 0.1), (np.array([60.0]), np.array([6.0, 5.0])), "Pa")
+    >>> measured = Peaks((0.2, 0.1), (np.array([15.0]), np.array([6.0, 5.0])), "Pa")
     >>> found = _with_posterior(posterior, measured, 99, np.random.default_rng(0))
     >>> laws = found.predicted
     >>> [[float(at[0].round(2)), float(at[-1].round(2))] for at, share in laws]

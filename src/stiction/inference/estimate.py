@@ -117,7 +117,29 @@ class BestFit:
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """All estimated parameters and derived numbers, by name."""
+        """All estimated parameters and derived numbers, by name.
+
+        >>> from stiction.inference.marginal_fit import family_of
+        >>> from stiction.random.marginals import Lognormal
+        >>> family = SpectrumFamily("exponential", {}, 1.0, None, (0.1, 6.0))
+        >>> model = family.model(family.vector([4.0, 2.0, 0.25]), np.array([0.0, 1.0]))
+        >>> setting = FitSetting((), family_of("lognormal"), family)
+        >>> law = Lognormal(mean=5.0, cv=0.2)
+        >>> fit = BestFit(setting, law, None, model, 0.1, 0.1, (0.0, 0.0))
+        >>> {name: round(value, 3) for name, value in fit.parameters.items() if "." not in name}
+        ... # doctest: +NORMALIZE_WHITESPACE
+        {'efolding_length': 2.0, 'mean': 5.0, 'standard_deviation': 1.0,
+         'correlation_length': 2.0, 'noise': 1.0}
+        >>> fit.parameters["marginal.mean"], fit.parameters["marginal.cv"]
+        (5.0, 0.2)
+        >>> fit.field("strength").quantity, fit.field("friction_coefficient").quantity
+        (None, 'friction_coefficient')
+        >>> turned = replace(fit, model=model._replace(anisotropy=3.0)).field("strength")
+        >>> turned.anisotropy, turned.mean_mode
+        (3.0, True)
+        >>> turned.marginal == law, turned.spectrum == model.spectrum
+        (True, True)
+        """
         lags = self.model.spectrum.correlation_length * LAGS
         correlation = self.model.spectrum.untruncated_correlation(lags)
         values = {
@@ -143,7 +165,28 @@ class BestFit:
         return RandomField(self.marginal, self.model.spectrum, **options)
 
     def simulate(self, rng: np.random.Generator) -> list[Array]:
-        """Simulate the measured values (points,) of each record, with noise."""
+        """Simulate the measured values (points,) of each record, with noise.
+
+        The field hardly varies. The records show the noise, whose variance is 0.25*4, and then the
+        factor between specimens.
+
+        >>> from stiction.inference.marginal_fit import family_of
+        >>> from stiction.random.marginals import Lognormal
+        >>> window = RecordWindow((0.5,), np.ones(4, dtype=np.bool_))
+        >>> law = Lognormal(mean=5.0, cv=1e-8)
+        >>> family = SpectrumFamily("exponential", {}, 1.0, None, (0.1, 6.0))
+        >>> model = family.model(family.vector([4.0, 2.0, 0.25]), np.array([0.0, 1.0]))
+        >>> setting = FitSetting((window,) * 4000, family_of("lognormal"), family)
+        >>> fit = BestFit(setting, law, None, model, 0.1, 0.1, (0.0, 0.0))
+        >>> rows = np.array(fit.simulate(np.random.default_rng(0)))
+        >>> rows.shape, f"{rows.mean():.1f} {rows.std():.1f}"
+        ((4000, 4), '5.0 1.0')
+        >>> model = family.model(family.vector([4.0, 2.0, 1e-20]), np.array([0.0, 1.0]))
+        >>> quiet = replace(fit, model=model, between=0.3)
+        >>> rows = np.array(quiet.simulate(np.random.default_rng(0)))
+        >>> f"{np.ptp(rows, axis=1).max():.4f} {rows.mean():.1f} {rows.std() / rows.mean():.1f}"
+        '0.0000 5.0 0.3'
+        """
         windows = self.setting.windows
         power = {window: self.model.power(window) for window in dict.fromkeys(windows)}
         rows = []
@@ -160,7 +203,20 @@ class BestFit:
 
     @property
     def of_means(self) -> Array:
-        """Variance that the field alone causes in the mean of each record."""
+        """Variance that the field alone causes in the mean of each record.
+
+        The mean of n values without correlation has the variance of a value over n.
+
+        >>> from types import SimpleNamespace
+        >>> def white(window):
+        ...     return np.where(np.arange(window.pairs.size) == 0, 1.0, 0.0)
+        >>> windows = tuple(RecordWindow((1.0,), np.ones(n, dtype=np.bool_)) for n in (4, 8))
+        >>> fit = SimpleNamespace(
+        ...     setting=SimpleNamespace(windows=(*windows, windows[0])),
+        ...     model=SimpleNamespace(correlation=white), parameters={"standard_deviation": 3})
+        >>> BestFit.of_means.fget(fit).round(9).tolist()
+        [2.25, 1.125, 2.25]
+        """
         windows, model = self.setting.windows, self.model
         shares = {w: w.variance_of_mean(model.correlation(w)) for w in set(windows)}
         deviation = self.parameters["standard_deviation"]
@@ -168,16 +224,49 @@ class BestFit:
 
     @cached_property
     def within(self) -> Array:
-        """Variance that the field alone causes in the log mean of each record."""
+        """Variance that the field alone causes in the log mean of each record.
+
+        >>> from types import SimpleNamespace
+        >>> fit = SimpleNamespace(of_means=np.array([3.0, 8.0]), parameters={"mean": 2.0})
+        >>> np.exp(BestFit.within.func(fit)).round(9).tolist()  # 1 + 3/4 and 1 + 8/4
+        [1.75, 3.0]
+        """
         return np.log1p(self.of_means / self.parameters["mean"] ** 2)
 
     def chance_of_scatter(self, levels: Array) -> float:
-        """Return the probability that means of records from one field scatter as much (step 7)."""
+        """Return the probability that means of records from one field scatter as much (step 7).
+
+        Two means, 1 away from their mean on either side, have Q = 2/v.
+
+        >>> from types import SimpleNamespace
+        >>> fit = SimpleNamespace(of_means=np.array([0.5, 0.5]))
+        >>> p = BestFit.chance_of_scatter(fit, np.array([1.0, 3.0]))
+        >>> f"{p:.6f}"  # of a normal number beyond 2 deviations
+        '0.045500'
+        """
         return float(chi2.sf(_q(levels, self.of_means, 0.0), levels.size - 1))
 
     @property
     def independent(self) -> float:
-        """Number of independent values that distinguish families equally well (step 5)."""
+        """Number of independent values that distinguish families equally well (step 5).
+
+        Two records have 4 points, one has 6. If all correlations are 1, the sum of their cubes is
+        2*16 + 36. If half of the variance is noise, they are 1/2 between different points.
+
+        >>> from types import SimpleNamespace
+        >>> first, second = (RecordWindow((1.0,), np.ones(n, dtype=np.bool_)) for n in (4, 6))
+        >>> def independent(noise_share, correlation):
+        ...     model = SimpleNamespace(noise_share=noise_share, correlation=correlation)
+        ...     setting = SimpleNamespace(windows=(first, second, first))
+        ...     fit = SimpleNamespace(setting=setting, model=model)
+        ...     return f"{BestFit.independent.fget(fit):.6f}"
+        >>> independent(0.0, lambda window: np.ones_like(window.pairs)), f"{14**2 / 68:.6f}"
+        ('2.882353', '2.882353')
+        >>> independent(0.5, lambda window: np.ones_like(window.pairs)), 14**2 / (11 + 9.75)
+        ('9.445783', 9.44578313253012)
+        >>> independent(0.0, lambda window: np.zeros_like(window.pairs))
+        '14.000000'
+        """
         points, alike = 0.0, 0.0
         for window, count in Counter(self.setting.windows).items():
             rho = (1.0 - self.model.noise_share) * self.model.correlation(window)
@@ -188,21 +277,79 @@ class BestFit:
 
     @property
     def lengths_held(self) -> float:
-        """Number of correlation lengths (on planes, correlation areas) in all records together."""
+        """Number of correlation lengths (on planes, correlation areas) in all records together.
+
+        Lines with 4 and 5 measured points, and a map with 5 of 6 points:
+
+        >>> from types import SimpleNamespace
+        >>> def held(spacings, *measured):
+        ...     length = SimpleNamespace(correlation_length=0.5)
+        ...     windows = [
+        ...         SimpleNamespace(measured=np.array(m), spacings=spacings) for m in measured]
+        ...     return BestFit.lengths_held.fget(SimpleNamespace(
+        ...         setting=SimpleNamespace(windows=windows),
+        ...         model=SimpleNamespace(spectrum=length, anisotropy=2.0)))
+        >>> held((0.25,), [True] * 4, [True, True, False, True, True, True])  # 9*0.25/0.5
+        4.5
+        >>> held((0.25, 0.5), [[True, True, True], [False, True, True]])  # 5*0.125/(0.5*1)
+        1.25
+        """
         windows, length = self.setting.windows, self.model.spectrum.correlation_length
         area = sum(float(one.measured.sum()) * math.prod(one.spacings) for one in windows)
         across = length * self.model.anisotropy if windows[0].measured.ndim == 2 else 1.0
         return area / (length * across)
 
     def as_of_one(self, rows: Sequence[Array]) -> list[Array]:
-        """Return records without the scatter between specimens, if it is estimated."""
+        """Return records without the scatter between specimens, if it is estimated.
+
+        >>> from types import SimpleNamespace
+        >>> fit = SimpleNamespace(within=np.zeros(2), setting=SimpleNamespace(between=False))
+        >>> rows = [np.array([1.0, 3.0]), np.array([8.0])]
+        >>> [row.tolist() for row in BestFit.as_of_one(fit, rows)]
+        [[1.0, 3.0], [8.0]]
+        >>> fit.setting.between = True
+        >>> [row.round(6).tolist() for row in BestFit.as_of_one(fit, rows)]
+        [[2.5, 7.5], [5.0]]
+        """
         return as_of_one(rows, self.within) if self.setting.between else list(rows)
 
 
 def estimate(
     rows: Sequence[Array], setting: FitSetting, start: BestFit | None = None
 ) -> BestFit:
-    """Fit measured values (points,) of each record, less the trend, from a start if it is given."""
+    """Fit measured values (points,) of each record, less the trend, from a start if it is given.
+
+    Examples
+    --------
+    Records of different specimens are first scaled to equal means, and then twice by means of
+    the last fit (`_estimate` is replaced here).
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> from stiction.base.errors import warn_accuracy, warn_user
+    >>> @dataclass
+    ... class Fit:
+    ...     start: Any
+    ...     within: Any
+    ...     between: float = 0.0
+    ...     def as_of_one(self, rows):
+    ...         return ["scaled"]
+    >>> def fit(rows, setting, start):
+    ...     print([row if isinstance(row, str) else float(row[0].round(4)) for row in rows],
+    ...           start and "from a start")
+    ...     warn_user("strength", UnitWarning)
+    ...     return Fit(start, np.full(3, 0.05))
+    >>> rows = [np.array([2.0 * factor]) for factor in np.exp([0.0, 0.7, 0.2])]
+    >>> with patch("stiction.inference.estimate._estimate", fit), collect_warnings() as caught:
+    ...     estimated = estimate(rows, SimpleNamespace(between=True))
+    ...     alone = estimate(["row"], SimpleNamespace(between=False), estimated).between
+    [2.7451, 2.7451, 2.7451] None
+    ['scaled'] from a start
+    ['scaled'] from a start
+    ['row'] from a start
+    >>> f"{alone} {math.log1p(estimated.between**2):.6f}", caught  # 0.13 - 0.05
+    ('0.0 0.080000', [])
+    """
     with collect_warnings() as caught:
         if not setting.between:
             fitted = _estimate(rows, setting, start)
@@ -269,6 +416,20 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
     For N values with correlation R, the fraction is tr(M R)/N. The
     projection M removes the trend of each record, and the mean of all
     records, from the values.
+
+    Values without correlation lose one of N for the mean of all, and one for the trend of each
+    record. A single record that is correlated throughout loses all, and the least part is left.
+
+    >>> from types import SimpleNamespace
+    >>> first, second = (RecordWindow((1.0,), np.ones(n, dtype=np.bool_), 1) for n in (4, 6))
+    >>> white = SimpleNamespace(correlation=lambda w: 1.0 * (np.arange(w.pairs.size) == 0))
+    >>> uniform = SimpleNamespace(correlation=lambda w: np.ones_like(w.pairs))
+    >>> f"{_left([first, second, first], white):.6f}"  # 1 - (3 + 1)/14
+    '0.714286'
+    >>> f"{_left([first, second, first], uniform):.6f}"  # 1 - (2*16 + 36)/14^2
+    '0.653061'
+    >>> _left([first], uniform)
+    0.2
     """
     taken, mean, points = 0.0, 0.0, 0.0
     for window, count in Counter(windows).items():
@@ -280,7 +441,23 @@ def _left(windows: Sequence[RecordWindow], model: Model) -> float:
 
 
 def bands(group: Observed, expected: Array) -> Array:
-    """Return band averages (bands, 3) of wavenumber (rad/m), periodogram and expectation."""
+    """Return band averages (bands, 3) of wavenumber (rad/m), periodogram and expectation.
+
+    Examples
+    --------
+    The wavenumbers 4 and 4.1 are in one band. The point with weight 0 is left out.
+
+    >>> from types import SimpleNamespace
+    >>> window = SimpleNamespace(
+    ...     weights=np.array([[0, 1, 1], [0.5, 1, 0]]),
+    ...     wave_vectors=(np.array([[0], [4.1]]), np.array([[0, 4, 8]])))
+    >>> group = SimpleNamespace(window=window, average=np.array([[99, 1, 2], [5, 7, 99]]))
+    >>> for band in bands(group, np.array([[99, 3, 4], [6, 8, 99]])):
+    ...     band.round(4).tolist()
+    [4.05, 3.0, 4.5]
+    [5.728, 7.0, 8.0]
+    [8.0, 2.0, 4.0]
+    """
     weights = group.window.weights
     k = np.broadcast_to(np.sqrt(sum(v**2 for v in group.window.wave_vectors)), weights.shape)
     kept = weights > 0.0
@@ -314,7 +491,21 @@ class Goodness(NamedTuple):
 def windowed(
     records: Sequence[Record], degree: int
 ) -> tuple[tuple[RecordWindow, ...], list[Array]]:
-    """Return a window for each record, shared by equal geometries, and the values without trend."""
+    """Return a window for each record, shared by equal geometries, and the values without trend.
+
+    Examples
+    --------
+    A straight line less its trend is its mean. The records 0 and 1 have the same geometry.
+
+    >>> line, spacing = np.array([1.0, 3.0, 5.0, 7.0]), (0.5,)
+    >>> missing = np.array([1.0, 3.0, np.nan, 7.0])
+    >>> records = (line, spacing), (2.0 * line, spacing), (missing, spacing), (line, (0.25,))
+    >>> windows, rows = windowed([Record(*record) for record in records], 1)
+    >>> [windows.index(window) for window in windows], windows[3].spacings
+    ([0, 0, 2, 3], (0.25,))
+    >>> [row.round(6).tolist() for row in rows[1:3]]
+    [[8.0, 8.0, 8.0, 8.0], [3.666667, 3.666667, 3.666667]]
+    """
     made: dict[Any, RecordWindow] = {}
     windows, rows = [], []
     for values, spacings in records:
@@ -334,6 +525,41 @@ def ranking(
 
     Families that cannot be fitted are left out. If all families fail,
     an `InputError` is raised.
+
+    Examples
+    --------
+    Three families have 2, 1 and 2 parameters. The likeliest family, 'a', has 20 independent
+    values, so the scores are -20 - 2, -24 - 1 and -30 - 2. (Fits are replaced by numbers here.)
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> means, sizes = {"a": -1.0, "b": -1.2, "d": -1.5}, {"a": 20, "b": 40, "d": 60}
+    >>> def setting(name):
+    ...     parameters = "x" if name == "b" else "xy"
+    ...     law = SimpleNamespace(label=name, parameters=lambda _: parameters)
+    ...     return SimpleNamespace(marginal=law, spectrum=SimpleNamespace(noise=None))
+    >>> def fit(rows, setting):
+    ...     if (name := setting.marginal.label) not in means:
+    ...         raise InputError(f"{name} fails")
+    ...     return SimpleNamespace(
+    ...         setting=setting, marginal=name.upper(), of_values=means[name],
+    ...         distance=sizes[name] / 100, independent=sizes[name],
+    ...         model=SimpleNamespace(noise=0.0), as_of_one=lambda rows: rows)
+    >>> changed = {"estimate": fit, "mean_log_likelihood": lambda mean, *_: mean}
+    >>> with patch.multiple("stiction.inference.estimate", **changed):
+    ...     estimates, families = ranking([setting(name) for name in "dcba"], [np.ones(3)])
+    ...     ranking([setting("x"), setting("y")], [np.ones(3)])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: x fails
+    y fails
+    >>> [one.marginal for one in estimates], [*families]
+    (['A', 'B', 'D'], ['a', 'b', 'd'])
+    >>> [round(one.score, 6) for one in families.values()], families["b"][:2]
+    ([0.0, -3.0, -10.0], ('B', 0.4))
+    >>> ratio = families["b"].weight / families["a"].weight  # exp(-3 + 0.5) over exp(0 + 1)
+    >>> f"{math.log(ratio):.6f}", families["d"].weight, f"{families['a'].weight:.6f}"
+    ('-3.500000', 0.0, '0.970688')
     """
     fitted: list[tuple[float, BestFit]] = []
     problems: list[str] = []
@@ -373,7 +599,17 @@ def ranking(
 
 
 def levels_of(rows: Sequence[Array]) -> Array:
-    """Return the mean for each record from different specimens."""
+    """Return the mean for each record from different specimens.
+
+    Examples
+    --------
+    >>> levels_of([np.array([1.0, 3.0]), np.array([8.0])]).tolist()
+    [2.0, 8.0]
+    >>> levels_of([np.array([1.0, -1.0]), np.array([8.0])])
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: between: needs records with a positive mean, got 0
+    """
     levels = np.array([row.mean() for row in rows])
     if levels.min() <= 0.0:
         raise InputError(f"between: needs records with a positive mean, got {levels.min():g}")
@@ -384,6 +620,22 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
     """Return the records scaled as if all came from one specimen (step 9).
 
     `within` holds the variances v_k.
+
+    Examples
+    --------
+    Without a variance by the field, all records get the mean 5. With variances, the logarithms
+    of the levels get Q(0) = n - 1, and the mean of the levels stays.
+
+    >>> rows = [np.array([1.0, 3.0]), np.array([8.0])]
+    >>> [row.round(6).tolist() for row in as_of_one(rows, np.zeros(2))]
+    [[2.5, 7.5], [5.0]]
+    >>> scaled = as_of_one(rows, np.full(2, 0.5 * math.log(2.0) ** 2))
+    >>> [row.round(6).tolist() for row in scaled]  # the ratio 4 of the means becomes 2
+    [[1.666667, 5.0], [6.666667]]
+    >>> within = np.array([0.1, 0.2, 0.4])
+    >>> levels = levels_of(as_of_one(np.array([[4], [7], [19]]), within))
+    >>> f"{levels.mean():.6f} {_q(np.log(levels), within, 0.0):.6f}"
+    '10.000000 2.000000'
     """
     levels = levels_of(rows)
     logarithms = np.log(levels)
@@ -398,7 +650,13 @@ def as_of_one(rows: Sequence[Array], within: Array) -> list[Array]:
 
 
 def _q(values: Array, within: Array, s: float) -> float:
-    """Return Q(s) for values (step 7)."""
+    """Return Q(s) for values (step 7).
+
+    The weights are 1/2 and 1/4, and m(s) is 5/3.
+
+    >>> f"{_q(np.array([1.0, 3.0]), np.array([1.0, 3.0]), 1.0):.6f}"  # (4/9)/2 + (16/9)/4
+    '0.666667'
+    """
     weight = 1.0 / (s + within)
     middle = float(weight @ values / weight.sum())
     return float(weight @ (values - middle) ** 2)
@@ -408,6 +666,19 @@ def scatter_between(logarithms: Array, within: Array) -> float:
     """Estimate the coefficient of variation of a log-normal factor between records (step 8).
 
     For a single record the estimate is 0.
+
+    Examples
+    --------
+    With equal variances v, the estimate is the variance of the logarithms, 0.13, less v.
+
+    >>> logarithms = np.array([0.0, 0.7, 0.2])
+    >>> cv = scatter_between(logarithms, np.full(3, 0.05))
+    >>> f"{math.log1p(cv**2):.6f}"
+    '0.080000'
+    >>> [scatter_between(logarithms[:n], np.full(n, 0.14)) for n in (3, 1)]
+    [0.0, 0.0]
+    >>> f"{scatter_between(9.0 * logarithms, np.full(3, 0.05)):.6f}"  # at most
+    '1.000000'
     """
 
     def excess(s: float) -> float:  # it falls as s rises
