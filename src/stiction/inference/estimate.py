@@ -167,7 +167,7 @@ class BestFit:
     def simulate(self, rng: np.random.Generator) -> list[Array]:
         """Simulate the measured values (points,) of each record, with noise.
 
-        The field hardly varies. The records show the noise, whose variance is 0.25*4, and then the
+        The field hardly varies. Records show the noise, whose variance is 0.25*4, and then the
         factor between specimens.
 
         >>> from stiction.inference.marginal_fit import family_of
@@ -250,7 +250,7 @@ class BestFit:
     def independent(self) -> float:
         """Number of independent values that distinguish families equally well (step 5).
 
-        Two records have 4 points, one has 6. If all correlations are 1, the sum of their cubes is
+        Two records have 4 points, one has 6. If correlations are 1, the sum of their cubes is
         2*16 + 36. If half of the variance is noise, they are 1/2 between different points.
 
         >>> from types import SimpleNamespace
@@ -343,7 +343,7 @@ def estimate(
     >>> with patch("stiction.inference.estimate._estimate", fit), collect_warnings() as caught:
     ...     estimated = estimate(rows, SimpleNamespace(between=True))
     ...     alone = estimate(["row"], SimpleNamespace(between=False), estimated).between
-    [2.7451, 2.7451, 2.7451] None
+    [2.8234, 2.8234, 2.8234] None
     ['scaled'] from a start
     ['scaled'] from a start
     ['row'] from a start
