@@ -61,7 +61,11 @@ class Solid(Listed):
     @model_validator(mode="before")
     @classmethod
     def _shear_modulus(cls, given: Any) -> Any:
-        """Replace `youngs_modulus` by G = E/(2 (1 + nu))."""
+        """Replace `youngs_modulus` by G = E/(2 (1 + nu)).
+
+        >>> Solid(youngs_modulus=3e9, poisson_ratio=0.25, density=1200.0).shear_modulus
+        1200000000.0
+        """
         named = dict(given.kwargs or {}) if isinstance(given, ArgsKwargs) else given
         if not isinstance(named, dict) or "youngs_modulus" not in named:
             return given
@@ -91,7 +95,11 @@ class Solid(Listed):
 
     @property
     def youngs_modulus(self) -> float:
-        """E = 2 (1 + nu) G, Pa."""
+        """E = 2 (1 + nu) G, Pa.
+
+        >>> Solid(shear_modulus=1.2e9, poisson_ratio=0.25, density=1200.0).youngs_modulus
+        3000000000.0
+        """
         return 2.0 * (1.0 + self.poisson_ratio) * self.shear_modulus
 
     @property
@@ -101,7 +109,12 @@ class Solid(Listed):
 
     @property
     def wave_speed_ratio(self) -> float:
-        """c_d/c_s: sqrt(2 (1-nu)/(1-2 nu)) in plane strain, sqrt(2/(1-nu)) in plane stress."""
+        """c_d/c_s: sqrt(2 (1-nu)/(1-2 nu)) in plane strain, sqrt(2/(1-nu)) in plane stress.
+
+        >>> solids = [Solid(1e9, 0.2, 1e3, plane) for plane in ("strain", "stress")]
+        >>> [round(solid.wave_speed_ratio**2, 9) for solid in solids]  # 1.6/0.6 and 2/0.8
+        [2.666666667, 2.5]
+        """
         nu = self.poisson_ratio
         if self.plane == "strain":
             return math.sqrt(2.0 * (1.0 - nu) / (1.0 - 2.0 * nu))
@@ -109,7 +122,12 @@ class Solid(Listed):
 
     @property
     def dilatational_wave_speed(self) -> float:
-        """c_d of the plane state, m/s."""
+        """c_d of the plane state, m/s.
+
+        >>> speed = Solid(4e9, 0.2, 1e3, "stress").dilatational_wave_speed
+        >>> round(speed**2 / 1e6, 6)  # 2.5 G/rho
+        10.0
+        """
         return self.wave_speed_ratio * self.shear_wave_speed
 
     @property
@@ -119,6 +137,12 @@ class Solid(Listed):
         The cubic is q^3 - 8 q^2 + (24 - 16/eta^2) q - 16 (1 - 1/eta^2)
         = 0 with eta = c_d/c_s. It follows from (2-q)^2 = 4 sqrt(1-q)
         sqrt(1-q/eta^2), squared and divided by q (Rayleigh, 1885).
+
+        With a Poisson ratio of 1/4, the speed is sqrt(2 - 2/sqrt(3)) c_s:
+
+        >>> exact = math.sqrt(2.0 - 2.0 / math.sqrt(3.0))
+        >>> round(Solid(4e9, 0.25, 1e3).rayleigh_wave_speed / 2e3 - exact, 9), round(exact, 4)
+        (0.0, 0.9194)
         """
         slowness = self.wave_speed_ratio**-2
         roots = np.roots([1.0, -8.0, 24.0 - 16.0 * slowness, -16.0 * (1.0 - slowness)])
@@ -127,7 +151,11 @@ class Solid(Listed):
 
     @property
     def kolosov(self) -> float:
-        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress."""
+        """Kolosov's constant: 3 - 4 nu in plane strain, (3 - nu)/(1 + nu) in plane stress.
+
+        >>> [round(Solid(1e9, 0.2, 1e3, plane).kolosov, 9) for plane in ("strain", "stress")]
+        [2.2, 2.333333333]
+        """
         nu = self.poisson_ratio
         return 3.0 - 4.0 * nu if self.plane == "strain" else (3.0 - nu) / (1.0 + nu)
 
@@ -137,6 +165,12 @@ class Solid(Listed):
         Mode II: G/(1-nu) in plane strain, G (1+nu) in plane stress,
         that is 2 G (1 - c_s^2/c_d^2) (Geubelle and Rice, 1995, static
         limit). Mode III: G.
+
+        >>> for plane in ("strain", "stress"):  # G/(1 - nu) and G (1 + nu)
+        ...     solid = Solid(1e9, 0.2, 1e3, plane)
+        ...     print(f"{solid.effective_modulus():.6g} {solid.effective_modulus('III'):.6g}")
+        1.25e+09 1e+09
+        1.2e+09 1e+09
         """
         if mode not in ("II", "III"):
             raise InputError(f"mode: must be 'II' or 'III', got {mode!r}")

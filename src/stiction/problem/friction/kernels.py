@@ -90,6 +90,22 @@ def line_at(
     peak, residual, rate, slip, ahead : float
         tau_p and tau_r (Pa), the weakening rate W at zero slip (Pa/m),
         and slips (m).
+
+    Examples
+    --------
+    The strength falls from 5 Pa at 2 Pa/m to 1 Pa:
+
+    >>> from stiction.problem.friction.parameters import Exponential
+    >>> line_at(Linear(), 5.0, 1.0, 2.0, 0.5, 1.0), line_at(Linear(), 5.0, 1.0, 2.0, 0.5, 2.0)
+    ((4.0, 2.0), (1.0, 0.0))
+
+    The tangent of 1 + 4 exp(-d/2) at d = 2 has the slope -2/e:
+
+    >>> value, rate = line_at(Exponential(), 5.0, 1.0, 2.0, 0.5, 1.5)
+    >>> round(value - (1.0 + 4.0 / np.e + 1.5 * 2.0 / np.e), 12), round(rate * np.e, 9)
+    (0.0, 2.0)
+    >>> line_at(Exponential(), 3.0, 3.0, 2.0, 0.5, 1.5)
+    (3.0, 0.0)
     """
     return _line(law, peak, residual, weakening_rate, slip, ahead)
 
@@ -108,6 +124,10 @@ def strengths(law: Any, peak: Array, residual: Array, W: Array, slip: Array) -> 
     """Return the strength tau_f, Pa, at every node.
 
     Parameters of `line_at` are (nodes,) arrays.
+
+    >>> peak, residual, W = np.array([5.0, 7.0]), np.array([1.0, 2.0]), np.array([2.0, 3.0])
+    >>> strengths(Linear(), peak, residual, W, np.array([1.0, 1.5])).tolist()
+    [3.0, 2.5]
     """
     result = np.empty(slip.size)
     for i in range(slip.size):

@@ -109,6 +109,13 @@ class FrictionLaw(Listed):
         Up to the `reach`, cubic Hermite pieces through f and f' are
         integrated (relative error about 1e-12 for a smooth f). Beyond
         the reach, f is integrated by adaptive quadrature.
+
+        The exponential law has the integral 1 - exp(-u) and the reach 4.6:
+
+        >>> FrictionLaw.area(ExponentialWeakening(), [[0.5, 6.0]]).round(8).tolist()
+        [[0.39346934, 0.99752125]]
+        >>> (1.0 - np.exp([-0.5, -6.0])).round(8).tolist()
+        [0.39346934, 0.99752125]
         """
         from scipy.integrate import quad  # few laws need it
 
@@ -123,6 +130,11 @@ class FrictionLaw(Listed):
 
         The result is `math.inf` if f stays above the fraction. The slip
         is found by bisection.
+
+        >>> from types import SimpleNamespace
+        >>> law = SimpleNamespace(fraction=lambda u: 0.3 + 0.7 / (1.0 + u))
+        >>> [round(FrictionLaw.slip_at(law, fraction), 9) for fraction in (0.8, 0.44, 0.3)]
+        [0.4, 4.0, inf]
         """
         above, below = 0.0, 1.0
         while self.fraction(below) > fraction:
@@ -135,7 +147,11 @@ class FrictionLaw(Listed):
         return below
 
     def fraction(self, u: Any) -> Array:
-        """Return f(u), where u is slip over d_c, with any shape."""
+        """Return f(u), where u is slip over d_c, with any shape.
+
+        >>> LinearWeakening().fraction([[0.0, 0.25, 1.5]]).tolist()
+        [[1.0, 0.75, 0.0]]
+        """
         f = self.parameters.f
         return np.vectorize(lambda slip: f(slip)[0], otypes=[float])(u)
 
@@ -173,7 +189,11 @@ class FrictionLaw(Listed):
 
     @property
     def reach(self) -> float:
-        """Slip u at which f reaches 0, or else 1 %, and the strength counts as residual."""
+        """Slip u at which f reaches 0, or else 1 %, and the strength counts as residual.
+
+        >>> round(ExponentialWeakening().reach, 6), LinearWeakening().reach  # ln 100 and 1
+        (4.60517, 1.0)
+        """
         end = self.slip_at(0.0)
         return end if np.isfinite(end) else self.slip_at(NEARLY_RESIDUAL)
 
@@ -184,7 +204,14 @@ class FrictionLaw(Listed):
         return next((pair for pair in given if pair[1] is not None), None)
 
     def residual(self, strength: Array) -> Array:
-        """Return tau_r, Pa, for a peak strength (Pa, with any shape)."""
+        """Return tau_r, Pa, for a peak strength (Pa, with any shape).
+
+        >>> strength = np.array([4.0, 6.0])
+        >>> LinearWeakening(residual_ratio=0.25).residual(strength).tolist()
+        [1.0, 1.5]
+        >>> float(LinearWeakening(residual_strength=3.0).residual(strength))
+        3.0
+        """
         if self.residual_ratio is None:
             return np.asarray(self.residual_strength, dtype=np.float64)
         return np.asarray(self.residual_ratio) * strength
@@ -194,6 +221,17 @@ class FrictionLaw(Listed):
 
         `drop` is tau_p - tau_r, Pa. `value` is the value of a scale, in
         Pa/m, m or J/m².
+
+        A law that falls at first with the slope 7, and has the integral 0.2:
+
+        >>> law = PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.3, 0.0])
+        >>> drop = np.array([4.0, 6.0])
+        >>> for scale, value in (("critical_slip", [2.0, 3.0]), ("fracture_energy", 0.7)):
+        ...     print(law.weakening_rate_of(drop, scale, value).round(9).tolist())
+        [14.0, 14.0]
+        [32.0, 72.0]
+        >>> law.weakening_rate_of(drop, "weakening_rate", 5.0).tolist()
+        [5.0, 5.0]
         """
         value = np.asarray(value, dtype=np.float64)
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
@@ -205,12 +243,24 @@ class FrictionLaw(Listed):
 
     @property
     def uniform_weakening_rate(self) -> float | None:
-        """The weakening rate, Pa/m, if it is given and the same at all nodes."""
+        """The weakening rate, Pa/m, if it is given and the same at all nodes.
+
+        >>> rates = None, 3.0, [3.0, 3.0], [3.0, 5.0]
+        >>> [LinearWeakening(weakening_rate=rate).uniform_weakening_rate for rate in rates]
+        [None, 3.0, 3.0, None]
+        """
         W = self.weakening_rate
         return None if W is None or np.ptp(W) > 0.0 else float(np.max(W))
 
     def critical_slip_of(self, drop: Array, weakening_rate: Array) -> Array:
-        """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m)."""
+        """Return d_c, m, from tau_p - tau_r (Pa) and the weakening rate W (Pa/m).
+
+        A law that falls at first with the slope 7:
+
+        >>> law = PiecewiseWeakening(slip=[0.1, 1.0], strength=[0.3, 0.0])
+        >>> round(float(law.critical_slip_of(np.array(4.0), np.array(14.0))), 9)
+        2.0
+        """
         return self.initial_slope * drop / weakening_rate
 
     def dissipated(self, slip: Array, drop: Array, weakening_rate: Array) -> Array:
@@ -218,6 +268,17 @@ class FrictionLaw(Listed):
 
         `slip` (m) has shape (..., nodes). `drop` = tau_p - tau_r (Pa)
         and `weakening_rate` = W (Pa/m) have shape (nodes,).
+
+        The critical slip is 4 Pa / (2 Pa/m) = 2 m. The second node does not
+        weaken:
+
+        >>> slips, drop = np.array([[1.0, 1.0], [9.0, 9.0]]), np.array([4.0, 0.0])
+        >>> LinearWeakening().dissipated(slips, drop, np.array([2.0, 2.0])).tolist()
+        [[3.0, 0.0], [4.0, 0.0]]
+        >>> ExponentialWeakening().dissipated(slips, drop, np.array([2.0, 2.0])).round(6).tolist()
+        [[3.147755, 0.0], [7.911128, 0.0]]
+        >>> [round(8.0 * (1.0 - math.exp(-u)), 6) for u in (0.5, 4.5)]
+        [3.147755, 7.911128]
         """
         if self.linear:
             # Slip beyond d_c dissipates no more.
@@ -258,12 +319,20 @@ class LinearWeakening(FrictionLaw):
     parameters: ClassVar[Linear] = Linear()
 
     def area(self, u: Any) -> Array:
-        """Return w - w²/2 with w = min(u, 1)."""
+        """Return w - w²/2 with w = min(u, 1).
+
+        >>> LinearWeakening().area([0.5, 1.0, 3.0]).tolist()
+        [0.375, 0.5, 0.5]
+        """
         w = np.minimum(np.asarray(u, dtype=np.float64), 1.0)
         return w - 0.5 * w * w
 
     def slip_at(self, fraction: float) -> float:
-        """Return u = 1 - f."""
+        """Return u = 1 - f.
+
+        >>> LinearWeakening().slip_at(0.25)
+        0.75
+        """
         return 1.0 - fraction
 
 
@@ -288,15 +357,29 @@ class ExponentialWeakening(FrictionLaw):
     parameters: ClassVar[Exponential] = Exponential()
 
     def area(self, u: Any) -> Array:
-        """Return 1 - exp(-u)."""
+        """Return 1 - exp(-u).
+
+        >>> float(ExponentialWeakening().area(math.log(4.0)).round(9))
+        0.75
+        """
         return -np.expm1(-np.asarray(u, dtype=np.float64))
 
     def slip_at(self, fraction: float) -> float:
-        """Return u = -ln f."""
+        """Return u = -ln f.
+
+        >>> law = ExponentialWeakening()
+        >>> round(law.slip_at(0.25) / math.log(2.0), 9), law.slip_at(0.0)
+        (2.0, inf)
+        """
         return -math.log(fraction) if fraction > 0.0 else math.inf
 
 
 def _listed(value: Any) -> Any:
+    """Return an array as a list, and another value as given.
+
+    >>> _listed(np.array([3.0, 4.5])), _listed((3.0, 4.5)), _listed(np.array(3.0))
+    ([3.0, 4.5], (3.0, 4.5), array(3.))
+    """
     return value.tolist() if isinstance(value, np.ndarray) and value.ndim else value
 
 
@@ -356,18 +439,33 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def corners(self) -> tuple[Array, Array]:
-        """u and f at all corners, including the corner at zero slip."""
+        """u and f at all corners, including the corner at zero slip.
+
+        >>> law = PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.9, 0.0])
+        >>> [numbers.tolist() for numbers in law.corners]
+        [[0.0, 0.5, 1.0], [1.0, 0.9, 0.0]]
+        """
         return np.array((0.0, *self.slip)), np.array((1.0, *self.strength))
 
     @property
     def _pieces(self) -> tuple[Array, Array]:
         # Slopes and areas of the pieces.
+        """Slopes and areas of the pieces.
+
+        >>> law = PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.9, 0.0])
+        >>> [numbers.round(9).tolist() for numbers in law._pieces], round(law.steepening, 9)
+        ([[0.2, 1.8], [0.475, 0.225]], 9.0)
+        """
         u, f = self.corners
         return -np.diff(f) / np.diff(u), 0.5 * (f[1:] + f[:-1]) * np.diff(u)
 
     @property
     def plateau(self) -> float:
-        """The slip u up to which the strength does not fall."""
+        """The slip u up to which the strength does not fall.
+
+        >>> [PiecewiseWeakening(slip=[0.2, 1.0], strength=[f, 0.0]).plateau for f in (1.0, 0.9)]
+        [0.2, 0.0]
+        """
         return self.slip[0] if self.strength[0] == 1.0 else 0.0
 
     @cached_property
@@ -377,11 +475,20 @@ class PiecewiseWeakening(FrictionLaw):
 
     @property
     def integral(self) -> float:
-        """Area under f."""
+        """Area under f.
+
+        >>> round(PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.9, 0.0]).integral, 9)
+        0.7
+        """
         return float(np.sum(self._pieces[1]))
 
     def area(self, u: Any) -> Array:
-        """Return the area under f up to u."""
+        """Return the area under f up to u.
+
+        >>> law = PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.9, 0.0])
+        >>> law.area([0.0, 0.25, 0.5, 0.75, 2.0]).round(9).tolist()
+        [0.0, 0.24375, 0.475, 0.64375, 0.7]
+        """
         (corners, f), (slopes, areas) = self.corners, self._pieces
         # The area up to the corner before u, and a trapezium from this
         # corner to u.
@@ -392,14 +499,26 @@ class PiecewiseWeakening(FrictionLaw):
         return at_corners[piece] + into * (f[piece] - 0.5 * slopes[piece] * into)
 
     def slip_at(self, fraction: float) -> float:
-        """Return the slip u at which f has the given value."""
+        """Return the slip u at which f has the given value.
+
+        >>> law = PiecewiseWeakening(slip=[0.5, 1.0], strength=[0.9, 0.0])
+        >>> [round(law.slip_at(fraction), 9) for fraction in (1.0, 0.95, 0.45, 0.0)]
+        [0.0, 0.25, 0.75, 1.0]
+        """
         # `interp` needs rising numbers, and f falls.
         u, f = self.corners
         return float(np.interp(fraction, f[::-1], u[::-1]))
 
     @property
     def parameters(self) -> Polygon | Linear:
-        """Parameters for the kernels. A single piece gives the linear law, to the bit."""
+        """Parameters for the kernels. A single piece gives the linear law, to the bit.
+
+        >>> PiecewiseWeakening(slip=[1.0], strength=[0.0]).parameters
+        Linear(initial_slope=1.0)
+        >>> law = PiecewiseWeakening(slip=[0.2, 0.6, 1.0], strength=[1.0, 0.1, 0.0])
+        >>> round(law.parameters.initial_slope, 9)
+        2.25
+        """
         if len(self.slip) == 1:
             return Linear()
         slopes = self._pieces[0]
@@ -421,6 +540,17 @@ class PiecewiseWeakening(FrictionLaw):
         >>> pieces = st.PiecewiseWeakening.from_law(law, 32)
         >>> round(float(pieces.weakening_rate) / 0.5e12, 3)
         0.984
+
+        Two pieces of the exponential law end at u = ln 2 and ln 2 + 2. The
+        second is a triangle with the area 1/2:
+
+        >>> for scale in SCALES:
+        ...     law = st.ExponentialWeakening(**{scale: 3.0})
+        ...     pieces = st.PiecewiseWeakening.from_law(law, 2)
+        ...     print(f"{pieces.scale[1]:.6f} {pieces.slip[0]:.6f}", pieces.strength)
+        2.164043 0.257374 (0.5, 0.0)
+        8.079442 0.257374 (0.5, 0.0)
+        3.059581 0.257374 (0.5, 0.0)
         """
         if problems := contradictions(law):
             raise InputError([f"law: {text}" for text in problems])
@@ -450,7 +580,12 @@ class PiecewiseWeakening(FrictionLaw):
 
 @lru_cache(maxsize=64)
 def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
-    """Return slips u up to the reach of a law, with the compiled f and -f' at these slips."""
+    """Return slips u up to the reach of a law, with the compiled f and -f' at these slips.
+
+    >>> u, f, slopes = _examined(LinearWeakening())
+    >>> u.size, [float(numbers[1024]) for numbers in (u, f, slopes)]
+    (4097, [0.25, 0.75, 1.0])
+    """
     from stiction.problem.friction.kernels import compiled  # imports numba
 
     parameters = law.parameters
@@ -461,7 +596,11 @@ def _examined(law: FrictionLaw) -> tuple[Array, Array, Array]:
 
 @lru_cache(maxsize=64)
 def _antiderivative(law: FrictionLaw) -> Any:
-    """Return the integral of cubic Hermite pieces through f and f', up to the reach of a law."""
+    """Return the integral of cubic Hermite pieces through f and f', up to the reach of a law.
+
+    >>> round(float(_antiderivative(LinearWeakening())(0.25)), 9)  # 1/4 - 1/32
+    0.21875
+    """
     from scipy.interpolate import CubicHermiteSpline
 
     slips, f, slopes = _examined(law)
@@ -469,7 +608,28 @@ def _antiderivative(law: FrictionLaw) -> Any:
 
 
 def contradictions(law: FrictionLaw) -> list[str]:
-    """Return messages about mistakes in a user's law, such as an f that rises."""
+    """Return messages about mistakes in a user's law, such as an f that rises.
+
+    >>> class Law:
+    ...     __module__ = "users.laws"
+    ...     parameters, reach, integral, initial_slope = Linear(), 1.0, 0.5, 1.0
+    >>> mistakes = [("integral", 0.0), ("integral", np.inf), ("initial_slope", 1.01)]
+    >>> mistakes += [("initial_slope", 0.0), ("reach", 0.0), ("reach", np.inf)]
+    >>> mistakes += [("parameters", ())]
+    >>> for name, value in mistakes + [("reach", 0.5), ("initial_slope", 1.0005)]:
+    ...     law = Law()
+    ...     setattr(law, name, value)
+    ...     print([text[:43] for text in contradictions(law)])
+    ['Law: the integral of f, area(inf), must be ']
+    ['Law: the integral of f, area(inf), must be ']
+    ["Law: initial_slope is 1.01, but -f'(0) is 1"]
+    ["Law: f must fall from zero slip on, got -f'"]
+    ['Law: slip_at(0), or slip_at(0.01) if that i']
+    ['Law: slip_at(0), or slip_at(0.01) if that i']
+    ['Law: parameters must be a NamedTuple with i']
+    []
+    []
+    """
     if type(law).__module__.startswith("stiction."):
         return []
     # Check first what the later checks need: parameters, and f that

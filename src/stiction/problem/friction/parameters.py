@@ -29,6 +29,11 @@ class Linear(NamedTuple):
     initial_slope: float = 1.0
 
     def f(self, u: float) -> tuple[float, float]:
+        """Return 1 - u and its slope, down to 0.
+
+        >>> Linear().f(0.25), Linear().f(1.0), Linear().f(3.0)
+        ((0.75, 1.0), (0.0, 0.0), (0.0, 0.0))
+        """
         return (1.0 - u, 1.0) if u < 1.0 else (0.0, 0.0)
 
 
@@ -38,6 +43,11 @@ class Exponential(NamedTuple):
     initial_slope: float = 1.0
 
     def f(self, u: float) -> tuple[float, float]:
+        """Return exp(-u), which is also the slope.
+
+        >>> [round(number, 9) for number in Exponential().f(math.log(4.0))]
+        [0.25, 0.25]
+        """
         left = math.exp(-u)
         return left, left
 
@@ -50,6 +60,18 @@ class Polygon(NamedTuple):
     initial_slope: float
 
     def f(self, u: float) -> tuple[float, float]:
+        """Return f and -f' by linear interpolation. A corner belongs to the piece behind it.
+
+        >>> import numpy as np
+        >>> polygon = Polygon(np.array([0.0, 0.5, 1.0]), np.array([1.0, 0.75, 0.0]), 0.5)
+        >>> for u in (0.25, 0.5, 0.75, 1.0, 3.0):
+        ...     print(*map(float, polygon.f(u)))
+        0.875 0.5
+        0.75 1.5
+        0.375 1.5
+        0.0 0.0
+        0.0 0.0
+        """
         piece, last = 0, self.slip.shape[0] - 1
         while piece < last and u >= self.slip[piece + 1]:
             piece += 1
