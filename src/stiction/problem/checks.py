@@ -68,6 +68,35 @@ def contradictions_of(
     """Return messages about profiles (samples, *shape), Pa, that contradict each other.
 
     With `overstress`, the initial stress may exceed the strength.
+
+    >>> line = Interface(8.0, 8)
+    >>> strength, residual = np.full((3, 8), 5.0), np.ones((3, 8))
+    >>> initial = np.full((3, 8), 2.0)
+    >>> initial[1, 5:7] = 5.0, 6.0
+    >>> initial[2, 7] = 9.0
+    >>> print(contradictions_of(line, strength, residual, initial, False)[0][:87])
+    strength: must be above initial_stress. At x = 5 m of sample 1 they are 5 and 5 Pa (nod
+    >>> print(contradictions_of(line, strength, residual, initial, False)[0][83:])
+    (nodes: 2, further samples: 1). Only st.Rupture() accepts this
+    >>> contradictions_of(line, strength, residual, initial, True)
+    []
+
+    Nodes that never break have an infinite strength. A finite strength may
+    be 1e8 times the median:
+
+    >>> strength[1, 3], strength[1, 4] = 5e8, np.inf
+    >>> contradictions_of(line, strength, residual, 0.0 * initial, False)
+    []
+    >>> strength[1, 3] = 6e8
+    >>> print(contradictions_of(line, strength, residual, 0.0 * initial, False)[0][:83])
+    strength: 6e+08 Pa at x = 3 m of sample 1 is more than 1e+08 times the median, 5 Pa
+
+    A sample whose strength is nowhere above the residual strength:
+
+    >>> strength[1], residual[2] = 6.0, np.linspace(5.0, 7.0, 8)
+    >>> text = contradictions_of(line, strength, residual, 0.0 * initial, False)[0]
+    >>> print(text.partition(". ")[2])
+    In sample 2 strength is 5 to 5 Pa, and residual_strength is 5 to 7 Pa. Check both units
     """
     problems = []
     over = (strength <= initial).reshape(len(strength), -1)
@@ -109,6 +138,19 @@ def steepest_weakening_rate(strength: Array, residual: Array, weakening_rate: Ar
 
     Arrays have shape (samples, *shape). Barriers do not count: with a
     uniform critical slip they weaken steeply but never slip.
+
+    The drops have the lower quartiles 3 and 4, so barriers have drops above
+    30 and 40:
+
+    >>> strength = np.array([[2.0, 3.0, 4.0, 25.0, 60.0], [9.0, 41.0, 5.0, np.inf, 1.0]])
+    >>> residual = np.array([[0.0], [1.0]]) * np.ones(5)
+    >>> rates = np.array([[7.0, 8.0, 9.0, 20.0, 90.0], [3.0, 30.0, 5.0, 95.0, 1.0]])
+    >>> steepest_weakening_rate(strength, residual, rates)
+    30.0
+    >>> steepest_weakening_rate(strength[:1], residual[:1], rates[:1])
+    20.0
+    >>> steepest_weakening_rate(strength[:1, 1:4], residual[:1, 1:4], rates[:1, 1:4])
+    20.0
     """
     drop = strength - residual
     if drop.max() <= BARRIER * drop.min() or weakening_rate.max() == weakening_rate.min():
@@ -130,13 +172,40 @@ def nodes_in_nucleation_length(problem: Any, weakening_rate: float) -> tuple[flo
 
     The weakening rate (Pa/m) is the steepest at any slip, as everywhere
     in this file.
+
+    >>> from types import SimpleNamespace
+    >>> plane = SimpleNamespace(spacings=(0.5, 0.25))
+    >>> problem = SimpleNamespace(nucleation_lengths=lambda W: (3 / W, 8 / W), interface=plane)
+    >>> nodes_in_nucleation_length(problem, 2.0)
+    (3.0, 16.0)
     """
     lengths = problem.nucleation_lengths(weakening_rate)
     return tuple(np.divide(lengths, problem.interface.spacings).tolist())
 
 
 def check_resolution(problem: Any, weakening_rate: float) -> None:
-    """Refuse a grid that does not resolve h_n at the highest weakening rate (Pa/m)."""
+    """Refuse a grid that does not resolve h_n at the highest weakening rate (Pa/m).
+
+    A nucleation length of 4 m may span 4 nodes, and no fewer:
+
+    >>> from types import SimpleNamespace
+    >>> def resolution(spacing):
+    ...     problem = SimpleNamespace(solid=SimpleNamespace(shear_modulus=3e9))
+    ...     problem.half_spaces = SimpleNamespace(nucleation_lengths=lambda W: (8.0 / W,))
+    ...     problem.interface = SimpleNamespace(spacings=(spacing,), shape=(64,), is_held=False)
+    ...     problem.interface.spacing = spacing
+    ...     try:
+    ...         check_resolution(problem, 2.0)
+    ...     except InputError as error:
+    ...         print(str(error)[:88])
+    >>> resolution(1.0)
+    >>> resolution(2.0)
+    interface.nodes: must be 128 or more. The nucleation length, 4 m, spans 2 nodes, but mus
+    >>> resolution(100.0)
+    interface.nodes: must be 6400 or more. The nucleation length, 4 m, spans 0.04 nodes, but
+    >>> resolution(101.0)
+    solid.shear_modulus, interface.length, friction: the nucleation length is 4 m, and the n
+    """
     lengths = problem.half_spaces.nucleation_lengths(weakening_rate)
     resolution = np.divide(lengths, problem.interface.spacings)
     if min(resolution) >= MIN_NODES_IN_NUCLEATION:
@@ -162,7 +231,19 @@ def check_resolution(problem: Any, weakening_rate: float) -> None:
 
 
 def _check_extent(interface: Interface, resolution: Array) -> None:
-    """Refuse an extent narrower than the nucleation length, which is given in nodes."""
+    """Refuse an extent narrower than the nucleation length, which is given in nodes.
+
+    >>> line = Interface(8.0, 8, extent=(2.0, 5.0))
+    >>> plane = Interface((8.0, 16.0), (8, 8), extent=((2.0, 5.0), (4.0, 12.0)))
+    >>> pairs = (line, [4.0]), (line, [4.1]), (plane, [4.0, 5.0]), (plane, [4.0, 5.5])
+    >>> for interface, nodes in pairs:
+    ...     try:
+    ...         _check_extent(interface, nodes)
+    ...     except InputError as error:
+    ...         print(str(error).partition(". ")[0])
+    interface.extent: is 4 m wide along x, less than the nucleation length, 4.1 m
+    interface.extent: is 10 m wide along y, less than the nucleation length, 11 m
+    """
     breakable = interface.breakable
     for axis, dim in enumerate(interface.dims):
         across = tuple({0, 1} - {axis})[: breakable.ndim - 1]
@@ -176,14 +257,39 @@ def _check_extent(interface: Interface, resolution: Array) -> None:
 
 
 def _finer(problem: Any, resolution: Any, wanted: int) -> str:
-    """Return the number of nodes for which the nucleation length spans `wanted` nodes."""
+    """Return the number of nodes for which the nucleation length spans `wanted` nodes.
+
+    >>> from types import SimpleNamespace
+    >>> problem = SimpleNamespace(interface=SimpleNamespace(shape=(64, 10)))
+    >>> _finer(problem, [4.0, 6.0], 8)  # 64 x 2, and 10 x 4/3 = 13.3
+    '128 x 14'
+    """
     growth = wanted / np.maximum(resolution, 1e-300)
     halves = np.ceil(0.5 * np.array(problem.interface.shape) * growth)
     return " x ".join(f"{2 * n:.10g}" for n in halves)
 
 
 def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str) -> None:
-    """Warn with the error `cost` if h_n spans fewer than `enough` nodes at a rate (Pa/m)."""
+    """Warn with the error `cost` if h_n spans fewer than `enough` nodes at a rate (Pa/m).
+
+    >>> import warnings
+    >>> from types import SimpleNamespace
+    >>> plane = SimpleNamespace(spacings=(0.5, 0.25), shape=(64, 32), is_plane=True)
+    >>> plane = SimpleNamespace(
+    ...     nucleation_lengths=lambda W: (12 / W, 9 / W), interface=plane, specimen=None
+    ... )
+    >>> line = SimpleNamespace(nucleation_lengths=lambda W: (12 / W,), mode="II")
+    >>> line.interface, line.specimen = Interface(32.0, 64), Blocks(height=1.0)
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     for problem, enough in ((plane, 12.0), (line, 8.0), (line, 12.0), (line, 13.0)):
+    ...         warn_if_coarse(problem, 3.0, enough, "about 3 %")
+    >>> for warning in told:
+    ...     print(str(warning.message).removeprefix("the nucleation length spans ")[:-11])
+    8.0 nodes along x and, in mode III, 12.0 along y, and 16 are recommended (interface.nodes = 128 x 44)
+    8.0 nodes, 3.1 at a free end, and 16 are recommended (interface.nodes = 128)
+    8.0 nodes, 3.1 at a free end, and 32 are recommended (interface.nodes = 256)
+    """
     resolution = nodes_in_nucleation_length(problem, weakening_rate)
     if min(resolution) < enough:
         spanned = f"{resolution[0]:.1f} nodes"
@@ -199,7 +305,26 @@ def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str
 
 
 def warn_if_short(problem: Any, weakening_rate: float) -> None:
-    """Warn about an interface that h_n fills, or on which free ends would count."""
+    """Warn about an interface that h_n fills, or on which free ends would count.
+
+    >>> import warnings
+    >>> from types import SimpleNamespace
+    >>> line = SimpleNamespace(lengths=(8.0,), is_plane=False)
+    >>> plane = SimpleNamespace(lengths=(9.0, 8.0), is_plane=True)
+    >>> def warning(patch, interface=line, specimen=None):
+    ...     problem = SimpleNamespace(interface=interface, specimen=specimen)
+    ...     problem.nucleation_lengths = lambda W: (patch / W, 99.0)
+    ...     with warnings.catch_warnings(record=True) as told:
+    ...         warnings.simplefilter("always")
+    ...         warn_if_short(problem, 2.0)
+    ...     return [(warning.category.__name__, str(warning.message)[:62]) for warning in told]
+    >>> warning(4.0), warning(6.4, plane), warning(17.0, specimen="blocks")
+    ([], [], [])
+    >>> warning(5.0)
+    [('AccuracyWarning', 'the interface is 3.2 nucleation lengths long and continues per')]
+    >>> warning(16.0, plane)
+    [('UnitWarning', 'the critical patch (nucleation length 8 m) fills the interface')]
+    """
     interface = problem.interface
     patch = problem.nucleation_lengths(weakening_rate)[0]
     length = min(interface.lengths)
@@ -223,7 +348,20 @@ def warn_if_short(problem: Any, weakening_rate: float) -> None:
 
 
 def doubt_sample(problem: Any, sample: Any) -> None:
-    """Warn about the units of given profiles, as `doubt_strengths` does."""
+    """Warn about the units of given profiles, as `doubt_strengths` does.
+
+    >>> from types import SimpleNamespace
+    >>> from unittest.mock import patch
+    >>> sample = SimpleNamespace(
+    ...     mean=lambda rows: rows.mean(-1), normal_pressure=np.array([[2.0, 4.0], [6.0, 8.0]]),
+    ...     mean_strength=7.0, residual_strength=np.array([1.0, 2.0]),
+    ...     initial_stress=np.array([-9.0, 3.0]),
+    ... )
+    >>> with patch(f"{__name__}.doubt_strengths") as doubts:
+    ...     doubt_sample("problem", sample)
+    >>> doubts.call_args
+    call('problem', 7.0, 1.5, pressure=5.0, initial=9.0)
+    """
     pressure = float(sample.mean(sample.normal_pressure).mean())
     doubt_strengths(
         problem,
@@ -248,6 +386,32 @@ def doubt_strengths(
     scales of slip, given by name, that the grid does not resolve at
     these strengths. By default, `pressure` and `initial`, the size
     of the initial stress, come from the problem.
+
+    A problem that fits, and strengths that do not fit the modulus, the
+    pressure, the slip over which they fall, or the initial stress:
+
+    >>> import warnings
+    >>> import stiction as st
+    >>> def doubts(strength, residual=0.0, initial=0.0, pressure=None, rate=1e9):
+    ...     problem = st.Problem(
+    ...         st.Solid(1e9, 0.25, 1200.0), st.Interface(9e9 / rate, 64),
+    ...         st.LinearWeakening(weakening_rate=rate),
+    ...         st.Load(initial_stress=initial, normal_pressure=pressure),
+    ...     )
+    ...     with warnings.catch_warnings(record=True) as told:
+    ...         warnings.simplefilter("always")
+    ...         doubt_strengths(problem, strength, residual)
+    ...     return [str(warning.message).split(", ", 1)[1][:32] for warning in told]
+    >>> doubts(4e7, 3e7, -1e7, 4.1e6)
+    []
+    >>> doubts(6e7)
+    ['6e+07 Pa, is 0.06 times the shea']
+    >>> doubts(4e7, 6e7)
+    ['6e+07 Pa, is 0.06 times the shea']
+    >>> doubts(4e7, pressure=3.9e6), doubts(4e7, pressure=4.1e10)
+    (['4e+07 Pa, is 10 times the normal'], ['4e+07 Pa, is 0.00098 times the n'])
+    >>> doubts(4e7, rate=5e15), doubts(4e7, initial=-380.0)
+    (['4e+07 Pa, falls within a slip of'], ['380 Pa, is 9.5e-06 times the str'])
     """
     friction, modulus = problem.friction, problem.solid.shear_modulus
     pressure = problem.given_pressure if pressure is None else pressure

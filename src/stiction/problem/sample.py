@@ -84,6 +84,28 @@ class Sample(Result, _Profiles):
     problem : Problem
         The problem that made the sample. Other problems do not accept
         the sample.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> interface = SimpleNamespace(mean=lambda rows: rows[..., :2].mean(-1))
+    >>> problem = SimpleNamespace(interface=interface, friction=SimpleNamespace(steepening=1.5))
+    >>> strength = np.array([[5.0, 7.0, np.inf], [6.0, 9.0, np.inf]])
+    >>> rates = np.array([[4.0, 4.0, 4.0], [8.0, 8.0, 8.0]])
+    >>> initial = np.array([[1.0, 2.0, 9.0], [3.0, 5.0, 9.0]])
+    >>> profile = np.array([0.5, 2.0, 0.5])
+    >>> sample = Sample(strength, np.ones((2, 3)), rates, initial, profile, strength, problem)
+    >>> sample.samples, sample.shape, sample.axes, sample.mean_strength
+    (2, (3,), (-1,), 6.75)
+    >>> sample.mean(strength).tolist(), sample.steepest_weakening_rate
+    ([6.0, 7.5], 12.0)
+    >>> sample.mean_stress(np.array([2.0, 4.0])).tolist()
+    [4.0, 9.0]
+    >>> part = sample.part(slice(1, 2))
+    >>> part.strength.tolist(), part.load_profile.size, part.samples
+    ([[6.0, 9.0, inf]], 3, 1)
+    >>> sample.uniform_weakening, sample._replace(weakening_rate=rates.T[:2]).uniform_weakening
+    (True, False)
     """
 
     def _summary(self) -> Summary:
@@ -157,6 +179,38 @@ def on_nodes(value: Any, quantity: str, interface: Interface) -> Placed:
 
     Values without coordinates keep their shape, and a value for each
     sample becomes a column.
+
+    Points of a periodic line may have any order, and the end is its first
+    node. Coefficients of friction are told from stresses:
+
+    >>> import xarray as xr
+    >>> line, x = Interface(4.0, 8), np.array([3.5, 0.5, 4.0, 1.0])
+    >>> profile = xr.DataArray([1.0, 2.0, 3.0, 4.0], {"x": x}, ["x"], attrs={"units": "1"})
+    >>> quantity, values = on_nodes(profile, "strength", line)
+    >>> quantity, values.tolist(), on_nodes(profile, "height", line).quantity
+    ('friction_coefficient', [3.0, 2.0, 4.0, nan, nan, nan, nan, 1.0], 'height')
+
+    Nodes of a specimen lie in the middle of cells:
+
+    >>> free = Interface(4.0, 8, ends="free")
+    >>> on_nodes(profile.assign_coords(x=x - 0.25), "height", free).values.tolist()
+    [2.0, 4.0, nan, nan, nan, nan, 1.0, 3.0]
+
+    Places on a plane, two profiles, and a value for each sample:
+
+    >>> plane = Interface((4.0, 16.0), (8, 8))
+    >>> places = {"x": ("row", [0.0, 3.5, 0.5]), "y": ("row", [2.0, 14.0, 0.0])}
+    >>> heights = xr.DataArray([5.0, 6.0, 7.0], places, ["row"])
+    >>> values = on_nodes(heights, "height", plane).values
+    >>> values.shape, float(values[0, 1]), float(values[7, 7]), float(values[1, 0])
+    ((8, 8), 5.0, 6.0, 7.0)
+    >>> two = xr.DataArray([[1.0, 2.0], [3.0, 4.0]], {"x": [0.5, 0.0]}, ["sample", "x"])
+    >>> on_nodes(two, "strength", line).values[:, :3].tolist()
+    [[2.0, 1.0, nan], [4.0, 3.0, nan]]
+    >>> on_nodes(xr.DataArray([1.0, 2.0], dims="sample"), "strength", line).values.tolist()
+    [[1.0], [2.0]]
+    >>> on_nodes(xr.DataArray([1.0, 2.0], dims="x"), "strength", line).values.tolist()
+    [1.0, 2.0]
     """
     if not hasattr(value, "dims"):
         return Placed(quantity, value)
@@ -204,6 +258,15 @@ def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
 
     Values without coordinates keep their shape, and their dictionary of
     positions is empty.
+
+    >>> import xarray as xr
+    >>> plane = xr.DataArray([[1, 2], [3, 4]], {"y": [5, 6], "x": [7, 8]}, ["y", "x"])
+    >>> values, places = points_of(plane)
+    >>> values.tolist(), {dim: x.tolist() for dim, x in places.items()}
+    ([1, 3, 2, 4], {'x': [7, 7, 8, 8], 'y': [5, 6, 5, 6]})
+    >>> points_of(xr.DataArray([[1], [2]], dims=["x", "y"]))
+    (array([[1],
+           [2]]), {})
     """
     dims = [dim for dim in ("x", "y") if dim in array.coords]
     if len(dims) == 2 and "row" not in array.dims:
@@ -212,7 +275,37 @@ def points_of(array: Any) -> tuple[Array, dict[str, Array]]:
 
 
 def _offset(dim: str, x: Array, interface: Interface) -> float:
-    """Return the offset of points from nodes over the spacing, within (-0.5, 0.5]."""
+    """Return the offset of points from nodes over the spacing, within (-0.5, 0.5].
+
+    >>> import warnings
+    >>> def offset(x, **given):
+    ...     with warnings.catch_warnings(record=True) as told:
+    ...         warnings.simplefilter("always")
+    ...         by = _offset("x", np.array(x), Interface(4.0, 8, **given))
+    ...     return round(by, 9), [str(warning.message)[:25] for warning in told]
+    >>> offset([0.0, 0.5, 1.0]), offset([2.005, 1.505, 2.505])
+    ((0.0, []), (0.01, []))
+    >>> offset([0.1, 0.6]), offset([0.4, 0.9])
+    ((0.2, ['x is offset by 0.2 of a s']), (-0.2, ['x is offset by -0.2 of a ']))
+    >>> offset([0.25, 0.75])[0], offset([0.25, 0.75], ends="free")
+    (0.5, (0.0, []))
+    >>> offset([0.5, 1.0], ends="free")[0]
+    -0.5
+
+    The points may lie at neighbouring nodes, or at all nodes of a plane:
+
+    >>> for x in ([0.0, 1.0, 2.0], [0.5], [0.0, 0.5, 1.02], [0.0, 0.5, 5.0]):
+    ...     try:
+    ...         offset(x)
+    ...     except InputError as error:
+    ...         print(str(error)[:33])
+    the 3 points of x, from 0 to 2 m,
+    the 1 points of x, from 0.5 to 0.
+    the 3 points of x, from 0 to 1.02
+    x extends from 0 to 5 m on an int
+    >>> _offset("y", np.array([2.0, 6.0, 8.0]), Interface((4.0, 16.0), (8, 8)))
+    0.0
+    """
     axis = interface.dims.index(dim)
     spacing, length = interface.spacings[axis], interface.lengths[axis]
     formula, cells = f"{dim}_i = i L/n", ", as at the centres of cells"
@@ -252,6 +345,18 @@ def _check_repeats(
     """Refuse two different values at a place.
 
     `twins` are the first points at each place.
+
+    >>> line, places = Interface(8.0, 8), {"x": np.array([0.0, 1.0, 8.0])}
+    >>> twins = np.array([0, 1, 0])
+    >>> _check_repeats(np.array([[2.0, 3.0, 2.0], [np.nan, 3.0, np.nan]]), places, twins, line)
+    >>> for last in (4.0, np.nan):
+    ...     try:
+    ...         values = np.array([[2.0, 3.0, 2.0], [2.0, 3.0, last]])
+    ...         _check_repeats(values, places, twins, line)
+    ...     except InputError as error:
+    ...         print(str(error)[:51])
+    x = 0 and 8 m are the same position on an interface
+    x = 0 and 8 m are the same position on an interface
     """
     rows = values.reshape(-1, twins.size)
     same = (rows == rows[:, twins]) | np.isnan(rows) & np.isnan(rows[:, twins])
@@ -269,7 +374,28 @@ def _check_repeats(
 
 
 def as_rows(placed: Placed, name: str, interface: Interface) -> Placed:
-    """Return valid values of a profile as (1 or samples, *shape), (samples, 1) or a number."""
+    """Return valid values of a profile as (1 or samples, *shape), (samples, 1) or a number.
+
+    >>> line, plane = Interface(8.0, 8), Interface((8.0, 16.0), (8, 16))
+    >>> def shape(name, *given, interface=line):
+    ...     try:
+    ...         return as_rows(Placed(name, np.ones(given)), name, interface).values.shape
+    ...     except InputError as error:
+    ...         return str(error).partition(", got")[0]
+    >>> shape("strength", 8), shape("strength", 3, 8), shape("strength", 3, 8, 16, interface=plane)
+    ((1, 8), (3, 8), (3, 8, 16))
+    >>> shape("height", 3, 1), shape("height"), shape("height", 3, 1, interface=plane)
+    ((3, 1), (), (3, 1, 1))
+    >>> shape("strength", 3, 1), shape("friction_coefficient")
+    ('must have shape (8,) or (samples, 8)', 'must have shape (8,) or (samples, 8)')
+    >>> shape("height", 7), shape("height", 0, 8) == shape("height", 7)
+    ('must have shape (8,), (samples, 8), (samples, 1) or a number', True)
+    >>> gap = Placed("height", np.array([1.0] * 7 + [np.nan]))
+    >>> as_rows(gap, "height", line)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ... at 1 of 8 nodes, the first at x = 7 m...
+    """
     shape, values = interface.shape, placed.values
     first = name in ("strength", "friction_coefficient")
     column = values.ndim == 2 and values.shape[1] == 1
@@ -291,14 +417,28 @@ def as_rows(placed: Placed, name: str, interface: Interface) -> Placed:
 
 
 def turned(given: tuple[int, ...], shape: tuple[int, ...]) -> str:
-    """Return a hint for the message about the shape of a plane, if its axes are swapped."""
+    """Return a hint for the message about the shape of a plane, if its axes are swapped.
+
+    >>> turned((16, 8), (8, 16))
+    '. x and y are swapped: the first axis of a profile is x'
+    >>> turned((8, 8), (8, 16)), turned((8,), (8,))
+    ('', '')
+    """
     if len(shape) == 2 and given == shape[::-1]:
         return ". x and y are swapped: the first axis of a profile is x"
     return ""
 
 
 def refuse_missing(values: Array, interface: Interface) -> None:
-    """Raise an `InputError` that names the first NaN among values (..., *shape)."""
+    """Raise an `InputError` that names the first NaN among values (..., *shape).
+
+    >>> values = np.zeros((3, 8))
+    >>> values[1, [3, 6]] = np.nan
+    >>> refuse_missing(values, Interface(8.0, 8))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ... at 2 of 8 nodes of sample 1, the first at x = 3 m...
+    """
     rows = np.isnan(values).reshape(-1, *interface.shape)
     row = int(np.argmax(rows.any(axis=interface.axes)))
     raise InputError(
@@ -313,6 +453,23 @@ def check_values(name: str, array: Array, interface: Interface) -> None:
     """Raise an `InputError` if a value is impossible for the profile with this name.
 
     `array` is a number, a profile or rows of profiles.
+
+    >>> def refusal(name, *values):
+    ...     try:
+    ...         return check_values(name, np.array(values), Interface(8.0, 8))
+    ...     except InputError as error:
+    ...         return str(error)[:41]
+    >>> print(refusal("strength", -1e100, 1e100), refusal("residual_strength", 0.0, 3.0))
+    None None
+    >>> refusal("strength", 1.0, -1.1e100), refusal("initial_stress", np.nan)
+    ('must be finite. Entry (1,) is -1.1e+100 ', 'must be finite. Entry (0,) is nan (at mo')
+    >>> refusal("critical_slip", 2.0, 0.0), refusal("residual_strength", 1.0, -0.5)
+    ('must be positive, got 0 m', 'must not be negative, got -0.5 Pa')
+    >>> refusal("friction_coefficient", 99.0, 100.0), refusal("friction_coefficient", 99.0, 101.0)
+    (None, 'its mean is 100. If it is a strength, us')
+    >>> refusal("normal_pressure", [9.0] * 7 + [-62.0], [1.0] * 8)
+    >>> refusal("normal_pressure", [1.0] * 8, [9.0] * 7 + [-63.0])
+    'must be positive on average, but the mea'
     """
     least, greatest = array.min(), array.max()
     if not (least >= -LARGEST and greatest <= LARGEST):  # also NaN
@@ -345,6 +502,28 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
 
     There are also messages about values that are missing in both
     places. In the messages, `owner` precedes the names.
+
+    >>> from types import SimpleNamespace
+    >>> law = {"residual_strength": 0.0, "residual_ratio": None, **dict.fromkeys(SCALES)}
+    >>> load = SimpleNamespace(initial_stress=np.array([0.0, 2.0]), normal_pressure=None)
+    >>> load.pressing_force = 5.0
+    >>> def messages(*names, pressure=None, scale=("critical_slip", 3.0), specimen=None):
+    ...     friction = SimpleNamespace(**law, scale=scale)
+    ...     problem = SimpleNamespace(friction=friction, load=load, given_pressure=pressure)
+    ...     problem.specimen = specimen and SimpleNamespace(pressing=specimen)
+    ...     return [text[:47] for text in given_twice(problem, names, "profiles")]
+    >>> messages("strength", "residual_strength"), messages("initial_stress")
+    ([], ['problem.load.initial_stress: has no effect toge'])
+    >>> messages("normal_pressure", "strength")
+    ['problem.load.pressing_force: has no effect toge']
+    >>> messages("strength", scale=None), messages("fracture_energy", scale=None)
+    (['problem.friction: give one of weakening_rate, c'], [])
+    >>> messages("friction_coefficient"), messages("friction_coefficient", pressure=3.0)
+    (['friction_coefficient: needs a normal pressure. '], [])
+    >>> messages(specimen="soft"), messages(specimen="glued", pressure=3.0)
+    ([], [])
+    >>> messages(specimen="glued")
+    ["problem.specimen.pressing: 'glued' has no effec"]
     """
     twice = [
         f"problem.{key}: has no effect together with {owner}.{name}. Leave either out"
@@ -367,13 +546,33 @@ def given_twice(problem: Any, names: Collection[str], owner: str) -> list[str]:
 
 
 def pressing_of(problem: Any) -> Any:
-    """Return the pressure at the nodes over the given pressure: 1, or (nodes,) if glued."""
+    """Return the pressure at the nodes over the given pressure: 1, or (nodes,) if glued.
+
+    >>> from types import SimpleNamespace
+    >>> blocks = SimpleNamespace(pressure="profile")
+    >>> for specimen in None, *[SimpleNamespace(pressing=how) for how in ("soft", "glued")]:
+    ...     print(pressing_of(SimpleNamespace(specimen=specimen, blocks=blocks)))
+    1.0
+    1.0
+    profile
+    """
     glued = problem.specimen is not None and problem.specimen.pressing == "glued"
     return problem.blocks.pressure if glued else 1.0
 
 
 def constants_of(problem: Any, strength: Any) -> dict[str, Any]:
-    """Return, by name, values for profiles that are not given, or None without a value."""
+    """Return, by name, values for profiles that are not given, or None without a value.
+
+    >>> from types import SimpleNamespace
+    >>> friction = SimpleNamespace(residual=lambda peak: 0.5 * peak, scale=("critical_slip", 3.0))
+    >>> load = SimpleNamespace(initial_stress=2.0)
+    >>> problem = SimpleNamespace(friction=friction, load=load, normal_pressure=7.0)
+    >>> [*constants_of(problem, 8.0).values()]
+    [4.0, 2.0, 3.0, 7.0]
+    >>> friction.scale = None
+    >>> [*constants_of(problem, 8.0)]
+    ['residual_strength', 'initial_stress', 'normal_pressure']
+    """
     return {
         "residual_strength": problem.friction.residual(strength),
         "initial_stress": problem.load.initial_stress,
@@ -401,6 +600,40 @@ def made(problem: Any, profiles: Mapping[str, Array], accept: Collection[str]) -
     """Return a sample from arrays with valid values, if they fit together.
 
     Profiles that are not given come from the problem.
+
+    The critical slip of the problem gives W = (tau_p - tau_r)/d_c. A node
+    that does not weaken takes the slowest rate, and its residual strength
+    is its strength:
+
+    >>> import stiction as st
+    >>> def sample(extent=None, accept=(), initial=0.0, **profiles):
+    ...     problem = st.Problem(
+    ...         st.Solid(1e9, 0.25, 1200.0), st.Interface(8.0, 8, extent=extent),
+    ...         st.LinearWeakening(critical_slip=2.0, residual_strength=3.0),
+    ...         st.Load(initial_stress=initial),
+    ...     )
+    ...     return made(problem, profiles, accept)
+    >>> strength = np.array([[9.0, 2.0, 7.0, 5.0, 4.0, 9.0, 9.0, 9.0]])
+    >>> result = sample(strength=strength)
+    >>> result.weakening_rate.tolist()
+    [[3.0, 0.5, 2.0, 1.0, 0.5, 3.0, 3.0, 3.0]]
+    >>> result.residual_strength[0, :3].tolist(), result.strength[0, :3].tolist()
+    ([3.0, 2.0, 3.0], [9.0, 2.0, 7.0])
+    >>> result.normal_pressure[0, :2].tolist(), result.initial_stress.shape
+    ([nan, nan], (1, 8))
+
+    A profile precedes the problem. Nodes beyond the extent have an infinite
+    strength and the fastest rate:
+
+    >>> result = sample(strength=strength, weakening_rate=np.array([[7.0]]))
+    >>> result.weakening_rate[0, ::3].tolist()
+    [7.0, 7.0, 7.0]
+    >>> result = sample((2.0, 4.0), strength=strength)
+    >>> result.strength.tolist(), result.weakening_rate[0].tolist()
+    ([[inf, inf, 7.0, 5.0, 4.0, inf, inf, inf]], [2.0, 2.0, 2.0, 1.0, 0.5, 2.0, 2.0, 2.0])
+    >>> result = sample(strength=strength, accept={"overstress"}, initial=8.0)
+    >>> result.initial_stress[0, 6:].tolist()
+    [8.0, 8.0]
     """
     interface, strength = problem.interface, profiles["strength"]
     constants = constants_of(problem, strength)
