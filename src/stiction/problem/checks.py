@@ -285,10 +285,10 @@ def warn_if_coarse(problem: Any, weakening_rate: float, enough: float, cost: str
     ...     for problem, enough in ((plane, 12.0), (line, 8.0), (line, 12.0), (line, 13.0)):
     ...         warn_if_coarse(problem, 3.0, enough, "about 3 %")
     >>> for warning in told:
-    ...     print(str(warning.message).removeprefix("the nucleation length spans ")[:-11])
-    8.0 nodes along x and, in mode III, 12.0 along y, and 16 are recommended (interface.nodes = 128 x 44)
-    8.0 nodes, 3.1 at a free end, and 16 are recommended (interface.nodes = 128)
-    8.0 nodes, 3.1 at a free end, and 32 are recommended (interface.nodes = 256)
+    ...     print(*str(warning.message).split(" spans ")[1].split(" are recommended "))
+    8.0 nodes along x and, in mode III, 12.0 along y, and 16 (interface.nodes = 128 x 44): about 3 %
+    8.0 nodes, 3.1 at a free end, and 16 (interface.nodes = 128): about 3 %
+    8.0 nodes, 3.1 at a free end, and 32 (interface.nodes = 256): about 3 %
     """
     resolution = nodes_in_nucleation_length(problem, weakening_rate)
     if min(resolution) < enough:
