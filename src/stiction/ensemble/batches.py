@@ -76,7 +76,13 @@ class Failure(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the sample, such as 'sample 3 of point 2 (seed 5)'."""
+        """Name of the sample, such as 'sample 3 of point 2 (seed 5)'.
+
+        >>> Failure(2, 3, 5, "no root").name
+        'sample 3 of point 2 (seed 5)'
+        >>> print(Failure(0, 3, 5, "no\\nroot\\x1b"))
+        sample 3 (seed 5): no / root\\x1b
+        """
         where = f" of point {self.point}" if self.point else ""
         return f"sample {self.sample}{where} (seed {self.seed})"
 
@@ -101,13 +107,24 @@ class Table(NamedTuple):
 def _columns(
     point: int, first: int, values: Mapping[str, NDArray[Any]]
 ) -> dict[str, NDArray[Any]]:
-    """Return the values of consecutive samples at a point, with their numbers."""
+    """Return the values of consecutive samples at a point, with their numbers.
+
+    >>> columns = _columns(2, 7, {"stress": np.array([5.0, 4.0, 6.0])})
+    >>> [(name, values.tolist()) for name, values in columns.items()]
+    [('_point', [2, 2, 2]), ('_sample', [7, 8, 9]), ('stress', [5.0, 4.0, 6.0])]
+    >>> [values.tolist() for values in _columns(2, 7, {}).values()]
+    [[], []]
+    """
     count = len(next(iter(values.values()), ()))
     return {POINT: np.full(count, point), NUMBER: first + np.arange(count), **values}
 
 
 def usable_cores() -> int:
-    """Return how many cores this process may use."""
+    """Return how many cores this process may use.
+
+    >>> 1 <= usable_cores() <= os.cpu_count()
+    True
+    """
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -117,6 +134,16 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
     """Return the results of all jobs.
 
     Each warning is issued once, at the line of the caller.
+
+    >>> from stiction.base.errors import warn_accuracy
+    >>> def square(number):
+    ...     warn_accuracy("a doubt")
+    ...     return number * number
+    >>> with collect_warnings() as warned:
+    ...     print(in_threads(square, [3, 1, 2], workers=2))
+    [9, 1, 4]
+    >>> [warning.text for warning in warned]
+    ['a doubt']
     """
     with merge_warnings() as caught, ThreadPoolExecutor(workers) as pool:
         contexts = [copy_context() for _ in jobs]
@@ -128,7 +155,26 @@ def in_threads(function: Callable[[Any], Any], jobs: Sequence[Any], workers: int
 def on_executor(
     function: Callable[[Any], Table], jobs: Sequence[Any], executor: Executor, meter: Meter
 ) -> list[dict[str, NDArray[Any]]]:
-    """Return the columns of all tables from an executor. Each warning is issued once."""
+    """Return the columns of all tables from an executor. Each warning is issued once.
+
+    >>> from stiction.base.progress import SILENT
+    >>> warning = Warned("a doubt of {samples}", UserWarning, 2, 1, (7,))
+    >>> def square(job):
+    ...     return Table({"square": np.array(job) ** 2}, (), 0.0, versions(), (warning,))
+    >>> with ThreadPoolExecutor(2) as executor, collect_warnings() as warned:
+    ...     columns = on_executor(square, [[3, 5], [4]], executor, SILENT)
+    >>> [column["square"].tolist() for column in columns]
+    [[9, 25], [16]]
+    >>> [(warning.affected, warning.total, warning.numbers) for warning in warned]
+    [(2, 4, ())]
+    >>> def fails(job):
+    ...     raise ValueError("no root")
+    >>> with ThreadPoolExecutor(1) as executor:
+    ...     on_executor(fails, [[3, 5], [4]], executor, SILENT)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.WorkerError: the worker that computed items 0 to 1 of point 0 was lost ...
+    """
     futures = [executor.submit(function, job) for job in jobs]
     with merge_warnings() as caught:
         try:
@@ -150,7 +196,39 @@ def versions() -> str:
 
 
 def solve_span(experiment: Experiment, span: Span) -> Table:
-    """Solve a span of samples. A sample that fails does not stop the others."""
+    """Solve a span of samples. A sample that fails does not stop the others.
+
+    The batch of the samples 4 to 6 fails, so each of its samples is solved
+    alone.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def results(first, count):
+    ...     if first <= 4 < first + count:
+    ...         raise ArithmeticError("diverged")
+    ...     if first <= 6 < first + count:
+    ...         raise InputError("strength: must be positive")
+    ...     return {"stress": 10.0 * np.arange(first, first + count)}
+    >>> def batches(first, count):
+    ...     return [(first, 2), (first + 2, count - 2)]
+    >>> experiment = Named(batches=batches, results=results, seed=9)
+    >>> table = solve_span(experiment, Span(3, 2, 5))
+    >>> [(name, values.tolist()) for name, values in table.columns.items()]
+    [('_point', [3, 3, 3]), ('_sample', [2, 3, 5]), ('stress', [20.0, 30.0, 50.0])]
+    >>> [tuple(failure) for failure in table.failures]
+    [(3, 4, 9, 'ArithmeticError: diverged', False), (3, 6, 9, 'strength: must be positive', True)]
+    >>> table = solve_span(
+    ...     Named(batches=lambda *span: [span], results=results, seed=9), Span(3, 4, 1)
+    ... )
+    >>> [(name, values.tolist()) for name, values in table.columns.items()]
+    [('_point', []), ('_sample', [])]
+    >>> from stiction.base.errors import warn_of_samples
+    >>> def doubtful(first, count):
+    ...     warn_of_samples("{samples}", np.arange(count) == 1)
+    ...     return {"stress": np.zeros(count)}
+    >>> table = solve_span(Named(batches=batches, results=doubtful, seed=9), Span(3, 2, 5))
+    >>> [str(warning) for warning in table.warned], table.versions == versions()
+    (['2 of 5 samples (3, 5)'], True)
+    """
     begin = time.perf_counter()
     parts: list[dict[str, NDArray[Any]]] = []
     failures: list[Failure] = []
@@ -182,7 +260,37 @@ def solve_span(experiment: Experiment, span: Span) -> Table:
 def piece_size(
     experiment: Experiment, span: Span, pace: float | None, left: int, workers: int
 ) -> int:
-    """Return the number of samples for the next piece, from the pace in s per sample."""
+    """Return the number of samples for the next piece, from the pace in s per sample.
+
+    A block of draws is 256 samples on a line. Pieces end with a block.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def experiment(shape, batch=300, bytes=8.0):
+    ...     problem = Named(interface=Named(shape=shape))
+    ...     return Named(problem=problem, batch=batch, sample_bytes=bytes)
+    >>> line, span = experiment((16,)), Span(0, 100, 9000)
+    >>> piece_size(line, span, None, 10_000, 2)  # before a pace is known
+    256
+    >>> piece_size(
+    ...     line, span, 0.001, 10_000, 2
+    ... )  # 500 samples in half a second, up to sample 512
+    412
+    >>> piece_size(line, Span(0, 100, 500), 0.001, 10_000, 2)  # a whole span is not cut
+    500
+    >>> piece_size(line, span, 0.001, 2401, 2)  # a quarter of these is 601
+    412
+    >>> piece_size(line, span, 0.0001, 2401, 2)  # ... up to sample 512, not 701
+    412
+    >>> piece_size(line, span, 0.0001, 400, 2), piece_size(line, Span(0, 100, 3), None, 400, 2)
+    (256, 3)
+    >>> piece_size(experiment((16,), bytes=2.0**20), span, 0.001, 10_000, 2)  # 16 MiB
+    16
+    >>> plane = experiment((16, 16), batch=7)
+    >>> piece_size(plane, span, None, 10_000, 2), piece_size(plane, span, 0.1, 10_000, 2)
+    (7, 5)
+    >>> piece_size(plane, span, 0.1, 9, 2), piece_size(plane, span, 9.0, 10_000, 2)
+    (3, 1)
+    """
     block = block_of(len(experiment.problem.interface.shape))
     # The first piece is short, because it measures the pace.
     size = min(experiment.batch, SAMPLES_PER_BLOCK)
@@ -202,6 +310,19 @@ def workers_of(executor: Executor, workers: int) -> int:
     """Return the current number of workers in an executor.
 
     Workers of Dask come and go.
+
+    >>> from types import SimpleNamespace as Named
+    >>> (
+    ...     workers_of(Named(_max_workers=3), 5),
+    ...     workers_of(Named(), 5),
+    ...     workers_of(Named(_max_workers=0), 5),
+    ... )
+    (3, 5, 5)
+    >>> client = Named(nthreads=lambda: {"first": 2, "second": 4})
+    >>> workers_of(Named(_client=client, _max_workers=3), 5)
+    6
+    >>> workers_of(Named(_client=Named(nthreads=dict)), 5)
+    1
     """
     client = getattr(executor, "_client", None)
     if client is not None:
@@ -224,6 +345,36 @@ def solve_spans(
     memory stays bounded. Closing the generator cancels the
     pieces that have not begun. A lost worker, or a worker
     with different versions, raises a `WorkerError`.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def experiment(factor):
+    ...     def results(first, count):
+    ...         return {"stress": factor * np.arange(first, first + count)}
+    ...
+    ...     problem = Named(interface=Named(shape=(16,)))
+    ...     return Named(
+    ...         problem=problem,
+    ...         batch=300,
+    ...         sample_bytes=8.0,
+    ...         seed=9,
+    ...         results=results,
+    ...         batches=lambda first, count: [(first, count)],
+    ...     )
+    >>> points, spans = [experiment(2.0), experiment(3.0)], [Span(0, 100, 600), Span(1, 4, 5)]
+    >>> for executor in (None, ThreadPoolExecutor(1)):
+    ...     pieces = sorted(
+    ...         solve_spans(points, spans, executor=executor), key=lambda piece: piece[0]
+    ...     )
+    ...     for point in (0, 1):
+    ...         parts = [table.columns for span, table in pieces if span.point == point]
+    ...         numbers = np.concatenate([part["_sample"] for part in parts])
+    ...         stress = np.concatenate([part["stress"] for part in parts])
+    ...         right = bool((stress == (2.0 + point) * numbers).all())
+    ...         print(numbers[0], numbers[-1], numbers.size, np.unique(np.diff(numbers)), right)
+    100 699 600 [1] True
+    4 8 5 [1] True
+    100 699 600 [1] True
+    4 8 5 [1] True
     """
     waiting = deque(spans)
     left = sum(span.samples for span in spans)
@@ -265,7 +416,33 @@ def solve_spans(
 
 
 def _result(future: Future[Table], span: Span) -> Table:
-    """Return the results from a finished piece as a table."""
+    """Return the results from a finished piece as a table.
+
+    >>> def result(given):
+    ...     future = Future()
+    ...     is_error = isinstance(given, Exception)
+    ...     (future.set_exception if is_error else future.set_result)(given)
+    ...     return _result(future, Span(2, 4, 3))
+    >>> table = Table({}, (), 0.0, versions())
+    >>> result(table) is table
+    True
+    >>> result(table._replace(versions="numpy 1"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.WorkerError: a worker has numpy 1, not stiction ... the same versions
+    >>> result(InputError("strength: must be positive"))
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: strength: must be positive
+    >>> result(AttributeError("cannot pickle f"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: executor: no part of the study can be sent to a process: ...
+    >>> result(OSError("lost"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.WorkerError: ... items 4 to 6 of point 2 was lost (OSError: lost)...
+    """
     try:
         table = future.result()
     except InputError:
@@ -289,7 +466,12 @@ def _result(future: Future[Table], span: Span) -> Table:
 
 
 def spans_of(missing: NDArray[np.bool_]) -> list[Span]:
-    """Return spans of missing samples, given a mask (points, samples)."""
+    """Return spans of missing samples, given a mask (points, samples).
+
+    >>> mask = np.array([[1, 0, 1, 1], [0, 0, 0, 0], [0, 1, 1, 1]], dtype=bool)
+    >>> [tuple(span) for span in spans_of(mask)]
+    [(0, 0, 1), (0, 2, 2), (2, 1, 3)]
+    """
     spans = []
     for point, row in enumerate(missing):
         # Missing samples begin and end where the mask changes.

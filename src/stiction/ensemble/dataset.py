@@ -27,7 +27,18 @@ the dimension."""
 
 
 def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
-    """Return one experiment for each distinct combination of the named parts."""
+    """Return one experiment for each distinct combination of the named parts.
+
+    >>> from types import SimpleNamespace as Named
+    >>> problem, a, b = Named(), Named(), Named()
+    >>> points = [
+    ...     Named(number=i, problem=problem, method=m) for i, m in enumerate((a, a, b, a))
+    ... ]
+    >>> [point.number for point in distinct(points, "problem", "method")]
+    [0, 2]
+    >>> [point.number for point in distinct(points, "problem")]
+    [0]
+    """
     first: dict[Any, Experiment] = {}
     for point in points:
         first.setdefault(tuple(id(getattr(point, part)) for part in parts), point)
@@ -35,7 +46,14 @@ def distinct(points: Sequence[Experiment], *parts: str) -> list[Experiment]:
 
 
 def variables_in(points: Sequence[Experiment]) -> dict[str, Variable]:
-    """Return all variables that any point has, in the order of the methods."""
+    """Return all variables that any point has, in the order of the methods.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def point(**variables):
+    ...     return Named(problem=0, random=0, method=object(), variables=variables)
+    >>> variables_in([point(a=1, b=2), point(b=2, c=3)])
+    {'a': 1, 'b': 2, 'c': 3}
+    """
     some = distinct(points, "problem", "random", "method")
     return {name: variable for point in some for name, variable in point.variables.items()}
 
@@ -45,6 +63,77 @@ class Gathered:
 
     `only` names the variables to gather. `done`, with shape (points,
     samples), marks the gathered samples.
+
+    Examples
+    --------
+    Two points have the samples 0 to 2. One sample fails, and sample 5 does
+    not belong to this call.
+
+    >>> from types import SimpleNamespace as Named
+    >>> import stiction as st
+    >>> variables = {
+    ...     "critical_stress": Variable("Pa", "stress"),
+    ...     "events": Variable("1", "events"),
+    ...     "slip": Variable("m", "slip", ("sample", "x")),
+    ... }
+    >>> point = Named(
+    ...     problem=Named(interface=st.Interface(0.1, 8)),
+    ...     random=0,
+    ...     method=0,
+    ...     sample_bytes=80.0,
+    ...     variables=variables,
+    ... )
+    >>> rows = Gathered([point, point], 3)
+    >>> columns = {
+    ...     POINT: np.array([1, 0, 1]),
+    ...     NUMBER: np.array([2, 0, 5]),
+    ...     "critical_stress": np.array([7.0, 4.0, 9.0]),
+    ...     "events": np.array([3, 1, 2]),
+    ... }
+    >>> failures = (
+    ...     Failure(1, 1, 9, "no root"),
+    ...     Failure(0, 1, 9, "late"),
+    ...     Failure(1, 6, 9, "far"),
+    ... )
+    >>> rows.add(Table(columns, failures, 0.0, ""))
+    >>> rows.done.astype(int).tolist(), rows.onsets.tolist()
+    ([[1, 0, 0], [0, 0, 1]], [[4.0, nan, nan], [nan, nan, 7.0]])
+    >>> [failure.error for failure in rows.failed]  # in the order of points
+    ['late', 'no root']
+
+    A later run may solve a sample that failed.
+
+    >>> again = {
+    ...     POINT: np.array([0]),
+    ...     NUMBER: np.array([1]),
+    ...     "critical_stress": np.array([5.0]),
+    ... }
+    >>> rows.add(Table(again, (), 0.0, ""))
+    >>> [failure.error for failure in rows.failed], rows.onsets[0].tolist()
+    (['no root'], [4.0, 5.0, nan])
+    >>> axes = {
+    ...     "length": {"length": (np.array([0.3, 0.1]), Variable("m", "length", ("length",)))}
+    ... }
+    >>> found = rows.dataset({"seed": 9}, axes)
+    >>> found.critical_stress.dims, found.critical_stress.values.tolist()
+    (('length', 'sample'), [[4.0, 5.0, nan], [nan, nan, 7.0]])
+    >>> found.events.dtype.kind, found.length.values.tolist(), found.sample.values.tolist()
+    ('f', [0.3, 0.1], [0, 1, 2])
+    >>> found.attrs["cut_short"], found.attrs["failed_samples"], found.attrs["seed"]
+    ('3 of 6 samples are done', '[[1, 1, 9, "no root", false]]', 9)
+
+    A whole number stays one if no sample is missing:
+
+    >>> rows = Gathered([point], 1, only=["events"])
+    >>> rows.add(Table({name: values[1:2] for name, values in columns.items()}, (), 0.0, ""))
+    >>> found = rows.dataset({})
+    >>> (
+    ...     found.events.values.tolist(),
+    ...     found.events.dtype.kind,
+    ...     [*found],
+    ...     "cut_short" in found.attrs,
+    ... )
+    ([1], 'i', ['events'], False)
     """
 
     def __init__(
@@ -60,7 +149,39 @@ class Gathered:
         self._types: dict[str, np.dtype[Any]] = {}
 
     def misfit(self, table: Table) -> str:
-        """Return a message about a table that cannot belong to these points, or ''."""
+        """Return a message about a table that cannot belong to these points, or ''.
+
+        >>> from types import SimpleNamespace as Named
+        >>> import stiction as st
+        >>> variables = {
+        ...     "stress": Variable("Pa", "stress"),
+        ...     "slip": Variable("m", "slip", ("sample", "x")),
+        ... }
+        >>> variables["events"] = Variable("1", "event", ("sample", "event"))
+        >>> point = Named(
+        ...     problem=Named(interface=st.Interface(0.1, 8)),
+        ...     random=0,
+        ...     method=0,
+        ...     sample_bytes=80.0,
+        ...     variables=variables,
+        ... )
+        >>> rows = Gathered([point, point], 3)
+        >>> def misfit(number, sample, failures=(), **columns):
+        ...     columns = {name: np.zeros(shape) for name, shape in columns.items()}
+        ...     columns |= {POINT: np.array([number]), NUMBER: np.array([sample])}
+        ...     return rows.misfit(Table(columns, failures, 0.0, ""))
+        >>> (
+        ...     misfit(1, 9, stress=1, slip=(1, 8), events=(1, 5)),
+        ...     misfit(0, 0, [Failure(1, 0, 9, "")]),
+        ... )
+        ('', '')
+        >>> {misfit(2, 0), misfit(-1, 0), misfit(0, -1), misfit(0, 0, [Failure(2, 0, 9, "")])}
+        {'a point or a sample is not in the study'}
+        >>> misfit(0, 0, load=1), misfit(0, 0, slip=(1, 7))
+        ("'load' is not a variable of the study", 'slip has shape (7,) for each sample')
+        >>> misfit(0, 0, stress=(1, 8)), misfit(0, 0, events=1)
+        ('stress has shape (8,) for each sample', 'events has shape () for each sample')
+        """
         pairs = [failure[:2] for failure in table.failures]
         failed = np.array(pairs, dtype=object).reshape(-1, 2)
         # Numbers of failures may be anything in a stranger's file, so

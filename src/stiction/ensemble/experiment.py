@@ -60,6 +60,61 @@ class Experiment:
 
     Sample i depends only on the experiment and i, not on the batch. An
     `InputError` lists all mistakes.
+
+    Examples
+    --------
+    The strength has the modes 1 to 5 of a line with 16 nodes, and two draws
+    for each.
+
+    >>> import stiction as st
+    >>> solid, friction = st.Solid(2e9, 0.2, 1200.0), st.LinearWeakening(weakening_rate=1e11)
+    >>> load = st.Load(normal_pressure=np.linspace(1e6, 4e6, 16))
+    >>> problem = st.Problem(solid, st.Interface(0.1, 16), friction, load)
+    >>> def field(mean, **options):
+    ...     spectrum = st.SquaredExponentialSpectrum(0.016)
+    ...     return st.RandomField(st.Lognormal(mean=mean, cv=0.1), spectrum, **options)
+    >>> method = st.LocalCriterion()
+    >>> experiment = Experiment(problem, field(2e6), method, keep=("strength",), seed=5)
+    >>> experiment.dimension, experiment.pressure, round(experiment.mean_strength)
+    (10, 2500000.0, 2000000)
+    >>> experiment.given.names, len(Experiment(problem, [field(2e6), field(3e6)], method).given)
+    (('strength',), 2)
+    >>> round(Experiment(problem, [field(2e6), field(3e6)], method).mean_strength)
+    2500000
+    >>> without = Experiment(problem, field(2e6), method)
+    >>> experiment.variables.keys() - without.variables.keys()
+    {'strength'}
+    >>> experiment.sample_bytes - without.sample_bytes  # 16 numbers of 8 bytes
+    128.0
+    >>> values = experiment.results(3, 2)
+    >>> draws = experiment.draws(3, 2)
+    >>> bool((values["strength"] == experiment.profiles(draws)["strength"]).all())
+    True
+    >>> values.keys() == experiment.variables.keys(), values["critical_stress"].shape
+    (True, (2,))
+    >>> bool((experiment.with_seed(6).draws(3, 2) == draws).any()), experiment.seed
+    (False, 5)
+    >>> experiment.by(st.Equilibrium()).method.type, experiment.by(st.Equilibrium()).seed
+    ('equilibrium', 5)
+
+    A random pressure replaces the pressure of the problem, and coefficients
+    are multiplied by it.
+
+    >>> bare = st.Problem(solid, st.Interface(0.1, 16), friction)
+    >>> Experiment(bare, field(2e6), method).pressure
+    nan
+    >>> coefficient = field(0.5, quantity="friction_coefficient")
+    >>> random = st.RandomInterface(strength=coefficient, normal_pressure=field(3e6))
+    >>> experiment = Experiment(bare, random, method)
+    >>> round(experiment.pressure), round(experiment.mean_strength)
+    (3000000, 1500000)
+    >>> experiment = Experiment(problem, coefficient, method)
+    >>> round(experiment.mean_strength)
+    1250000
+    >>> draws = experiment.draws(0, 2)
+    >>> coefficients = experiment.random.from_draws(problem.interface, draws)["strength"]
+    >>> np.allclose(experiment.profiles(draws)["strength"], coefficients * load.normal_pressure)
+    True
     """
 
     problem: Problem
@@ -218,7 +273,14 @@ class Experiment:
         return min(size, max(1, MOST_NUMBERS // max(interface.size, self.dimension)))
 
     def batches(self, first: int, count: int, size: int = 0) -> Iterator[tuple[int, int]]:
-        """Divide samples, beginning with `first`, into (first, count) at multiples of a size."""
+        """Divide samples, beginning with `first`, into (first, count) at multiples of a size.
+
+        >>> list(Experiment.batches(None, 5, 12, 4)), list(Experiment.batches(None, 8, 3, 4))
+        ([(5, 3), (8, 4), (12, 4), (16, 1)], [(8, 3)])
+        >>> from types import SimpleNamespace as Named
+        >>> list(Experiment.batches(Named(batch=10), 8, 3))
+        [(8, 2), (10, 1)]
+        """
         size, end = size or self.batch, first + count
         # Batches begin at multiples of the size, so that blocks of
         # draws are whole.
@@ -227,7 +289,27 @@ class Experiment:
 
 
 class Measured(Experiment):
-    """An experiment with the given profiles of a single sample in place of random properties."""
+    """An experiment with the given profiles of a single sample in place of random properties.
+
+    Examples
+    --------
+    >>> import stiction as st
+    >>> solid, friction = st.Solid(2e9, 0.2, 1200.0), st.LinearWeakening(weakening_rate=1e11)
+    >>> problem = st.Problem(solid, st.Interface(0.1, 16), friction)
+    >>> profiles = {"strength": np.linspace(1e6, 2e6, 16)}
+    >>> measured = Measured(problem, profiles, st.LocalCriterion())
+    >>> measured.dimension, measured.draws(3, 2).shape, measured.given is profiles
+    (0, (2, 0), True)
+    >>> measured.sample({}).strength.shape, measured.results(0, 1)["critical_stress"].shape
+    ((1, 16), (1,))
+    >>> measured.results(0, 1).keys() == measured.variables.keys()
+    True
+    >>> try:
+    ...     Measured(problem, {"strength": np.ones((2, 16)) * 1e6}, st.LocalCriterion())
+    ... except InputError as error:
+    ...     print(error)
+    profiles: must be a single sample, got 2
+    """
 
     def __post_init__(self) -> None:
         problems = refusals(self.problem, self.method)
@@ -282,7 +364,17 @@ class Measured(Experiment):
 
 
 def method_of(random: Any, method: Any) -> Any:
-    """Return the method, by default the method of a posterior."""
+    """Return the method, by default the method of a posterior.
+
+    >>> from types import SimpleNamespace as Named
+    >>> posterior = Named(likelihood=Named(method="of the posterior"))
+    >>> method_of(posterior, "given"), method_of(posterior, None), method_of(None, "given")
+    ('given', 'of the posterior', 'given')
+    >>> method_of(Named(likelihood=None), None)
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: method: is needed without a posterior. Give st.Equilibrium()
+    """
     known = method or getattr(getattr(random, "likelihood", None), "method", None)
     if known is None:
         raise InputError("method: is needed without a posterior. Give st.Equilibrium()")

@@ -54,6 +54,26 @@ class LimitState:
     pressure is random, each stress is multiplied by the mean pressure
     over the pressure of its sample. A given stress then corresponds to
     a given friction coefficient.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace as Named
+    >>> random = Named(
+    ...     varying={"strength"}, several=True, member=lambda draws: draws[:, 0] > 0.0
+    ... )
+    >>> experiment = Named(
+    ...     method=Named(type="mine", label="my method"),
+    ...     dimension=7,
+    ...     random=random,
+    ...     with_seed=lambda seed: Named(draws=lambda first, samples: (seed, first, samples)),
+    ... )
+    >>> state = LimitState(experiment)
+    >>> state, state.several
+    (LimitState(critical_stress by my method, of 7 draws), True)
+    >>> state.guide
+    "'mine' has no less expensive first stage"
+    >>> state.draws(5, 2, 3), state.member(np.array([[-1.0], [2.0]])).tolist()
+    ((5, 2, 3), [0, 1])
     """
 
     experiment: Experiment
@@ -109,6 +129,56 @@ class LimitState:
 
         The stress is infinite if the event does not happen, because
         such a sample survives any stress.
+
+        The first draw below is the stress, and the second the pressure, whose
+        mean is 6. No sample slides below 2.
+
+        >>> from types import SimpleNamespace as Named
+        >>> from concurrent.futures import ThreadPoolExecutor
+        >>> def solve(draws):
+        ...     return {"normal_pressure": draws[:, 1:]}, {"critical_stress": draws[:, 0]}
+        >>> def state(executor=None, seconds=1.0, batch=2, workers=1, **options):
+        ...     counts, problem = [], Named(interface=Named(mean=lambda rows: rows.mean(-1)))
+        ...     experiment = Named(
+        ...         solve=solve,
+        ...         seconds=seconds,
+        ...         batch=batch,
+        ...         pressure=6.0,
+        ...         problem=problem,
+        ...         random=Named(varying={"normal_pressure"}),
+        ...         method=Named(label="mine"),
+        ...     )
+        ...     meter = Named(advance=counts.append)
+        ...     made = LimitState(
+        ...         experiment, meter=meter, workers=workers, executor=executor, **options
+        ...     )
+        ...     vars(made)["bounds"] = 2.0, 9.0
+        ...     return made, counts
+        >>> draws = np.array([[5.0, 3.0], [np.nan, 3.0], [1.5, 3.0], [7.0, 2.0], [8.0, 4.0]])
+        >>> one, counts = state()
+        >>> one(draws).tolist(), counts
+        ([5.0, inf, 2.0, 7.0, 8.0], [2, 2, 1])
+        >>> float(one(draws[3]))
+        7.0
+        >>> state(per_pressure=True)[0](draws).tolist()  # times 6 over the pressure
+        [10.0, inf, 3.0, 21.0, 12.0]
+        >>> with ThreadPoolExecutor(2) as executor:
+        ...     state(executor, batch=9)[0](draws).tolist()
+        [5.0, inf, 2.0, 7.0, 8.0]
+
+        Two threads get 3 and 2 samples, unless a part would take less than 2
+        ms.
+
+        >>> two, counts = state(seconds=1e-3, batch=9, workers=2)
+        >>> two(draws).tolist(), sorted(counts)
+        ([5.0, inf, 2.0, 7.0, 8.0], [2, 3])
+        >>> two, counts = state(seconds=4.9e-4, batch=9, workers=2)
+        >>> two(draws).tolist(), sorted(counts)
+        ([5.0, inf, 2.0, 7.0, 8.0], [1, 4])
+        >>> one(-np.inf * draws)  # doctest: +ELLIPSIS
+        Traceback (most recent call last):
+        ...
+        stiction.base.errors.InputError: method: mine returned an onset at minus infinity. ...
         """
         rows, experiment = np.atleast_2d(draws), self.experiment
         # Parts of at least `MIN_THREAD_SECONDS`, one for each thread,
@@ -155,7 +225,18 @@ class LimitState:
         return self.likely_bounds(0.0)
 
     def likely_bounds(self, negligible: float) -> tuple[float, float]:
-        """Return bounds that hold for all samples except a negligible fraction."""
+        """Return bounds that hold for all samples except a negligible fraction.
+
+        >>> from types import SimpleNamespace as Named
+        >>> state = LimitState(Named(random=Named(members=[(2.0, 5.0), (1.0, 4.0)])))
+        >>> class Bounded(LimitState):
+        ...     def _bounds_of(self, random, negligible):
+        ...         return random[0] + negligible, random[1] - negligible
+        >>> Bounded(state.experiment).likely_bounds(0.25), Bounded(state.experiment).bounds
+        ((1.25, 4.75), (1.0, 5.0))
+        >>> Bounded(state.experiment).bounds_of_members(0.5)
+        [(2.5, 4.5), (1.5, 3.5)]
+        """
         lows, highs = zip(*self.bounds_of_members(negligible), strict=True)
         return min(lows), max(highs)
 
@@ -170,6 +251,48 @@ class LimitState:
         With the load profile p, the strength tau_p and the initial
         stress tau_0, the first node fails at the load min((tau_p -
         tau_0)/p). The lower bound is the mean stress at this load.
+
+        A strength from 1 MPa and the load profile up to 1.5 give at least 0.2 +
+        (1 - 0.2) / 1.5 MPa, if the initial stress is 0.2 MPa.
+
+        >>> from types import SimpleNamespace as Named
+        >>> import stiction as st
+        >>> def between(low, high):
+        ...     law = st.Beta(alpha=1.0, beta=1.0, low=low, high=high)
+        ...     return st.RandomField(law, st.SquaredExponentialSpectrum(0.016))
+        >>> load = st.Load(
+        ...     profile=np.linspace(0.5, 1.5, 16), initial_stress=0.2e6, normal_pressure=2e6
+        ... )
+        >>> solid, friction = (
+        ...     st.Solid(2e9, 0.2, 1200.0),
+        ...     st.LinearWeakening(weakening_rate=1e11),
+        ... )
+        >>> problem = st.Problem(solid, st.Interface(0.1, 16), friction, load)
+        >>> def bounds(strength, negligible=0.0, method=st.LocalCriterion(), **fields):
+        ...     random = RandomInterface(strength=strength, **fields)
+        ...     members = Named(members=(random,), varying=random.varying)
+        ...     experiment = Named(problem=problem, random=members, method=method, pressure=3e6)
+        ...     state = LimitState(experiment, per_pressure="normal_pressure" in fields)
+        ...     return [round(end / 1e3, 3) for end in state.likely_bounds(negligible)]
+        >>> strength = between(1e6, 2e6)
+        >>> bounds(strength)
+        [733.333, 2000.0]
+        >>> bounds(strength, initial_stress=between(0.1e6, 0.3e6))  # 0.1 + (1 - 0.3) / 1.5
+        [566.667, 2000.0]
+        >>> bounds(strength, normal_pressure=between(2e6, 4e6))  # times 3/4, and 3/2
+        [550.0, 3000.0]
+        >>> bounds(
+        ...     between(-2e6, 2e6), normal_pressure=between(2e6, 4e6)
+        ... )  # 0.2 - 2.2 / 0.5, times 3/2
+        [-6300.0, 3000.0]
+        >>> bounds(strength, normal_pressure=between(0.0, 6e6))  # times 1/2, and infinity
+        [366.667, inf]
+        >>> bounds(strength, 1.28)  # 0.01 for each of 8 factors at 16 nodes
+        [740.0, 1990.0]
+        >>> bounds(strength.given({"x": [0.03], "values": [1.5e6]}, noise=1e5), 1.28)
+        [733.333, 2000.0]
+        >>> bounds(strength, method=Named())
+        [-inf, inf]
         """
         problem = self.experiment.problem
         if any(field.conditions is not None for field in random.properties.values()):
@@ -206,6 +329,20 @@ def weakest_first(state: LimitState) -> LimitState:
     the next as it goes down. The order is the order of a low quantile
     of a few samples, which are the same for each interface. The first
     stage solves them if it applies.
+
+    >>> import stiction as st
+    >>> solid, friction = st.Solid(2e9, 0.2, 1200.0), st.LinearWeakening(weakening_rate=1e11)
+    >>> problem = st.Problem(solid, st.Interface(0.1, 16), friction)
+    >>> def field(mean, cv):
+    ...     spectrum = st.SquaredExponentialSpectrum(0.016)
+    ...     return st.RandomField(st.Lognormal(mean=mean, cv=cv), spectrum, mean_mode=True)
+    >>> def order(*fields):
+    ...     state = LimitState(Experiment(problem, list(fields), st.LocalCriterion()))
+    ...     return weakest_first(state).experiment.random.order
+    >>> order(field(3e6, 0.1), field(1e6, 0.1), field(2e6, 0.1)), order(field(3e6, 0.1))
+    ((1, 2, 0), ())
+    >>> order(field(2e6, 0.1), field(2.1e6, 0.3))  # the low quantile counts, not the mean
+    (1, 0)
     """
     experiment, random = state.experiment, state.experiment.random
     count = len(random.members)
@@ -228,7 +365,44 @@ def weakest_first(state: LimitState) -> LimitState:
 
 
 def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
-    """Return whether the onset is proportional to the strength. See `inference.prior`."""
+    """Return whether the onset is proportional to the strength. See `inference.prior`.
+
+    >>> from types import SimpleNamespace as Named
+    >>> def scales(
+    ...     scaling="affine",
+    ...     varying=("strength",),
+    ...     names=("strength",),
+    ...     rate=1e11,
+    ...     residual=0.0,
+    ...     initial=0.0,
+    ...     profile=1.0,
+    ...     specimen=None,
+    ... ):
+    ...     friction = Named(weakening_rate=rate, residual_strength=residual)
+    ...     load = Named(initial_stress=initial)
+    ...     problem = Named(
+    ...         friction=friction, load=load, load_profile=profile, specimen=specimen
+    ...     )
+    ...     random = Named(varying={*varying}, names=names)
+    ...     return scales_with_strength(problem, random, Named(scaling=scaling))
+    >>> slope = np.array([1.0, 2.0])
+    >>> scales(), scales(initial=3.0, residual=2.0), scales(profile=slope), scales("stretch")
+    (True, True, True, True)
+    >>> scales("stretch", initial=3.0), scales("stretch", residual=slope)
+    (False, False)
+    >>> (
+    ...     scales("none"),
+    ...     scales(rate=None),
+    ...     scales(initial=slope),
+    ...     scales(initial=3.0, profile=slope),
+    ... )
+    (False, False, False, False)
+    >>> scales(varying=("strength", "normal_pressure"))  # the pressure has a factor
+    True
+    >>> both = ("strength", "normal_pressure")
+    >>> scales(varying=both, names=both), scales(varying=("strength", "initial_stress"))
+    (False, False)
+    """
     friction, initial = problem.friction, np.asarray(problem.load.initial_stress)
     scaling = optional_member(method, "scaling")
     if isinstance(problem.specimen, Slider):  # its shear and pressure do not scale
@@ -248,7 +422,19 @@ def scales_with_strength(problem: Any, random: Any, method: Any) -> bool:
 
 
 def solve_part(state: LimitState, draws: Array) -> Table:
-    """Return the stresses of draws as a table that comes back from an executor."""
+    """Return the stresses of draws as a table that comes back from an executor.
+
+    >>> from types import SimpleNamespace as Named
+    >>> from stiction.base.errors import warn_accuracy
+    >>> def stress(draws):
+    ...     warn_accuracy("a doubt")
+    ...     return draws[:, 0] + draws[:, 1]
+    >>> table = solve_part(Named(_stress=stress), np.array([[1.0, 2.0], [3.0, 5.0]]))
+    >>> table.columns["stress"].tolist(), [warning.text for warning in table.warned]
+    ([3.0, 8.0], ['a doubt'])
+    >>> table.failures, table.versions == versions(), table.seconds >= 0.0
+    ((), True, True)
+    """
     begin = time.perf_counter()
     with one_blas_thread(), collect_warnings() as warned:
         stress = state._stress(draws)

@@ -58,7 +58,27 @@ def check_run(points: Sequence[Experiment]) -> None:
 
 
 def _warn_if_long(points: Sequence[Experiment], missing: NDArray[Any], workers: int) -> None:
-    """Warn about an ensemble that takes hours, before it begins."""
+    """Warn about an ensemble that takes hours, before it begins.
+
+    Three samples of an hour and two of three hours take 4.5 hours on two
+    cores.
+
+    >>> from types import SimpleNamespace as Named
+    >>> from stiction.base.errors import collect_warnings
+    >>> def warned(*hours, workers=2):
+    ...     missing = np.array([[True, True, True], [False, True, True]])
+    ...     with collect_warnings() as texts:
+    ...         _warn_if_long(
+    ...             [Named(seconds=3600.0 * each) for each in hours], missing, workers
+    ...         )
+    ...     return [str(text) for text in texts]
+    >>> warned(1.0, 3.0)
+    ['samples: 5 samples take about 4.5 h on 2 cores']
+    >>> warned(1.0, 3.0, workers=1)
+    ['samples: 5 samples take about 9 h on 1 core']
+    >>> warned(0.4, 0.4), len(warned(0.41, 0.4))  # an hour, and more
+    ([], 1)
+    """
     # Points of a sweep may take different times for a sample.
     counts = missing.sum(axis=1)
     seconds = sum(p.seconds * n for p, n in zip(points, counts, strict=True)) / workers
@@ -83,6 +103,53 @@ def complete(
 
     `missing` is a mask (points, samples). A warning that several tables
     cause is issued once.
+
+    >>> from types import SimpleNamespace as Named
+    >>> from stiction.base.errors import collect_warnings, warn_of_samples
+    >>> from stiction.base.variables import Variable
+    >>> def point(factor, failing=()):
+    ...     def results(first, count):
+    ...         if failing == "all" or first in failing:
+    ...             raise ArithmeticError("no root")
+    ...         warn_of_samples("{samples} are doubtful", np.arange(count) == 0)
+    ...         return {"stress": factor * np.arange(first, first + count)}
+    ...
+    ...     return Named(
+    ...         problem=Named(interface=Named(shape=(16,))),
+    ...         method=Named(label="criterion"),
+    ...         seed=9,
+    ...         batch=300,
+    ...         sample_bytes=8.0,
+    ...         results=results,
+    ...         batches=lambda *span: [span],
+    ...     )
+    >>> def completed(*points, missing, executor=None):
+    ...     rows, tables = Gathered(points, 3, only=["stress"]), []
+    ...     store = Named(add=tables.append, save=lambda: tables.append("saved"))
+    ...     with collect_warnings() as texts:
+    ...         complete(
+    ...             rows,
+    ...             np.array(missing),
+    ...             store=store,
+    ...             executor=None,
+    ...             workers=1,
+    ...             progress=False,
+    ...         )
+    ...     return rows, tables, [str(text) for text in texts]
+    >>> rows, tables, texts = completed(point(2.0, [1]), missing=[[False, True, True]])
+    >>> rows.done.tolist(), [failure.sample for failure in rows.failed], texts
+    ([[False, False, True]], [1], ['1 of 1 samples (2) are doubtful'])
+    >>> len(tables), tables[-1]
+    (2, 'saved')
+    >>> rows, tables, texts = completed(
+    ...     point(2.0), point(3.0), missing=[[True, True, True]] * 2
+    ... )
+    >>> rows.done.all().item(), texts
+    (True, ['2 of 6 samples are doubtful'])
+    >>> completed(point(2.0, "all"), missing=[[True, False, True]])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.RunError: sample ... (seed 9): ArithmeticError: no root
     """
     points, lost, total = rows.points, 0, int(missing.sum())
     label = " and ".join({point.method.label: None for point in distinct(points, "method")})

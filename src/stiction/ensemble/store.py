@@ -70,6 +70,62 @@ class Store:
 
     After reading, `damage` holds the defects of damaged chunks by name.
     `seconds` (on one core) and `versions` describe the intact chunks.
+
+    Examples
+    --------
+    Two tables of one kind become one chunk. A damaged chunk is reported, and
+    deleted before its samples are computed again.
+
+    >>> import tempfile
+    >>> from types import SimpleNamespace as Named
+    >>> from stiction.base.errors import collect_warnings
+    >>> folder, study = tempfile.TemporaryDirectory(), {"samples": 3, "title": "a", "seed": 9}
+    >>> store = Store.open(Path(folder.name) / "run", study)
+    >>> def table(number, **columns):
+    ...     columns = {name: np.array([value]) for name, value in columns.items()}
+    ...     columns |= {POINT: np.array([0]), NUMBER: np.array([number])}
+    ...     return Table(columns, (Failure(0, 7, 9, "no root"),), 0.25 * number, versions())
+    >>> for one in (table(1, stress=2.0), table(2, stress=3.0), table(0, load=4.0)):
+    ...     store.add(one)
+    >>> store.save()
+    >>> chunks = store.path / CHUNKS
+    >>> (
+    ...     len(list(chunks.iterdir())),
+    ...     {NAME.fullmatch(path.name) is None for path in chunks.iterdir()},
+    ... )
+    (2, {False})
+    >>> def stored(samples=3):
+    ...     tables = []
+    ...     fits = Named(
+    ...         add=tables.append, misfit=lambda table: "load" in table.columns and "no load"
+    ...     )
+    ...     again = Store.open(store.path, study | {"samples": samples, "title": "b"})
+    ...     with collect_warnings() as warned:
+    ...         again.resume(fits)
+    ...     return again, tables, [str(warning).partition("npz: ")[2] for warning in warned]
+    >>> again, tables, warned = stored()
+    >>> [table.columns["stress"].tolist() for table in tables]
+    [[2.0, 3.0]]
+    >>> [failure.name for failure in tables[0].failures]
+    ['sample 7 (seed 9)', 'sample 7 (seed 9)']
+    >>> again.seconds, [*again.versions] == [versions()]
+    ([0.75], True)
+    >>> list(again.damage.values()), len(list(chunks.iterdir()))
+    (['does not fit the study: no load'], 1)
+    >>> warned
+    ['does not fit the study: no load. Its samples are computed again']
+    >>> for name in (32 * "0", digest(b"abc")):
+    ...     _ = (chunks / f"{name}.npz").write_bytes(b"abc")
+    >>> for text in stored()[2]:
+    ...     print(text)
+    fails its checksum. Its samples are computed again
+    is not a chunk, though its checksum is right. Its samples are computed again
+    >>> read_study(store.path)["title"], again.pilot
+    ('b', None)
+    >>> again.note_pilot({"pilot_bias": 0.5})
+    >>> again.pilot, stored(4)[0].pilot  # more samples need another pilot
+    ({'pilot_bias': 0.5}, None)
+    >>> folder.cleanup()
     """
 
     def __init__(self, path: Path, study: Mapping[str, Any]) -> None:
@@ -208,18 +264,41 @@ class Store:
 
 
 def digest(data: bytes) -> str:
-    """Return the first half of the SHA-256 digest in hexadecimal."""
+    """Return the first half of the SHA-256 digest in hexadecimal.
+
+    The first half of a known digest.
+
+    >>> digest(b"abc")
+    'ba7816bf8f01cfea414140de5dae2223'
+    """
     return hashlib.sha256(data).hexdigest()[:32]
 
 
 def _check_folder(folder: Path) -> None:
-    """Reject a link as the chunk folder, because files would be written to its target."""
+    """Reject a link as the chunk folder, because files would be written to its target.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _check_folder(Path(folder))
+    ...     _ = (Path(folder) / "file").write_bytes(b"")
+    ...     try:
+    ...         _check_folder(Path(folder) / "file")
+    ...     except InputError as error:
+    ...         print(str(error).rpartition("file: ")[2])
+    is not a folder. Remove it, or choose another run
+    """
     if not stat.S_ISDIR(os.lstat(folder).st_mode):
         raise InputError(f"{folder}: is not a folder. Remove it, or choose another run")
 
 
 def _rows(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return columns as rows, which are stored."""
+    """Return columns as rows, which are stored.
+
+    >>> columns = {POINT: np.array([0, 1]), "slip": np.array([[2.0, 3.0], [4.0, 5.0]])}
+    >>> rows = _rows(columns)
+    >>> rows.dtype.names, rows[POINT].tolist(), rows["slip"].tolist()
+    (('_point', 'slip'), [0, 1], [[2.0, 3.0], [4.0, 5.0]])
+    """
     types = [(name, values.dtype, values.shape[1:]) for name, values in columns.items()]
     rows = np.empty(len(columns[POINT]), dtype=types)
     for name, values in columns.items():
@@ -231,6 +310,37 @@ def _table_in(data: bytes) -> tuple[str, Table]:
     """Return the mark and the table of a chunk.
 
     Raise one of several errors for other content.
+
+    >>> def chunk(mark="m", made_by="v", seconds=0.5, failures=(), **columns):
+    ...     columns = {POINT: np.array([3]), NUMBER: np.array([7])} | columns
+    ...     about, file = json.dumps([mark, made_by, seconds, failures]).encode(), io.BytesIO()
+    ...     np.savez(file, about=np.frombuffer(about, dtype=np.uint8), rows=_rows(columns))
+    ...     return file.getvalue()
+    >>> mark, table = _table_in(
+    ...     chunk(failures=[(3, 8, 9, "no root", False)], stress=np.array([2.5]))
+    ... )
+    >>> mark, table.versions, table.seconds, table.failures[0].name
+    ('m', 'v', 0.5, 'sample 8 of point 3 (seed 9)')
+    >>> [(name, values.tolist()) for name, values in table.columns.items()]
+    [('_point', [3]), ('_sample', [7]), ('stress', [2.5])]
+    >>> strange = (
+    ...     {"mark": 3},
+    ...     {"made_by": None},
+    ...     {"seconds": -0.5},
+    ...     {"seconds": math.inf},
+    ...     {"seconds": "1"},
+    ...     {"failures": [(3, 8, 9, 5)]},
+    ...     {"failures": [(3, 8.5, 9, "")]},
+    ...     {"failures": [(3, 8, "9", "")]},
+    ...     {POINT: np.array([3.0])},
+    ...     {NUMBER: np.array([7.0])},
+    ...     {"text": np.array(["a"])},
+    ... )
+    >>> for given in strange:
+    ...     try:
+    ...         print(_table_in(chunk(**given)))
+    ...     except ValueError as error:
+    ...         assert str(error) == "values that no chunk can have"
     """
     arrays = arrays_in(data)
     mark, made_by, seconds, failed = json.loads(arrays["about"].tobytes())
@@ -281,7 +391,39 @@ def _write_json(file: Path, content: Mapping[str, Any]) -> None:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Return the content that `_write_json` wrote, or raise a `StoreError`."""
+    """Return the content that `_write_json` wrote, or raise a `StoreError`.
+
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> file = Path(folder.name) / STUDY
+    >>> _write_json(file, {"b": 2.5, "a": [1, "x"]})
+    >>> read_json(file), json.loads(file.read_text())["format"] == FORMAT
+    ({'b': 2.5, 'a': [1, 'x']}, True)
+    >>> def message():
+    ...     try:
+    ...         read_json(file)
+    ...     except StoreError as error:
+    ...         return str(error).rpartition("study.json")[2] or str(error)
+    >>> text = file.read_text()
+    >>> _ = file.write_text(text.replace("2.5", "2.6"))
+    >>> message()
+    ': is damaged. Run the study again into the folder'
+    >>> body = {"format": FORMAT - 1, "content": {}}
+    >>> sealed = body | {"digest": digest(json.dumps(body, sort_keys=True).encode())}
+    >>> _ = file.write_text(json.dumps(sealed))
+    >>> message().startswith(f": is of format {FORMAT - 1}, but this version reads {FORMAT}.")
+    True
+    >>> _ = file.write_text("[]")
+    >>> message()
+    ': is damaged. Run the study again into the folder'
+    >>> file.unlink()
+    >>> message().rpartition(": ")[2]
+    'there is no run here. Give the folder of `stiction run --out`'
+    >>> (file.parent / CHUNKS).mkdir()
+    >>> message()
+    ' is missing. Run the study again into the folder to restore it'
+    >>> folder.cleanup()
+    """
     try:
         body = json.loads(_read(file, MAX_JSON_BYTES))
         if body.pop("digest") != digest(json.dumps(body, sort_keys=True).encode()):
@@ -299,7 +441,20 @@ def read_json(file: Path) -> dict[str, Any]:
 
 
 def read_study(folder: Path) -> dict[str, Any]:
-    """Return the study of a run, or raise a `StoreError`."""
+    """Return the study of a run, or raise a `StoreError`.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _write_json(Path(folder) / STUDY, {"samples": 3, "seed": 9})
+    ...     print(read_study(Path(folder)))
+    ...     _write_json(Path(folder) / STUDY, {"samples": "3"})
+    ...     try:
+    ...         read_study(Path(folder))
+    ...     except Damaged as error:
+    ...         print(str(error).rpartition(": ")[2])
+    {'samples': 3, 'seed': 9}
+    is damaged. Run the study again to repair it
+    """
     study = read_json(folder / STUDY)
     if not isinstance(study.get("samples"), int):
         raise Damaged(f"{folder / STUDY}: is damaged. Run the study again to repair it")
@@ -307,12 +462,28 @@ def read_study(folder: Path) -> dict[str, Any]:
 
 
 def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a study without title and number of samples. The result identifies a run."""
+    """Return a study without title and number of samples. The result identifies a run.
+
+    >>> _identity({"title": "a", "samples": 3, "seed": 9, "problem": {"title": "b"}})
+    {'seed': 9, 'problem': {'title': 'b'}}
+    """
     return {key: value for key, value in study.items() if key not in ("title", "samples")}
 
 
 def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any]) -> None:
-    """Refuse a study that differs from the stored study, except by additional samples."""
+    """Refuse a study that differs from the stored study, except by additional samples.
+
+    >>> stored = {"samples": 3, "title": "a", "seed": 9}
+    >>> _refuse_another(Path("run"), stored | {"title": "b", "samples": 4}, stored)
+    >>> _refuse_another(
+    ...     Path("run"), stored | {"samples": 2, "seed": 8}, stored
+    ... )  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: run: holds another study. ...:
+      seed: 8 given, 9 stored
+      samples: 2 given, 3 stored. A run can only grow
+    """
     now, before = here["samples"], there["samples"]
     differences = _differences(_identity(here), _identity(there))
     if now < before:
@@ -325,7 +496,19 @@ def _refuse_another(path: Path, here: Mapping[str, Any], there: Mapping[str, Any
 
 
 def _differences(here: Any, there: Any, path: str = "") -> list[str]:
-    """Return the differences between two studies, each with its key and both values."""
+    """Return the differences between two studies, each with its key and both values.
+
+    >>> here = {"a": {"b": [1, 2], "c": 3}, "d": 4, "e": 5}
+    >>> there = {"a": {"b": [1, 7, 8], "c": 3}, "d": {"f": 6}, "e": 5, "g": 0}
+    >>> for text in _differences(here, there):
+    ...     print(text)
+    a.b.1: 2 given, 7 stored
+    a.b.2: nothing given, 8 stored
+    d: 4 given, {'f': 6} stored
+    g: nothing given, 0 stored
+    >>> _differences(here, here)
+    []
+    """
     if isinstance(here, list) and isinstance(there, list):
         here, there = dict(enumerate(here)), dict(enumerate(there))
     if isinstance(here, Mapping) and isinstance(there, Mapping):

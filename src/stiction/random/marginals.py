@@ -103,6 +103,8 @@ def frozen(family: Any, *args: float) -> Any:
     ([7.0, 16.0], True)
     >>> [float(end) for end in frozen(scipy.stats.uniform, 3.0, 2.0).support()], law.args
     ([3.0, 5.0], (-1.0, 2.0, 10.0, 3.0))
+    >>> float(law.a), float(law.b)  # without location and scale
+    (-1.0, 2.0)
     """
     distribution = copy(_frozen_once(family))
     distribution.args = args

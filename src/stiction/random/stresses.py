@@ -54,8 +54,10 @@ def check_pressure(problem: Problem, random: RandomInterface) -> None:
     >>> refusals(bare, "normal_pressure", normal_pressure=stress)
     >>> refusals(bare, "strength", "normal_pressure")
     'between.normal_pressure: multiplies normal_pressure, b'
-    >>> refusals(problem, "pressing_force")
-    'between.pressing_force: multiplies pressing_force, but'
+    >>> [refusals(problem, name)[8:35] for name in ("pressing_force", "initial_stress")]
+    ['pressing_force: multiplies ', 'initial_stress: multiplies ']
+    >>> line, load = st.Interface(0.1, 8, width=0.01), st.Load(pressing_force=2e3)
+    >>> refusals(st.Problem(solid, line, friction, load), "pressing_force")
     >>> marginal = st.Lognormal(mean=0.6, cv=0.2)
     >>> coefficient = st.RandomField(marginal, spectrum, quantity="friction_coefficient")
     >>> refusals(bare, residual_strength=coefficient)
@@ -116,6 +118,11 @@ def profiles_in_stress(
     {'normal_pressure': [3000000.0, 1000000.0], 'strength': [1500000.0, 750000.0]}
     >>> first_nodes(between__initial_stress=factors)
     {'initial_stress': [750000.0, 250000.0], 'strength': [1000000.0, 1500000.0]}
+    >>> from types import SimpleNamespace as Named
+    >>> blocks = Named(pressure=np.array([0.5, 1.5] * 4))
+    >>> problem = Named(specimen=Named(pressing="glued"), blocks=blocks, normal_pressure=None)
+    >>> first_nodes(normal_pressure=1e6 * factors)  # half of it, between glued blocks
+    {'normal_pressure': [750000.0, 250000.0], 'strength': [375000.0, 187500.0]}
     """
     stresses = {name: rows for name, rows in profiles.items() if not name.startswith(FACTOR)}
     factors = {name: rows for name, rows in profiles.items() if name.startswith(FACTOR)}
@@ -199,6 +206,14 @@ def support_in_stress(
     >>> random = st.RandomInterface(strength=field, normal_pressure=pressure)
     >>> support_in_stress(glued, random, "normal_pressure")
     (500000.0, 4500000.0)
+
+    Zero times infinity counts as zero:
+
+    >>> import scipy.stats
+    >>> unbounded = st.RandomField(scipy.stats.norm(1e6, 1e5), spectrum)
+    >>> random = st.RandomInterface(strength=unbounded, between={"strength": between(0.0, 2.0)})
+    >>> support_in_stress(problem, random, "strength")
+    (-inf, inf)
     """
     field, between = random.properties.get(name), random.between or {}
 
