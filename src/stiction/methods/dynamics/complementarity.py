@@ -54,6 +54,37 @@ def _solve(problem: SlipProblem, accuracy: float) -> Any:
     """Step 2: improve u in place to a residual of `accuracy` (Pa).
 
     Return whether that succeeds.
+
+    The equations of the slipping nodes have a direct solution. With a
+    steeper fall a patch is unstable. (The function runs without compilation,
+    with transforms by numpy.)
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> import numpy as np
+    >>> def by_numpy(transform, multiplier, field, spectrum, out):
+    ...     out[:] = np.fft.irfft(multiplier * np.fft.rfft(field), out.size)
+    >>> plain = FunctionType(_solve.py_func.__code__, globals() | {"convolve": by_numpy})
+    >>> symbol, falling = np.array([2.0, 3.0, 5.0, 6.0]), np.array([0.5, 1.0, 9.0, 0.0, 0.25, 1.5])
+    >>> fields = {name: np.zeros(6) for name in ("product", "cg_residual", "cg_direction")}
+    >>> problem = SimpleNamespace(
+    ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, **fields,
+    ...     cg_preconditioned=np.zeros(6), increment=np.array([0.1, 0.2, 0.0, 0.0, 0.3, 0.0]),
+    ...     slipping=np.array([1, 1, 0, 0, 1, 1]), driving=np.array([4.0, -3.0, 9.0, 9.0, 1.0, 2.0]),
+    ...     falling=falling,
+    ... )
+    >>> plain(problem, 1e-10)
+    True
+    >>> S, column = problem.slipping > 0, np.fft.irfft(symbol, 6)
+    >>> M = column[abs(np.subtract.outer(np.arange(6), np.arange(6)))]
+    >>> u = np.linalg.solve((M - np.diag(falling))[np.ix_(S, S)], problem.driving[S])
+    >>> np.allclose(problem.increment[S], u), problem.increment[~S].tolist()
+    (True, [0.0, 0.0])
+    >>> problem.falling, problem.driving = 9.0 * falling, 2.0 * problem.driving
+    >>> plain(problem, 1e-10)
+    False
+    >>> problem.driving[0] = np.nan
+    >>> plain(problem, 1e-10)
+    False
     """
     transform, work, product = problem.transform, problem.work, problem.product
     u, slipping = problem.increment, problem.slipping
@@ -112,6 +143,41 @@ def solve_increment(
     then the solution. The stress is accurate to `accuracy` (Pa). The
     strength may differ by `line_accuracy` (Pa) from the straight line
     that replaces it.
+
+    Nodes 1 and 2 slip, and node 2 passes to its residual strength. Node 4
+    leaves the first guess, and node 3 joins although its trial stress is too
+    low at first. No stress exceeds the strength after the slip. (The
+    functions run without compilation, with transforms by numpy.)
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> import numpy as np
+    >>> def by_numpy(transform, multiplier, field, spectrum, out):
+    ...     out[:] = np.fft.irfft(multiplier * np.fft.rfft(field), out.size)
+    >>> peak, residual, W = np.full(6, 9.0), np.full(6, 2.0), np.full(6, 1.5)
+    >>> def line(setting, i, slip, ahead):
+    ...     weakens = peak[i] - W[i] * (slip + ahead) > residual[i]
+    ...     return (peak[i] - W[i] * slip, W[i]) if weakens else (residual[i], 0.0)
+    >>> plain = globals() | {"convolve": by_numpy, "node_line": line}
+    >>> plain["node_strength"] = lambda setting, i, slip: line(setting, i, slip, 0.0)[0]
+    >>> for kernel in (_solve, solve_increment):
+    ...     plain[kernel.__name__] = FunctionType(kernel.py_func.__code__, plain)
+    >>> fields = "product", "cg_residual", "cg_direction", "cg_preconditioned", "driving", "falling"
+    >>> symbol, trial = np.array([2.0, 3.0, 5.0, 6.0]), np.array([1.0, 12.0, 20.0, 8.0, 3.0, 5.0])
+    >>> problem = SimpleNamespace(
+    ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, trial=trial,
+    ...     **{name: np.zeros(6) for name in fields},
+    ...     increment=np.array([0.0, 0.1, 0.5, 0.0, 0.2, 0.0]), slipping=np.array([0, 1, 0, 0, 1, 0]),
+    ... )
+    >>> slip = np.array([0.0, 0.5, 1.0, 0.0, 0.2, 0.0])
+    >>> plain["solve_increment"](problem, None, slip, 1e-9, 1e-9)
+    True
+    >>> u = problem.increment
+    >>> after = [line(None, i, slip[i] + u[i], 0.0)[0] for i in range(6)]
+    >>> above = trial - np.fft.irfft(symbol * np.fft.rfft(u), 6) - after
+    >>> print(u.round(4).tolist(), problem.slipping.tolist())
+    [0.0, 3.8875, 5.9688, 1.9875, 0.0, 0.0] [0, 1, 1, 1, 0, 0]
+    >>> (above.round(4) + 0.0).tolist()
+    [-4.1125, 0.0, 0.0, 0.0, -3.7125, -4.0]
     """
     u, slipping, trial = problem.increment, problem.slipping, problem.trial
     driving, falling, product, n = problem.driving, problem.falling, problem.product, u.size

@@ -116,6 +116,22 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
     similar, the scale is the mean of tau_p - tau_r. Nodes far stronger
     than the load do not raise it. The scale grows as the load becomes
     able to break them.
+
+    The first node holds the scale back at low loads, and the last node from
+    a load of 3.8 Pa. The middle node cannot break.
+
+    >>> peak, residual = np.array([7.0, np.inf, 5.0]), np.array([1.0, 0.0, 2.0])
+    >>> profile, initial = np.array([2.0, 9.0, 0.5]), np.array([-1.0, 9.0, 1.0])
+    >>> nodes = Nodes(peak, residual, np.ones(3), np.ones(3), profile, initial)
+    >>> scale = stress_scale(nodes)
+    >>> for load in (1.0, 1.5, 2.5, 3.5, 20.0):
+    ...     drop = np.minimum(peak - residual, 3.0 * (load * profile + initial - residual))
+    ...     print(f"{value_at(scale, load):.4f} {np.maximum(drop[[0, 2]], 0.0).mean():.4f}")
+    0.0000 0.0000
+    1.5000 1.5000
+    3.3750 3.3750
+    4.1250 4.1250
+    4.5000 4.5000
     """
     can_break = np.isfinite(nodes.peak)
     peak, residual = nodes.peak[can_break], nodes.residual[can_break]
@@ -134,7 +150,17 @@ def stress_scale(nodes: Nodes) -> PiecewiseLinear:
 
 @jit_inside
 def _set_maximum(step: Any, maximum: Any, radiated: float) -> None:
-    """Record the present mean stress as the last maximum."""
+    """Record the present mean stress as the last maximum.
+
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
+    >>> step, maximum = now.step, now.maximum
+    >>> step.time, step.load, step.mean_stress, step.whole_stress = 3.0, 5.0, 7.0, 8.0
+    >>> step.strength_change, step.top_node, maximum.largest_fall = -2.0, 4, 9.0
+    >>> _set_maximum.py_func(step, maximum, 0.5)
+    >>> print(*(f"{name}={maximum[name]:g}" for name in maximum.dtype.names))
+    stress=8 breakable=7 radiated=0.5 strength=-2 largest_fall=0 time=3 load=5 work=0 node=4
+    """
     maximum.stress, maximum.radiated = step.whole_stress, radiated
     maximum.strength, maximum.largest_fall = step.strength_change, 0.0
     maximum.breakable, maximum.node = step.mean_stress, step.top_node
@@ -143,7 +169,25 @@ def _set_maximum(step: Any, maximum: Any, radiated: float) -> None:
 
 @jit_inside
 def _begin_event(now: Any) -> None:
-    """Step 4: begin an instability at the last maximum of the mean stress."""
+    """Step 4: begin an instability at the last maximum of the mean stress.
+
+    The mean stress with the nodes beyond the extent is highest at the second
+    of three instabilities, and the mean stress without them at the third.
+
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
+    >>> maxima = [(6.0, 5.0, 0.1, 11.0, 3), (7.0, 4.0, 0.2, 12.0, 2), (6.5, 5.5, 0.3, 13.0, 1)]
+    >>> for stress, breakable, time, load, node in maxima:
+    ...     now.maximum.stress, now.maximum.breakable, now.maximum.node = stress, breakable, node
+    ...     now.maximum.time, now.maximum.load, now.step.top_slip_rate = time, load, 0.25
+    ...     _begin_event.py_func(now)
+    >>> print(*(f"{name}={now.results[name]:g}" for name in now.results.dtype.names[:5]))
+    first_stress=5 onset_stress=7 critical_stress=5.5 onset_time=0.2 onset_load=12
+    >>> [int(now.results[name]) for name in ("instabilities", "onset_node")]
+    [3, 2]
+    >>> int(now.event.unstable), int(now.event.begun), float(now.event.slip_rate)
+    (1, 1, 0.25)
+    """
     event, results, maximum = now.event, now.results, now.maximum
     event.unstable, event.begun, event.slip_rate = 1, 1, now.step.top_slip_rate
     is_first = results.instabilities == 0
@@ -159,7 +203,27 @@ def _begin_event(now: Any) -> None:
 
 @jit_inside
 def end_event(now: Any, unstable_slip_rate: float, radiated: float) -> None:
-    """Step 3: end an event, because the mean stress has recovered or the interface is calm."""
+    """Step 3: end an event, because the mean stress has recovered or the interface is calm.
+
+    Only the first instability counts as arrested: it was fast enough, and
+    not all nodes had broken. The last call finds no instability.
+
+    >>> from types import FunctionType
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> names = globals() | {"_set_maximum": _set_maximum.py_func}
+    >>> plain = FunctionType(end_event.py_func.__code__, names)  # without compilation
+    >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
+    >>> for unstable, rate, broken in ((1, 0.6, 0), (1, 0.5, 0), (1, 0.6, 1), (0, 0.6, 0)):
+    ...     now.event.unstable, now.event.slip_rate, now.results.all_broken = unstable, rate, broken
+    ...     now.step.whole_stress += 1.0
+    ...     plain(now, 0.5, 0.0)
+    ...     flags = now.event.last_arrested, now.results.arrested_events, now.event.unstable
+    ...     print(*flags, now.maximum.stress)
+    1 1 0 1.0
+    0 1 0 2.0
+    0 1 0 3.0
+    0 1 0 3.0
+    """
     event, results = now.event, now.results
     if event.unstable:
         event.unstable = 0
@@ -174,6 +238,37 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     """Update the maximum and the instabilities.
 
     Return the drop of the mean stress, Pa.
+
+    The scale makes a drop of 1 Pa an instability. The stress rises, falls by
+    0.05 Pa, falls by 2 Pa (but waves took off 1.5 Pa), and recovers. A deep
+    fall without weakening is not an instability. Then the last nodes reach
+    their residual strength: the instability was the sliding, and not
+    arrested.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> plain = dict(globals())  # the kernels without compilation
+    >>> for kernel in (_set_maximum, _begin_event, end_event, observe):
+    ...     plain[kernel.__name__] = FunctionType(kernel.py_func.__code__, plain)
+    >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
+    >>> step, results, now.run.scale = now.step, now.results, 1e4
+    >>> thresholds = SimpleNamespace(unstable_slip_rate=0.5, breakable=4)
+    >>> steps = [(100.0, 0.0, 0.0, 0), (99.95, 0.05, -0.5, 0), (98.0, 1.5, -3.0, 0)]
+    >>> steps += [(101.0, 0.5, -3.0, 0), (95.0, 4.0, -3.5, 3), (94.0, 5.0, -3.6, 4)]
+    >>> for node, (stress, radiated, change, weakened) in enumerate(steps):
+    ...     step.whole_stress, step.strength_change, step.weakened_nodes = stress, change, weakened
+    ...     step.top_node, step.top_slip_rate, step.mean_stress = node, 0.3 + 0.1 * node, 0.5 * stress
+    ...     fall = plain["observe"](now, thresholds, radiated)
+    ...     state = results.instabilities, results.arrested_events, results.all_broken
+    ...     print(f"{fall:.2f}", *state, now.event.unstable, now.maximum.node, now.maximum.stress)
+    -100.00 0 0 0 0 0 100.0
+    0.05 0 0 0 0 1 100.0
+    1.50 1 0 0 1 1 100.0
+    -1.00 1 1 0 0 3 101.0
+    0.00 1 1 0 0 3 101.0
+    0.00 1 0 1 0 3 101.0
+    >>> float(results.kinetic_stress), int(results.onset_node), round(float(now.event.slip_rate), 9)
+    (47.0, 1, 0.6)
     """
     step, maximum, event, results = now.step, now.maximum, now.event, now.results
     # 1. The fall by waves.
@@ -212,6 +307,65 @@ def finish_step(
     Return the drop of the mean stress, Pa.
 
     If the record has no rows, it stays empty.
+
+    The last node cannot break. Node 0 passes half its residual slip in the
+    middle of the step, node 1 has done so before, and node 2 never weakens.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS, STATION, STEP
+    >>> plain = dict(globals())  # the kernels without compilation
+    >>> for kernel in (_set_maximum, _begin_event, end_event, observe, finish_step):
+    ...     plain[kernel.__name__] = FunctionType(kernel.py_func.__code__, plain)
+    >>> state = SimpleNamespace(
+    ...     slip=np.array([0.5, 0.3, 0.05, 0.0]),
+    ...     slip_rate=np.array([1.0, 3.0, 2.0, 0.0]),
+    ...     stress=np.array([4.0, 5.0, -6.0, 1.0]),
+    ...     arrival=np.array([np.nan, 0.7, np.nan, np.nan]),
+    ...     maximum_slip=np.zeros(4),
+    ...     diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
+    ... )
+    >>> residual_slip, peak = np.array([0.8, 0.25, 0.0, np.inf]), np.array([8.0, 6.0, 7.0, np.inf])
+    >>> thresholds = SimpleNamespace(
+    ...     front_share=0.5, breakable=3, period_nodes=6, held=True, unstable_slip_rate=2.5,
+    ...     settling_time=5.0,
+    ... )
+    >>> setting = SimpleNamespace(
+    ...     nodes=SimpleNamespace(residual_slip=residual_slip, peak=peak), thresholds=thresholds,
+    ...     mean_initial=1.0, mean_profile=0.5, grid=SimpleNamespace(impedance=4.0),
+    ...     scale=PiecewiseLinear(np.array([0.0, 10.0]), np.array([0.0, 30.0])),
+    ...     stations=np.array([2, 0]),
+    ... )
+    >>> record = StepRecord(np.recarray(2, STEP), np.recarray((2, 2), STATION))
+    >>> increments, strength = np.array([0.2, 0.1, 0.05, 0.0]), np.array([5.0, 3.0, 2.0, np.inf])
+    >>> taken = TakenStep(10.0, 2.0, 10.0, 7.0, 2.0, increments, strength)
+    >>> now = state.diagnostics[0]
+    >>> now.event.open, step = 1, now.step
+    >>> float(plain["finish_step"](state, setting, taken, record, 1))
+    -4.0
+    >>> state.arrival.tolist(), state.maximum_slip.tolist(), float(now.maximum.work)
+    ([9.0, 0.7, 8.0, nan], [0.5, 0.3, 0.05, 0.0], 7.0)
+    >>> for names in (step.dtype.names[4:8], step.dtype.names[8:]):
+    ...     print(*(f"{name}={step[name]:.4g}" for name in names))
+    mean_slip=0.2833 mean_slip_rate=1 mean_stress=1 whole_stress=4
+    strength_change=-1.833 top_slip_rate=3 top_node=1 weakened_nodes=2
+    >>> float(now.run.scale), float(now.run.reverse_margin), int(now.run.reverse_node)
+    (30.0, -4.0, 2)
+    >>> int(now.event.fast), float(now.event.fast_since), float(now.event.peak_rate)
+    (1, 10.0, 1.0)
+    >>> float(record.steps[1].load), record.stations[1].slip.tolist()
+    (10.0, [0.05, 0.5])
+    >>> record.stations[1].slip_rate.tolist(), record.stations[1].shear_stress.tolist()
+    ([2.0, 1.0], [-6.0, 4.0])
+
+    After the settling time without fast slip, the event ends.
+
+    >>> state.slip_rate[:], empty = 0.1, StepRecord(record.steps[:0], record.stations[:0])
+    >>> for time in (14.9, 15.0):
+    ...     later = taken._replace(time=time, radiated=0.2)
+    ...     _ = plain["finish_step"](state, setting, later, empty, 0)
+    ...     print(now.event.calm, now.event.fast_until, step.work)
+    0 10.0 14.0
+    1 10.0 21.0
     """
     now, increments, strength = state.diagnostics[0], taken.increments, taken.strength
     step, run, event = now.step, now.run, now.event

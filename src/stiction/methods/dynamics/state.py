@@ -44,7 +44,12 @@ class PiecewiseLinear(NamedTuple):
 
 @jit
 def value_at(history: PiecewiseLinear, t: float) -> Any:
-    """Return the value of a piecewise linear function."""
+    """Return the value of a piecewise linear function.
+
+    >>> history = PiecewiseLinear(np.array([0.0, 1.0, 3.0]), np.array([2.0, 5.0, 4.0]))
+    >>> [value_at(history, t) for t in (-1.0, 0.5, 1.0, 2.0, 5.0)]
+    [-1.0, 3.5, 5.0, 4.5, 3.0]
+    """
     times, values = history
     low, high = 0, times.size - 1
     while high - low > 1:
@@ -85,7 +90,11 @@ Echoes in a period of two extents reach 0.06."""
 
 
 def record(numbers: str, counts: str = "", **groups: np.dtype[Any]) -> np.dtype[Any]:
-    """Return the type of a record of groups, numbers, and counts or flags, by their names."""
+    """Return the type of a record of groups, numbers, and counts or flags, by their names.
+
+    >>> record("slip load", "node", step=record("time")).descr
+    [('step', [('time', '<f8')]), ('slip', '<f8'), ('load', '<f8'), ('node', '<i8')]
+    """
     fields = [(name, "f8") for name in numbers.split()]
     fields += [(name, "i8") for name in counts.split()]
     return np.dtype([*groups.items(), *fields])
@@ -211,6 +220,10 @@ def event_type(nodes: int) -> np.dtype[Any]:
     """Return the data type for the record of an event.
 
     Pairs are values before and after.
+
+    >>> event = np.zeros((), event_type(3))
+    >>> event["slip"].shape, event["load"].shape, event["work"].shape, event["node"].dtype.kind
+    ((2, 3), (2,), (2,), 'i')
     """
     return np.dtype(
         [
@@ -299,14 +312,35 @@ class Setting(NamedTuple):
 
 @jit_inside
 def node_strength(setting: Setting, i: int, slip: float) -> Any:
-    """Return the strength of node i after some slip (m), Pa."""
+    """Return the strength of node i after some slip (m), Pa.
+
+    In these arrays the nodes have different strengths. (The examples run the
+    kernels without compilation.)
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.problem.friction.parameters import Linear
+    >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
+    >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
+    >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
+    >>> [node_strength.py_func(setting, i, 1.5) for i in (0, 1)]
+    [2.0, 2.5]
+    """
     nodes, W = setting.nodes, setting.nodes.weakening_rate[i]
     return strength_at(setting.law, nodes.peak[i], nodes.residual[i], W, slip)
 
 
 @jit_inside
 def node_line(setting: Setting, i: int, slip: float, ahead: float) -> Any:
-    """Return the straight line of strength of node i, as `friction.kernels.line_at` does."""
+    """Return the straight line of strength of node i, as `friction.kernels.line_at` does.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.problem.friction.parameters import Linear
+    >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
+    >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
+    >>> setting = SimpleNamespace(law=Linear(), nodes=nodes)
+    >>> [node_line.py_func(setting, 1, 1.5, ahead) for ahead in (0.1, 0.5)]
+    [(2.5, 3.0), (2.0, 0.0)]
+    """
     nodes, W = setting.nodes, setting.nodes.weakening_rate[i]
     return line_at(setting.law, nodes.peak[i], nodes.residual[i], W, slip, ahead)
 
@@ -333,12 +367,26 @@ class RuptureState(NamedTuple):
 
     @property
     def explicit(self) -> bool:
-        """Whether explicit steps come next."""
+        """Whether explicit steps come next.
+
+        >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
+        >>> state.explicit
+        False
+        >>> state.now["stepping"]["phase"] = Phase.EXPLICIT
+        >>> state.explicit
+        True
+        """
         return bool(self.now["stepping"]["phase"] == Phase.EXPLICIT)
 
     @property
     def steps(self) -> int:
-        """Number of steps so far, explicit and implicit."""
+        """Number of steps so far, explicit and implicit.
+
+        >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
+        >>> state.now["stepping"]["explicit_steps"], state.now["stepping"]["implicit_steps"] = 5, 2
+        >>> state.steps
+        7
+        """
         stepping = self.now["stepping"]
         return int(stepping["explicit_steps"] + stepping["implicit_steps"])
 
