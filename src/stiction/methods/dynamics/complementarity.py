@@ -69,8 +69,8 @@ def _solve(problem: SlipProblem, accuracy: float) -> Any:
     >>> problem = SimpleNamespace(
     ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, **fields,
     ...     cg_preconditioned=np.zeros(6), increment=np.array([0.1, 0.2, 0.0, 0.0, 0.3, 0.0]),
-    ...     slipping=np.array([1, 1, 0, 0, 1, 1]), driving=np.array([4.0, -3.0, 9.0, 9.0, 1.0, 2.0]),
-    ...     falling=falling,
+    ...     slipping=np.array([1, 1, 0, 0, 1, 1]), falling=falling,
+    ...     driving=np.array([4.0, -3.0, 9.0, 9.0, 1.0, 2.0]),
     ... )
     >>> plain(problem, 1e-10)
     True
@@ -166,7 +166,8 @@ def solve_increment(
     >>> problem = SimpleNamespace(
     ...     transform=None, work=None, symbol=symbol, inverse=1.0 / symbol, trial=trial,
     ...     **{name: np.zeros(6) for name in fields},
-    ...     increment=np.array([0.0, 0.1, 0.5, 0.0, 0.2, 0.0]), slipping=np.array([0, 1, 0, 0, 1, 0]),
+    ...     increment=np.array([0.0, 0.1, 0.5, 0.0, 0.2, 0.0]),
+    ...     slipping=np.array([0, 1, 0, 0, 1, 0]),
     ... )
     >>> slip = np.array([0.0, 0.5, 1.0, 0.0, 0.2, 0.0])
     >>> plain["solve_increment"](problem, None, slip, 1e-9, 1e-9)

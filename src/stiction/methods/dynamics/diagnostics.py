@@ -171,20 +171,21 @@ def _set_maximum(step: Any, maximum: Any, radiated: float) -> None:
 def _begin_event(now: Any) -> None:
     """Step 4: begin an instability at the last maximum of the mean stress.
 
-    The mean stress with the nodes beyond the extent is highest at the second
-    of three instabilities, and the mean stress without them at the third.
+    The mean stress with the nodes beyond the extent is highest at the third
+    of four instabilities, and the mean stress without them at the second.
 
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
     >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
-    >>> maxima = [(6.0, 5.0, 0.1, 11.0, 3), (7.0, 4.0, 0.2, 12.0, 2), (6.5, 5.5, 0.3, 13.0, 1)]
+    >>> maxima = [(6.0, 5.0, 0.1, 11.0, 3), (6.2, 5.5, 0.2, 12.0, 2)]
+    >>> maxima += [(7.0, 4.0, 0.3, 13.0, 1), (6.5, 4.5, 0.4, 14.0, 5)]
     >>> for stress, breakable, time, load, node in maxima:
     ...     now.maximum.stress, now.maximum.breakable, now.maximum.node = stress, breakable, node
     ...     now.maximum.time, now.maximum.load, now.step.top_slip_rate = time, load, 0.25
     ...     _begin_event.py_func(now)
     >>> print(*(f"{name}={now.results[name]:g}" for name in now.results.dtype.names[:5]))
-    first_stress=5 onset_stress=7 critical_stress=5.5 onset_time=0.2 onset_load=12
+    first_stress=5 onset_stress=7 critical_stress=5.5 onset_time=0.3 onset_load=13
     >>> [int(now.results[name]) for name in ("instabilities", "onset_node")]
-    [3, 2]
+    [4, 1]
     >>> int(now.event.unstable), int(now.event.begun), float(now.event.slip_rate)
     (1, 1, 0.25)
     """
@@ -239,11 +240,11 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
 
     Return the drop of the mean stress, Pa.
 
-    The scale makes a drop of 1 Pa an instability. The stress rises, falls by
-    0.05 Pa, falls by 2 Pa (but waves took off 1.5 Pa), and recovers. A deep
-    fall without weakening is not an instability. Then the last nodes reach
-    their residual strength: the instability was the sliding, and not
-    arrested.
+    The scale makes a drop of 1 Pa an instability. The stress rises, stays,
+    falls by 0.05 Pa, falls by 2 Pa (but waves took off 1.5 Pa), and
+    recovers. A deep fall without weakening is not an instability, and a
+    small fall after it neither. Then the last nodes reach their residual
+    strength: the instability was the sliding, and not arrested.
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS
@@ -253,22 +254,26 @@ def observe(now: Any, thresholds: Thresholds, radiated: float) -> Any:
     >>> now = np.zeros(1, DIAGNOSTICS).view(np.recarray)[0]
     >>> step, results, now.run.scale = now.step, now.results, 1e4
     >>> thresholds = SimpleNamespace(unstable_slip_rate=0.5, breakable=4)
-    >>> steps = [(100.0, 0.0, 0.0, 0), (99.95, 0.05, -0.5, 0), (98.0, 1.5, -3.0, 0)]
-    >>> steps += [(101.0, 0.5, -3.0, 0), (95.0, 4.0, -3.5, 3), (94.0, 5.0, -3.6, 4)]
+    >>> steps = [(100.0, 0.25, 0.0, 0), (100.0, 0.25, 0.0, 0), (99.95, 0.3, -0.5, 0)]
+    >>> steps += [(98.0, 1.75, -3.0, 0), (101.0, 0.5, -3.0, 0), (95.0, 4.0, -3.5, 3)]
+    >>> steps += [(100.5, 1.0, -3.6, 3), (94.0, 5.0, -3.6, 4)]
     >>> for node, (stress, radiated, change, weakened) in enumerate(steps):
     ...     step.whole_stress, step.strength_change, step.weakened_nodes = stress, change, weakened
-    ...     step.top_node, step.top_slip_rate, step.mean_stress = node, 0.3 + 0.1 * node, 0.5 * stress
+    ...     step.top_node, step.top_slip_rate = node, (0.6 if node == 3 else 0.4)
+    ...     step.mean_stress = 0.5 * stress
     ...     fall = plain["observe"](now, thresholds, radiated)
     ...     state = results.instabilities, results.arrested_events, results.all_broken
     ...     print(f"{fall:.2f}", *state, now.event.unstable, now.maximum.node, now.maximum.stress)
     -100.00 0 0 0 0 0 100.0
-    0.05 0 0 0 0 1 100.0
-    1.50 1 0 0 1 1 100.0
-    -1.00 1 1 0 0 3 101.0
-    0.00 1 1 0 0 3 101.0
-    0.00 1 0 1 0 3 101.0
+    0.00 0 0 0 0 0 100.0
+    0.05 0 0 0 0 2 100.0
+    1.50 1 0 0 1 2 100.0
+    -1.00 1 1 0 0 4 101.0
+    0.00 1 1 0 0 4 101.0
+    0.00 1 1 0 0 4 101.0
+    0.00 1 0 1 0 4 101.0
     >>> float(results.kinetic_stress), int(results.onset_node), round(float(now.event.slip_rate), 9)
-    (47.0, 1, 0.6)
+    (47.0, 2, 0.6)
     """
     step, maximum, event, results = now.step, now.maximum, now.event, now.results
     # 1. The fall by waves.
@@ -308,8 +313,9 @@ def finish_step(
 
     If the record has no rows, it stays empty.
 
-    The last node cannot break. Node 0 passes half its residual slip in the
-    middle of the step, node 1 has done so before, and node 2 never weakens.
+    Node 3 cannot break. Node 0 passes half its residual slip in the middle
+    of the step, node 1 has done so before, node 2 never weakens, and node 4
+    has not slipped far enough.
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS, STATION, STEP
@@ -317,16 +323,17 @@ def finish_step(
     >>> for kernel in (_set_maximum, _begin_event, end_event, observe, finish_step):
     ...     plain[kernel.__name__] = FunctionType(kernel.py_func.__code__, plain)
     >>> state = SimpleNamespace(
-    ...     slip=np.array([0.5, 0.3, 0.05, 0.0]),
-    ...     slip_rate=np.array([1.0, 3.0, 2.0, 0.0]),
-    ...     stress=np.array([4.0, 5.0, -6.0, 1.0]),
-    ...     arrival=np.array([np.nan, 0.7, np.nan, np.nan]),
-    ...     maximum_slip=np.zeros(4),
+    ...     slip=np.array([0.5, 0.25, 0.05, 0.0, 0.1]),
+    ...     slip_rate=np.array([1.0, 3.0, 2.0, 0.0, 0.5]),
+    ...     stress=np.array([4.0, 5.0, -6.0, 1.0, 3.0]),
+    ...     arrival=np.array([np.nan, 0.7, np.nan, np.nan, np.nan]),
+    ...     maximum_slip=np.zeros(5),
     ...     diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
     ... )
-    >>> residual_slip, peak = np.array([0.8, 0.25, 0.0, np.inf]), np.array([8.0, 6.0, 7.0, np.inf])
+    >>> residual_slip = np.array([0.8, 0.25, 0.0, np.inf, 1.0])
+    >>> peak = np.array([8.0, 6.0, 7.0, np.inf, 9.0])
     >>> thresholds = SimpleNamespace(
-    ...     front_share=0.5, breakable=3, period_nodes=6, held=True, unstable_slip_rate=2.5,
+    ...     front_share=0.5, breakable=4, period_nodes=6, held=True, unstable_slip_rate=2.5,
     ...     settling_time=5.0,
     ... )
     >>> setting = SimpleNamespace(
@@ -336,22 +343,23 @@ def finish_step(
     ...     stations=np.array([2, 0]),
     ... )
     >>> record = StepRecord(np.recarray(2, STEP), np.recarray((2, 2), STATION))
-    >>> increments, strength = np.array([0.2, 0.1, 0.05, 0.0]), np.array([5.0, 3.0, 2.0, np.inf])
+    >>> increments = np.array([0.2, 0.1, 0.04, 0.0, 0.1])
+    >>> strength = np.array([5.0, 3.0, 2.0, np.inf, 6.0])
     >>> taken = TakenStep(10.0, 2.0, 10.0, 7.0, 2.0, increments, strength)
     >>> now = state.diagnostics[0]
     >>> now.event.open, step = 1, now.step
     >>> float(plain["finish_step"](state, setting, taken, record, 1))
     -4.0
     >>> state.arrival.tolist(), state.maximum_slip.tolist(), float(now.maximum.work)
-    ([9.0, 0.7, 8.0, nan], [0.5, 0.3, 0.05, 0.0], 7.0)
+    ([9.0, 0.7, 8.0, nan, nan], [0.5, 0.25, 0.05, 0.0, 0.1], 7.0)
     >>> for names in (step.dtype.names[4:8], step.dtype.names[8:]):
     ...     print(*(f"{name}={step[name]:.4g}" for name in names))
-    mean_slip=0.2833 mean_slip_rate=1 mean_stress=1 whole_stress=4
-    strength_change=-1.833 top_slip_rate=3 top_node=1 weakened_nodes=2
+    mean_slip=0.225 mean_slip_rate=0.75 mean_stress=1.5 whole_stress=4
+    strength_change=-2.333 top_slip_rate=3 top_node=1 weakened_nodes=2
     >>> float(now.run.scale), float(now.run.reverse_margin), int(now.run.reverse_node)
     (30.0, -4.0, 2)
     >>> int(now.event.fast), float(now.event.fast_since), float(now.event.peak_rate)
-    (1, 10.0, 1.0)
+    (1, 10.0, 0.75)
     >>> float(record.steps[1].load), record.stations[1].slip.tolist()
     (10.0, [0.05, 0.5])
     >>> record.stations[1].slip_rate.tolist(), record.stations[1].shear_stress.tolist()
@@ -359,13 +367,14 @@ def finish_step(
 
     After the settling time without fast slip, the event ends.
 
-    >>> state.slip_rate[:], empty = 0.1, StepRecord(record.steps[:0], record.stations[:0])
-    >>> for time in (14.9, 15.0):
-    ...     later = taken._replace(time=time, radiated=0.2)
+    >>> empty = StepRecord(record.steps[:0], record.stations[:0])
+    >>> for time, rate in ((12.0, 2.6), (16.9, 2.4), (17.0, 2.4)):
+    ...     state.slip_rate[:], later = rate, taken._replace(time=time, radiated=1.0)
     ...     _ = plain["finish_step"](state, setting, later, empty, 0)
-    ...     print(now.event.calm, now.event.fast_until, step.work)
-    0 10.0 14.0
-    1 10.0 21.0
+    ...     print(now.event.calm, now.event.fast_since, now.event.fast_until, step.work)
+    0 10.0 12.0 14.0
+    0 10.0 12.0 21.0
+    1 10.0 12.0 28.0
     """
     now, increments, strength = state.diagnostics[0], taken.increments, taken.strength
     step, run, event = now.step, now.run, now.event

@@ -90,7 +90,29 @@ class _Attempt(NamedTuple):
 
 @jit_inside
 def _choose_size(now: Any, setting: Setting, step: float) -> Any:
-    """Step 1: return (size to try, size for later steps, whether cut short, whether the last)."""
+    """Step 1: return (size to try, size for later steps, whether cut short, whether the last).
+
+    The load rises by 2 Pa/s, and may rise by 1.1 Pa in a step. A step ends at
+    the next turning point of the load, or at the end time.
+
+    >>> from types import SimpleNamespace
+    >>> from stiction.methods.dynamics.state import PiecewiseLinear
+    >>> load = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.0, 2.0]))
+    >>> now = SimpleNamespace(step=SimpleNamespace(time=1.0, load=2.0))
+    >>> now.run = SimpleNamespace(scale=100.0)
+    >>> def size(turning_times, **changed):
+    ...     options = {"load_step": 0.011, "smallest_step": 0.1, "end_time": 9.0} | changed
+    ...     setting = SimpleNamespace(load=load, turning_times=np.array(turning_times))
+    ...     setting.thresholds = SimpleNamespace(**options)
+    ...     size, step, clipped, last = _choose_size.py_func(now, setting, 2.0)
+    ...     return round(float(size), 6), round(float(step), 6), clipped, bool(last)
+    >>> size([]), size([1.0, 1.3, 1.4])
+    ((0.5, 0.5, False, False), (0.3, 0.5, True, False))
+    >>> size([], smallest_step=1.0), size([], end_time=1.2)
+    ((1.0, 1.0, False, False), (0.2, 0.5, True, True))
+    >>> size([1.8], end_time=1.6)
+    (0.5, 0.5, False, False)
+    """
 
     thresholds, time, clipped, size = setting.thresholds, now.step.time, False, step
     smallest = thresholds.smallest_step
@@ -121,6 +143,61 @@ def _assemble(
     """Step 2: write the matrix, the stress without slip, and the first guess of u.
 
     Return the accuracy of u, Pa.
+
+    With Z = 4 and r = 1/4, the mean mode has the entry 4 * 1.25/0.5. The next
+    has 10 + 2 - 1 * (0.1 + 0.05)/0.5. Without the load, the stress of this
+    mode is 1 * (0.2 + 0.1i + 0.05 * 3) - 2 * 0.5 - 4/4 * 3. (The function
+    runs without compilation, with transforms by numpy.)
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> def forward(transform, field, spectrum):
+    ...     spectrum[:] = np.fft.rfft(field)
+    >>> def backward(transform, spectrum, field):
+    ...     field[:] = np.fft.irfft(spectrum, field.size)
+    >>> names = {"forward": forward, "backward": backward, "fading_memory": lambda *arguments: None}
+    >>> names |= globals() | names | {"tabulate": lambda grid, size, tables: tabulated.append(size)}
+    >>> plain, tabulated = FunctionType(_assemble.py_func.__code__, names), []
+    >>> stiffness = np.array([[0.0, 2.0, 5.0], [0.0, 1.0, 3.0]])
+    >>> grid = SimpleNamespace(transform=None, stiffness=stiffness, entry=np.array([0, 0, 1]))
+    >>> grid.impedance = 4.0
+    >>> problem = SimpleNamespace(
+    ...     symbol=np.zeros(3), inverse=np.zeros(3), work=np.zeros(3, complex), trial=np.zeros(4),
+    ...     increment=np.zeros(4), slipping=np.zeros(4, int),
+    ... )
+    >>> tables = SimpleNamespace(
+    ...     problem=problem, response=np.array([0.1, 0.2]), ramp_response=np.array([0.05, -0.1]),
+    ...     past_hat=np.zeros(3, complex), memory_sum=np.array([0.0, 0.2 + 0.1j, 0.3]),
+    ...     filled=np.zeros(1, int), valid_for=np.zeros(2),
+    ... )
+    >>> state = SimpleNamespace(
+    ...     past=np.array([1.0, 2.0, 4.0, 2.0]), slip_hat=np.array([0.0, 0.5, -1.0]), memory=None,
+    ...     slip_rate=np.array([0.0, 0.1, 0.0, 0.2]), diagnostics=np.zeros(1, DIAGNOSTICS),
+    ... )
+    >>> state.diagnostics = state.diagnostics.view(np.recarray)
+    >>> nodes = SimpleNamespace(profile=np.array([1.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
+    >>> nodes.peak, setting = np.array([np.inf, 9.0, 9.0, 9.0]), SimpleNamespace(grid=grid)
+    >>> setting.nodes = nodes
+    >>> accuracy = plain(state, setting, tables, _Attempt(0.5, 1.0, 3.0, 0.25, 1.0))
+    >>> problem.symbol.round(9).tolist(), (1.0 / problem.inverse).round(9).tolist()
+    ([10.0, 11.7, 14.4], [10.0, 11.7, 14.4])
+    >>> hat = np.fft.rfft(problem.trial - 3.0 * nodes.profile - 0.5)
+    >>> (hat.real.round(9) + 0.0).tolist(), (hat.imag.round(9) + 0.0).tolist()
+    ([9.0, -3.65, 7.2], [0.0, 0.1, 0.0])
+    >>> problem.increment.tolist(), problem.slipping.tolist()
+    ([0.5, 1.0, 2.0, 1.0], [0, 1, 0, 1])
+    >>> relative = accuracy * 1e14 / np.abs(problem.trial[1:]).max()
+    >>> round(float(relative), 9), tables.valid_for.tolist()
+    (1.0, [0.5, 0.25])
+
+    The tables serve further steps until the size or the ratio changes.
+
+    >>> for size, ratio in ((0.5, 0.25), (0.5, 0.5), (0.25, 0.5)):
+    ...     _ = plain(state, setting, tables, _Attempt(size, 1.0, 3.0, ratio, 2.0 * ratio / size))
+    ...     print(tabulated, problem.symbol[0])
+    [0.5] 10.0
+    [0.5] 12.0
+    [0.5, 0.25] 24.0
     """
     grid, problem = setting.grid, tables.problem
     stiffness, entry, symbol = grid.stiffness, grid.entry, problem.symbol
@@ -167,6 +244,31 @@ def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) 
 
     Weakening is a fraction of tau_p - tau_r. Creep at the residual
     strength counts if it is fast.
+
+    Node 0 loses 2 Pa out of 8 Pa. Node 1 loses 1 Pa out of 1 Pa, but a drop
+    below a tenth of the scale counts as 5 Pa. Nodes 2 and 3 are at the
+    residual strength, and slip by 0.3 and 0.4 residual slips. The step and Z
+    count slip above 0.5 m as fast.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> strength = {"node_strength": lambda setting, i, slip: (6.0, 2.0, 1.0, 1.0)[i] - 2.0 * slip}
+    >>> plain = FunctionType(_effect.py_func.__code__, globals() | strength)
+    >>> diagnostics = np.zeros(1, DIAGNOSTICS).view(np.recarray)
+    >>> diagnostics[0].run.scale = 50.0
+    >>> peak, residual = np.array([10.0, 2.0, 5.0, 5.0]), np.array([2.0, 1.0, 1.0, 1.0])
+    >>> residual_slip = np.array([2.0, 2.0, 1.0, 2.0])
+    >>> nodes = SimpleNamespace(peak=peak, residual=residual, residual_slip=residual_slip)
+    >>> setting = SimpleNamespace(nodes=nodes, grid=SimpleNamespace(impedance=2.0))
+    >>> setting.thresholds = SimpleNamespace(period_nodes=5)
+    >>> slip, past = np.array([0.5, 0.5, 1.0, 3.0]), np.array([0.0, 0.0, 0.0, 2.0])
+    >>> state = SimpleNamespace(slip=slip, past=past, diagnostics=diagnostics)
+    >>> attempt = _Attempt(2.0, 0.0, 0.0, 0.5, 0.0)
+    >>> for u in ([1.0, 0.0, 0.3, 0.0], [0.0, 0.5, 0.5, 0.0], [0.0, 0.5, 0.0, 0.8]):
+    ...     print(*np.round(plain(state, setting, np.array(u), attempt), 6).tolist())
+    0.25 1.3 0.39
+    0.2 1.0 0.3
+    0.4 1.3 0.15
     """
     nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio
@@ -189,7 +291,30 @@ def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) 
 def _accelerates(
     now: Any, thresholds: Thresholds, attempt: _Attempt, largest: float, radiated: float
 ) -> Any:
-    """Step 4: return whether the interface accelerates too much for an accurate load at onset."""
+    """Step 4: return whether the interface accelerates too much for an accurate load at onset.
+
+    A step matters if the load rises by 0.5 Pa at this scale. Radiation up to
+    0.1 Pa is not noticed, and may grow to 1.3 times 0.2 Pa.
+
+    >>> from types import SimpleNamespace
+    >>> now = SimpleNamespace(
+    ...     step=SimpleNamespace(load=7.0), run=SimpleNamespace(scale=1e6),
+    ...     stepping=SimpleNamespace(previous_radiated=0.2),
+    ... )
+    >>> thresholds = SimpleNamespace(smallest_step=0.1, slip_step=0.02)
+    >>> def accelerates(radiated=0.27, load=7.6, size=0.2, largest=0.0, ratio=0.5):
+    ...     attempt = _Attempt(size, 0.0, load, ratio, 0.0)
+    ...     return bool(_accelerates.py_func(now, thresholds, attempt, largest, radiated))
+    >>> accelerates(), accelerates(load=6.4), accelerates(size=0.19, largest=0.0021)
+    (True, True, True)
+    >>> accelerates(radiated=0.25), accelerates(load=7.4), accelerates(ratio=0.0)
+    (False, False, False)
+    >>> accelerates(size=0.19, largest=0.0019)
+    False
+    >>> now.stepping.previous_radiated = 0.0
+    >>> accelerates(radiated=0.14), accelerates(radiated=0.12)
+    (True, False)
+    """
     # A step that hardly raises the load cannot misplace the onset.
     matters = abs(attempt.load - now.step.load) > _FREE_LOAD_RISE * now.run.scale
     noticed = _NOTICED_RADIATION * now.run.scale
@@ -209,6 +334,51 @@ def _accept(
     """Step 5: take the step in place.
 
     Write the strength after it, and return the work, J/m.
+
+    The steps of node 0 are 0.4 m in 0.5 s, after 0.2 m/s: its rate is 1.5 *
+    0.8 - 0.5 * 0.2 m/s. (The function runs without compilation, with
+    transforms by numpy.)
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> from stiction.methods.dynamics.state import DIAGNOSTICS
+    >>> def forward(transform, field, spectrum):
+    ...     spectrum[:] = np.fft.rfft(field)
+    >>> def backward(transform, spectrum, field):
+    ...     field[:] = np.fft.irfft(spectrum, field.size)
+    >>> names = {"forward": forward, "backward": backward}
+    >>> names["advance_with_ramp"] = lambda *arguments: None
+    >>> names["node_strength"] = lambda setting, i, slip: 9.0 + i - 2.0 * slip
+    >>> plain = FunctionType(_accept.py_func.__code__, globals() | names)
+    >>> stiffness, entry = np.array([[0.0, 2.0, 5.0], [0.0, 1.0, 3.0]]), np.array([0, 0, 1])
+    >>> grid = SimpleNamespace(transform=None, stiffness=stiffness, entry=entry)
+    >>> grid.impedance, grid.cell = 4.0, 0.25
+    >>> u, past = np.array([0.4, 0.0, 0.0, 0.0]), np.array([0.2, 0.6, 0.0, 0.0])
+    >>> tables = SimpleNamespace(
+    ...     problem=SimpleNamespace(increment=u, work=np.zeros(3, complex)), transfer=np.zeros(4),
+    ...     slip_rate_hat=np.zeros(3, complex), slope_hat=np.zeros(3, complex),
+    ...     strength=np.zeros(4), response=np.array([0.1, 0.2]),
+    ...     ramp_response=np.array([0.05, -0.1]), memory_sum=np.array([0.0, 0.2, 0.3]),
+    ...     past_hat=np.fft.rfft(past),
+    ... )
+    >>> state = SimpleNamespace(
+    ...     slip_hat=np.array([0.0, 0.5, -1.0], complex), memory=None,
+    ...     slip=np.array([1.0, 2.0, 0.0, 0.0]), slip_rate=np.zeros(4), past=past.copy(),
+    ...     stress=np.zeros(4), diagnostics=np.zeros(1, DIAGNOSTICS).view(np.recarray),
+    ... )
+    >>> state.diagnostics[0].step.load = 1.0
+    >>> nodes = SimpleNamespace(profile=np.array([1.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
+    >>> setting = SimpleNamespace(grid=grid, nodes=nodes)
+    >>> work = plain(state, setting, tables, _Attempt(0.5, 1.0, 3.0, 0.5, 2.0))
+    >>> print(f"{work:.6f}", state.slip.tolist(), state.slip_rate.round(9).tolist())  # 0.4 * 2.5/4
+    0.250000 [1.4, 2.0, 0.0, 0.0] [1.1, 0.0, 0.0, 0.0]
+    >>> state.past.tolist(), tables.strength[:2].round(9).tolist()
+    ([0.8, 0.0, 0.0, 0.0], [6.2, 6.0])
+    >>> V, a = np.fft.rfft(u / 0.5), 2.0 * np.fft.rfft(u / 0.5 - past)
+    >>> memory = tables.memory_sum + tables.response[entry] * V + tables.ramp_response[entry] * a
+    >>> hat = stiffness[1] * memory - stiffness[0] * (np.array([0.0, 0.5, -1.0]) + np.fft.rfft(u))
+    >>> stress = np.fft.irfft(hat, 4) + 3.0 * nodes.profile + 0.5 - 4.0 * state.slip_rate
+    >>> np.allclose(state.stress, stress), np.allclose(state.slip_hat, [0.4, 0.9, -0.6])
+    (True, True)
     """
     size, ratio, rise, load = attempt.size, attempt.ratio, attempt.rise, attempt.load
     grid, u = setting.grid, tables.problem.increment
@@ -244,7 +414,18 @@ def _accept(
 
 @jit_inside
 def _next_size(asked: float, size: float, largest: float, growing: bool) -> Any:
-    """Step 6: return the next size, at which a step weakens nodes by `asked`."""
+    """Step 6: return the next size, at which a step weakens nodes by `asked`.
+
+    A step that weakens too much is followed by a smaller size. Small effects
+    allow a larger size, unless the slip rate grows.
+
+    >>> following = _next_size.py_func
+    >>> sizes = [following(0.02, 1.0, most, False) for most in (0.021, 0.019, 0.013, 0.004)]
+    >>> [round(float(size), 4) for size in sizes]
+    [0.7071, 1.0, 1.4142, 2.0]
+    >>> following(0.02, 1.0, 0.004, True), following(0.02, 9e19, 0.004, False)
+    (1.0, 1e+20)
+    """
     root = np.sqrt(2.0)
     if largest > asked:
         return size / root
