@@ -197,7 +197,7 @@ def _calm(now: Any, thresholds: Thresholds, step: float, impedance: float, rise:
     >>> now.run.scale, now.stepping.calm_slip_rate = 1e4, 9.6
     >>> for top, weakened in ((0.79, 0), (19.0, 4), (0.81, 4), (40.0, 4), (51.0, 4), (90.0, 5)):
     ...     now.step.top_slip_rate, now.step.weakened_nodes = top, weakened
-    ...     calm = _calm.py_func(now, thresholds, 1.0, 2.0, 3.0)
+    ...     calm = _calm.py_func(now, thresholds, 0.5, 2.0, 1.5)
     ...     print(bool(calm), now.stepping.calm_steps, now.stepping.calm_slip_rate)
     False 1 9.6
     True 2 9.6
@@ -234,7 +234,7 @@ def explicit_steps(
 
     >>> from types import FunctionType, SimpleNamespace
     >>> from stiction.methods.dynamics.state import DIAGNOSTICS, PiecewiseLinear
-    >>> def taken(falls, calm, total=4.0, instabilities=0, weakened=0, **changed):
+    >>> def taken(falls, calm, total=4.0, instabilities=0, weakened=0, open=1, **changed):
     ...     def forward(transform, field, spectrum):
     ...         spectrum[:] = np.fft.rfft(field)
     ...     def finish_step(state, setting, done, record, row):
@@ -248,7 +248,7 @@ def explicit_steps(
     ...     names["_calm"] = lambda *arguments: calm[len(kept) - 1]
     ...     kept, diagnostics = [], np.zeros(1, DIAGNOSTICS).view(np.recarray)
     ...     now = diagnostics[0]
-    ...     now.run.scale, now.event.open, now.results.instabilities = 1e4, 1, instabilities
+    ...     now.run.scale, now.event.open, now.results.instabilities = 1e4, open, instabilities
     ...     now.step.weakened_nodes, now.step.time, now.step.load = weakened, 1.0, 2.0
     ...     options = {"slid_stop": True, "held": False, "event_stop": False, "rest_stop": False}
     ...     options |= {"breakable": 2, "period_nodes": 8, "explicit_only": False} | changed
@@ -282,10 +282,12 @@ def explicit_steps(
     A calm interface ends the run or goes on with implicit steps.
 
     >>> calm = [False, True, False]
-    >>> for changed in ({}, {"rest_stop": True}, {"rest_stop": True, "instabilities": 1}):
+    >>> rest = {"rest_stop": True}
+    >>> for changed in ({}, {"open": 0}, rest, rest | {"instabilities": 1}):
     ...     count, reason, *_, now = taken([0.0, 0.0, 0.0], calm, **changed)
     ...     print(count, reason, now.event.calm)
     2 TO_IMPLICIT 1
+    2 TO_IMPLICIT 0
     2 TO_IMPLICIT 1
     2 AT_REST 1
     >>> for changed in ({}, {"held": True}, {"slid_stop": False, "explicit_only": True}):

@@ -175,7 +175,7 @@ def _assemble(
     ...     slip_rate=np.array([0.0, 0.1, 0.0, 0.2]), diagnostics=np.zeros(1, DIAGNOSTICS),
     ... )
     >>> state.diagnostics = state.diagnostics.view(np.recarray)
-    >>> nodes = SimpleNamespace(profile=np.array([1.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
+    >>> nodes = SimpleNamespace(profile=np.array([99.0, 2.0, 1.0, 1.0]), initial=np.full(4, 0.5))
     >>> nodes.peak, setting = np.array([np.inf, 9.0, 9.0, 9.0]), SimpleNamespace(grid=grid)
     >>> setting.nodes = nodes
     >>> accuracy = plain(state, setting, tables, _Attempt(0.5, 1.0, 3.0, 0.25, 1.0))
@@ -247,7 +247,8 @@ def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) 
 
     Node 0 loses 2 Pa out of 8 Pa. Node 1 loses 1 Pa out of 1 Pa, but a drop
     below a tenth of the scale counts as 5 Pa. Nodes 2 and 3 are at the
-    residual strength, and slip by 0.3 and 0.4 residual slips. The step and Z
+    residual strength, and slip by 0.3 and 0.4 residual slips. Node 4 never
+    weakens. The step and Z
     count slip above 0.5 m as fast.
 
     >>> from types import FunctionType, SimpleNamespace
@@ -256,19 +257,19 @@ def _effect(state: RuptureState, setting: Setting, u: Array, attempt: _Attempt) 
     >>> plain = FunctionType(_effect.py_func.__code__, globals() | strength)
     >>> diagnostics = np.zeros(1, DIAGNOSTICS).view(np.recarray)
     >>> diagnostics[0].run.scale = 50.0
-    >>> peak, residual = np.array([10.0, 2.0, 5.0, 5.0]), np.array([2.0, 1.0, 1.0, 1.0])
-    >>> residual_slip = np.array([2.0, 2.0, 1.0, 2.0])
+    >>> peak, residual = np.array([10.0, 2.0, 5.0, 5.0, 1.0]), np.array([2.0, 1.0, 1.0, 1.0, 1.0])
+    >>> residual_slip = np.array([2.0, 2.0, 1.0, 2.0, 0.0])
     >>> nodes = SimpleNamespace(peak=peak, residual=residual, residual_slip=residual_slip)
     >>> setting = SimpleNamespace(nodes=nodes, grid=SimpleNamespace(impedance=2.0))
     >>> setting.thresholds = SimpleNamespace(period_nodes=5)
-    >>> slip, past = np.array([0.5, 0.5, 1.0, 3.0]), np.array([0.0, 0.0, 0.0, 2.0])
+    >>> slip, past = np.array([0.5, 0.5, 1.0, 3.0, 1.0]), np.array([0.0, 0.0, 0.0, 2.0, 0.0])
     >>> state = SimpleNamespace(slip=slip, past=past, diagnostics=diagnostics)
     >>> attempt = _Attempt(2.0, 0.0, 0.0, 0.5, 0.0)
-    >>> for u in ([1.0, 0.0, 0.3, 0.0], [0.0, 0.5, 0.5, 0.0], [0.0, 0.5, 0.0, 0.8]):
+    >>> for u in ([1, 0, 0.3, 0, 0], [0, 0.5, 0.5, 0, 0], [0, 0.5, 0, 0.8, 0.9]):
     ...     print(*np.round(plain(state, setting, np.array(u), attempt), 6).tolist())
     0.25 1.3 0.39
     0.2 1.0 0.3
-    0.4 1.3 0.15
+    0.4 2.2 0.42
     """
     nodes, slip, past = setting.nodes, state.slip, state.past
     residual_slip, size, ratio = nodes.residual_slip, attempt.size, attempt.ratio

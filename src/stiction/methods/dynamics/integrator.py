@@ -77,7 +77,22 @@ class Run:
     events: list[NDArray[Any]] = dataclasses.field(default_factory=list)
 
     def elastic_stress(self, slip_hat: NDArray[np.complex128], load: float) -> Floats:
-        """Return the stress (Pa) on an interface at rest with a given slip and load."""
+        """Return the stress (Pa) on an interface at rest with a given slip and load.
+
+        A wave of slip with the amplitude 3 and the stiffness 2 takes off 6 Pa
+        where it is largest. (The examples of `Run` replace the parts of a run
+        that a method does not read.)
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.interface import Interface
+        >>> medium = SimpleNamespace(interface=Interface(0.8, 8))
+        >>> medium.grid = SimpleNamespace(stiffness=np.array([[0.0, 1.0, 2.0, 5.0, 7.0]]))
+        >>> nodes = SimpleNamespace(profile=np.linspace(1.0, 8.0, 8), initial=np.full(8, -1.0))
+        >>> run = Run(medium, SimpleNamespace(nodes=nodes), "sliding", 1.0, 0.0)
+        >>> slip_hat = np.fft.rfft(3.0 * np.cos(np.pi / 2.0 * np.arange(8)))
+        >>> run.elastic_stress(slip_hat, 10.0)[:4].round(9).tolist()
+        [3.0, 19.0, 35.0, 39.0]
+        """
         grid, nodes = self.medium.grid, self.setting.nodes
         interface = self.medium.interface
         stress_hat = (-grid.stiffness[0] * slip_hat).reshape(interface.wavenumbers.shape)
@@ -85,28 +100,78 @@ class Run:
         return elastic + load * nodes.profile + nodes.initial
 
     def mean(self, field: Floats) -> float:
-        """Return the mean of a flat field over the nodes that can break."""
+        """Return the mean of a flat field over the nodes that can break.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.interface import Interface
+        >>> medium = SimpleNamespace(interface=Interface(0.8, 8, extent=(0.2, 0.4)))
+        >>> Run(medium, None, "sliding", 1.0, 0.0).mean(np.arange(8.0) ** 2)  # (4 + 9 + 16)/3
+        9.666666666666666
+        """
         interface = self.medium.interface
         return float(interface.mean(field.reshape(interface.shape)))
 
     def strength_after(self, slip: Floats) -> Floats:
-        """Return the strength after a slip (m), Pa."""
+        """Return the strength after a slip (m), Pa.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.problem.friction.parameters import Linear
+        >>> fields = {"peak": [5.0, 7.0], "residual": [1.0, 2.0], "weakening_rate": [2.0, 3.0]}
+        >>> nodes = SimpleNamespace(**{name: np.array(values) for name, values in fields.items()})
+        >>> run = Run(None, SimpleNamespace(nodes=nodes, law=Linear()), "sliding", 1.0, 0.0)
+        >>> run.strength_after(np.array([1.5, 2.0])).tolist()
+        [2.0, 2.0]
+        """
         nodes, law = self.setting.nodes, self.setting.law
         peak, residual, W = nodes.peak, nodes.residual, nodes.weakening_rate
         return strengths(law, peak, residual, W, slip)
 
     def scale_at(self, load: float) -> float:
-        """Return the stress scale, Pa, at a load, or at `least_load` if it is larger."""
+        """Return the stress scale, Pa, at a load, or at `least_load` if it is larger.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.dynamics.state import PiecewiseLinear
+        >>> scale = PiecewiseLinear(np.array([0.0, 10.0]), np.array([0.0, 20.0]))
+        >>> run = Run(None, SimpleNamespace(scale=scale), "sliding", 1.0, least_load=3.0)
+        >>> run.scale_at(1.0), run.scale_at(5.0)
+        (6.0, 10.0)
+        """
         return float(value_at(self.setting.scale, max(load, self.least_load)))
 
     @property
     def first_load(self) -> float:
-        """Load at which the first node reaches its strength, before any slip, Pa."""
+        """Load at which the first node reaches its strength, before any slip, Pa.
+
+        >>> from types import SimpleNamespace
+        >>> peak, initial, profile = np.array([[5.0, 9.0, 4.0], [1.0, 0.5, 2.0], [1.0, 5.0, 0.5]])
+        >>> nodes = SimpleNamespace(peak=peak, initial=initial, profile=profile)
+        >>> Run(None, SimpleNamespace(nodes=nodes), "sliding", 1.0, 0.0).first_load
+        1.7
+        """
         nodes = self.setting.nodes
         return float(np.min((nodes.peak - nodes.initial) / nodes.profile))
 
     def first_slip(self) -> float | None:
-        """Return the time, s, at which the first node reaches its strength, if it ever does."""
+        """Return the time, s, at which the first node reaches its strength, if it ever does.
+
+        The load rises to 3 Pa, falls to 2 Pa, and rises by 2 Pa/s. The last piece
+        continues. A load that falls at last never reaches 4 Pa.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.dynamics.state import PiecewiseLinear
+        >>> times, values = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.5, 3.0, 2.0, 6.0])
+        >>> for first_load, pieces in ((0.4, 4), (2.5, 4), (3.5, 4), (8.0, 4), (4.0, 3)):
+        ...     one = np.ones(1)
+        ...     nodes = SimpleNamespace(peak=first_load * one, initial=0.0 * one, profile=one)
+        ...     load = PiecewiseLinear(times[:pieces], values[:pieces])
+        ...     setting = SimpleNamespace(nodes=nodes, load=load)
+        ...     print(Run(None, setting, "time", 1.0, 0.0).first_slip())
+        0.0
+        0.8
+        2.75
+        5.0
+        None
+        """
         (times, values), target = self.setting.load, self.first_load
         if values[0] >= target:
             return 0.0
@@ -116,7 +181,15 @@ class Run:
         return float(times[last - 1] + missing / slope) if slope > 0.0 else None
 
     def slope(self, time: float) -> float:
-        """Return the absolute loading rate just after a time, Pa/s."""
+        """Return the absolute loading rate just after a time, Pa/s.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.dynamics.state import PiecewiseLinear
+        >>> load = PiecewiseLinear(np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.5, 3.0, 2.0, 6.0]))
+        >>> run = Run(None, SimpleNamespace(load=load), "time", 1.0, 0.0)
+        >>> [run.slope(time) for time in (0.0, 0.9, 1.0, 2.0, 9.0)]
+        [2.5, 2.5, 1.0, 2.0, 2.0]
+        """
         times, values = self.setting.load
         i = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, times.size - 2))
         return float(abs(values[i + 1] - values[i]) / (times[i + 1] - times[i]))
@@ -126,6 +199,54 @@ class Run:
 
         The memory is empty. If any stress exceeds the strength by more than round-off,
         explicit steps come first.
+
+        At 1 s the load is 4 Pa, and the strength of node 1 is 3.5 Pa. With Z = 2 it
+        slips at 0.25 m/s, and radiates 0.5 Pa. At zero load, its stress and
+        strength have the sum 3 Pa.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.dynamics.state import PiecewiseLinear
+        >>> from stiction.problem.friction.parameters import Linear
+        >>> from stiction.problem.interface import Interface
+        >>> grid = SimpleNamespace(frequency=np.ones(4), multiplicity=1, poles=np.zeros(2))
+        >>> grid.stiffness = np.array([[0.0, 1.0, 2.0, 5.0, 7.0]])
+        >>> medium = SimpleNamespace(interface=Interface(0.8, 8), impedance=2.0, grid=grid)
+        >>> peak = np.array([5.0, 3.5, 6.0, 7.0, 4.0, 9.0, 9.0, 9.0])
+        >>> nodes = SimpleNamespace(peak=peak, residual=0.2 * peak, weakening_rate=np.full(8, 2.0))
+        >>> nodes.residual_slip, nodes.profile, nodes.initial = 0.4 * peak, np.ones(8), np.zeros(8)
+        >>> history = PiecewiseLinear(np.array([0.0, 2.0]), np.array([0.0, 8.0]))
+        >>> options = {"held": False, "period_nodes": 8, "front_share": 0.5, "smallest_step": 1e-6}
+        >>> thresholds = SimpleNamespace(**options, load_step=1e-3, explicit_only=False)
+        >>> setting = SimpleNamespace(nodes=nodes, load=history, scale=history)
+        >>> setting.thresholds = thresholds
+        >>> setting.law, setting.mean_initial, setting.mean_profile = Linear(), 0.0, 1.0
+        >>> run = Run(medium, setting, "sliding", 1.0, 0.0)
+        >>> state = run.start(1.0)
+        >>> state.slip_rate[:2].tolist(), state.stress[[0, 1, 4]].tolist(), state.explicit
+        ([0.0, 0.25], [4.0, 3.5, 4.0], True)
+        >>> step, maximum, of_run = (state.now[name] for name in ("step", "maximum", "run"))
+        >>> [float(step[name]) for name in ("time", "load", "whole_stress", "mean_stress")]
+        [1.0, 4.0, 3.9375, 3.9375]
+        >>> [float(maximum[name]) for name in ("time", "stress", "breakable", "strength")]
+        [1.0, 4.0, 4.0, 0.0625]
+        >>> int(step["top_node"]), int(maximum["node"]), float(step["top_slip_rate"])
+        (1, 1, 0.25)
+        >>> [float(of_run[name]) for name in ("scale", "reverse_margin", "reverse_node")]
+        [16.0, 3.0, 1.0]
+
+        With this slip, nodes 2 and 3 are at and beyond their residual strengths,
+        and a front has arrived at node 0 too. The first step lets the load rise
+        by a tenth of `load_step`.
+
+        >>> peak += 20.0
+        >>> nodes.residual_slip[:] = 0.4
+        >>> state = run.start(1.0, np.array([0.2, 0.1, 0.4, 0.9, 0.0, 0.0, 0.0, 0.0]))
+        >>> np.isfinite(state.arrival).tolist(), int(state.now["step"]["weakened_nodes"])
+        ([True, False, True, True, False, False, False, False], 2)
+        >>> [round(float(state.now["step"][name]), 9) for name in ("strength_change", "mean_slip")]
+        [-0.4, 0.2]
+        >>> state.explicit, round(float(state.now["stepping"]["next_size"]), 9)
+        (False, 0.0004)
         """
         interface, impedance = self.medium.interface, self.medium.impedance
         setting, nodes, thresholds = self.setting, self.setting.nodes, self.setting.thresholds
@@ -182,12 +303,40 @@ class Run:
         )  # fmt: skip
 
     def ended(self, state: RuptureState) -> bool:
-        """Return whether the end time is reached, apart from round-off after many steps."""
+        """Return whether the end time is reached, apart from round-off after many steps.
+
+        >>> from types import SimpleNamespace
+        >>> setting = SimpleNamespace(thresholds=SimpleNamespace(end_time=5.0))
+        >>> run = Run(SimpleNamespace(step=0.1), setting, "time", 1.0, 0.0)
+        >>> times = (4.9, 5.0 - 2e-7, 5.0 - 5e-8, 5.1)
+        >>> [run.ended(SimpleNamespace(now={"step": {"time": time}})) for time in times]
+        [False, False, True, True]
+        """
         remaining = self.setting.thresholds.end_time - state.now["step"]["time"]
         return bool(remaining <= 1e-6 * self.medium.step)
 
     def ending(self, state: RuptureState, reason: int) -> str | None:
-        """Return the reason why a run ends in its present state, or `None` if it goes on."""
+        """Return the reason why a run ends in its present state, or `None` if it goes on.
+
+        >>> from types import SimpleNamespace
+        >>> from stiction.methods.dynamics.state import PiecewiseLinear
+        >>> history = PiecewiseLinear(np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 3.0]))
+        >>> thresholds = SimpleNamespace(held=False, end_time=9.0)
+        >>> setting = SimpleNamespace(load=history, thresholds=thresholds)
+        >>> medium = SimpleNamespace(step=0.1)
+        >>> run, medium.impedance = Run(medium, setting, "sliding", 1.0, 0.0), 2.0
+        >>> def ending(reason=Reason.DONE, time=3.0, rate=4e-9, explicit=False):
+        ...     state = SimpleNamespace(slip_rate=np.array([rate, 0.0]), explicit=explicit)
+        ...     state.now = {"step": {"time": time}, "run": {"scale": 10.0}}
+        ...     return run.ending(state, reason)
+        >>> [ending(reason) for reason in (Reason.ALL_SLID, Reason.DROPPED, Reason.AT_REST)]
+        ['sliding', 'onset', 'rest']
+        >>> ending(), ending(time=9.0), ending(time=1.9), ending(rate=6e-9), ending(explicit=True)
+        ('rest', 'time', None, None, None)
+        >>> run.stop, thresholds.held = "time", True
+        >>> ending(), ending(Reason.ALL_SLID)
+        (None, 'rest')
+        """
         if reason == Reason.ALL_SLID and self.setting.thresholds.held:
             return "rest"
         if reason in _ENDINGS:
@@ -208,6 +357,22 @@ class Run:
 
         The ending is `None` if the run has not ended. The reason is
         then NOT_FINITE or DONE.
+
+        At most 1000 steps lie between two checks.
+
+        >>> class Scripted(Run):
+        ...     def take_steps(self, state, count):
+        ...         counts.append(count)
+        ...         state.now["stepping"]["implicit_steps"] += count
+        ...         return count, Reason.NOT_FINITE if state.steps >= 3600 else Reason.DONE
+        ...     def ending(self, state, reason):
+        ...         return "sliding" if 2500 <= state.steps < 3000 else None
+        >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
+        >>> run, counts = Scripted(None, None, "sliding", 1.0, 0.0), []
+        >>> run.run_to_end(state, 1500), counts
+        ((None, <Reason.DONE: 0>), [1000, 500])
+        >>> run.run_to_end(state, 9000), run.run_to_end(state, 9000)[0], counts
+        (('sliding', <Reason.DONE: 0>), None, [1000, 500, 1000, 1000, 1000])
         """
         ending, reason = None, int(Reason.DONE)
         while ending is None and reason != Reason.NOT_FINITE and state.steps < max_steps:
@@ -224,6 +389,35 @@ class Run:
         The reason is DONE after `count` steps or at the end time,
         otherwise ALL_SLID, DROPPED, AT_REST or NOT_FINITE. Each step
         fills a row of `record`.
+
+        The steps are scripted: a number and a reason for each loop. Each change of
+        type is followed by the other loop.
+
+        >>> from types import SimpleNamespace
+        >>> class Scripted(Run):
+        ...     def _implicit(self, state, count, record):
+        ...         state.now["event"]["begun"] = len(script) == 2
+        ...         called.append((state.explicit, count))
+        ...         return script.pop(0)
+        ...     def _to_explicit(self, state):
+        ...         state.now["stepping"]["phase"] = Phase.EXPLICIT
+        ...     def _to_implicit(self, state):
+        ...         state.now["stepping"]["phase"] = Phase.IMPLICIT
+        ...     def _follow_event(self, state, rests):
+        ...         called.append(rests)
+        ...         state.now["event"]["begun"] = state.now["event"]["calm"] = 0
+        ...     _explicit = _implicit
+        >>> thresholds = SimpleNamespace(held=True, end_time=9.0)
+        >>> setting, called = SimpleNamespace(thresholds=thresholds), []
+        >>> run = Scripted(SimpleNamespace(step=0.1), setting, "sliding", 1.0, 0.0)
+        >>> state = RuptureState(*[np.zeros(0)] * 10, np.zeros(1, DIAGNOSTICS))
+        >>> script = [(3, Reason.TO_EXPLICIT), (4, Reason.TO_IMPLICIT), (5, Reason.ALL_SLID)]
+        >>> taken, reason = run.take_steps(state, 20)
+        >>> taken, reason.name, called
+        (12, 'ALL_SLID', [(False, 20), (True, 17), False, (False, 13), True])
+        >>> script, state.now["step"]["time"] = [(2, Reason.DONE), (2, Reason.DONE)], 9.0
+        >>> run.take_steps(state, 20)[0], run.take_steps(state, 2)[0]
+        (2, 2)
         """
         taken = 0
         while taken < count:
@@ -252,6 +446,29 @@ class Run:
         An event ends when its fast slip has settled (`rests`). If the
         next event begins before then, the open event ends where the
         next event begins: at a maximum of the mean stress.
+
+        The next event begins at a maximum, before the fast slip has settled. Then
+        slip comes to rest, which is also the last maximum.
+
+        >>> class Scripted(Run):
+        ...     def _keep_event(self, state, slip, end):
+        ...         kept.append((slip.tolist(), float(end["work"])))
+        >>> state, kept = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS)), []
+        >>> run, now = Scripted(None, None, "sliding", 1.0, 0.0), state.now
+        >>> state.slip[:], state.maximum_slip[:] = (0.5, 0.25), (0.1, 0.2)
+        >>> now["maximum"]["time"], now["maximum"]["work"], now["step"]["work"] = 1.0, 3.0, 7.0
+        >>> now["maximum"]["node"], now["step"]["time"], now["event"]["begun"] = 1, 2.0, 1
+        >>> run._follow_event(state, rests=False)
+        >>> kept, state.event_slip.tolist()
+        ([([0.1, 0.2], 3.0)], [0.1, 0.2])
+        >>> [float(now["event"][name]) for name in ("open", "begun", "time", "work", "node")]
+        [1.0, 0.0, 1.0, 3.0, 1.0]
+        >>> now["maximum"]["time"], now["event"]["calm"], now["event"]["fast"] = 2.0, 1, 1
+        >>> run._follow_event(state, rests=True)
+        >>> kept[1], state.event_slip.tolist(), state.maximum_slip.tolist()
+        (([0.5, 0.25], 7.0), [0.5, 0.25], [0.5, 0.25])
+        >>> [float(now["event"][name]) for name in ("open", "calm", "fast", "time", "work")]
+        [0.0, 0.0, 0.0, 2.0, 7.0]
         """
         now, event = state.now, state.now["event"]
         if rests:
@@ -270,7 +487,39 @@ class Run:
     def _keep_event(
         self, state: RuptureState, slip: Floats, end: Any, settled: bool = True
     ) -> None:
-        """Keep the open event with its slip, load and work at the end, if its slip was fast."""
+        """Keep the open event with its slip, load and work at the end, if its slip was fast.
+
+        >>> from types import SimpleNamespace
+        >>> thresholds = SimpleNamespace(held=False, unstable_slip_rate=5.0)
+        >>> run = Run(None, SimpleNamespace(thresholds=thresholds), "sliding", 1.0, 0.0)
+        >>> state = RuptureState(*np.zeros((10, 2)), np.zeros(1, DIAGNOSTICS))
+        >>> end = np.zeros((), STEP)
+        >>> end["load"], end["work"] = 8.0, 9.0
+        >>> begun, state.slip[:], state.event_slip[:] = state.now["event"], (0.5, 0.25), (0.1, 0.2)
+        >>> begun["open"], begun["fast"], begun["node"], begun["time"] = 1, 1, 1, 1.0
+        >>> begun["fast_since"], begun["fast_until"] = 3.0, 7.0
+        >>> begun["load"], begun["work"] = 2.0, 4.0
+        >>> state.now["step"]["top_slip_rate"] = 0.6
+        >>> run._keep_event(state, state.slip, end, settled=False)
+        >>> event = run.events[0]
+        >>> event["load"].tolist(), event["work"].tolist(), event["slip"].tolist()
+        ([2.0, 8.0], [4.0, 9.0], [[0.1, 0.2], [0.5, 0.25]])
+        >>> event["time"].item(), event["duration"].item(), run.cut_short
+        (1.0, 4.0, True)
+
+        An interface that slides on ends no event, unless the slip is an earlier
+        one. Without fast slip there is no event.
+
+        >>> state.now["results"]["all_broken"] = 1
+        >>> run._keep_event(state, state.slip, end), run._keep_event(state, state.slip.copy(), end)
+        (None, None)
+        >>> state.now["step"]["top_slip_rate"] = 0.4
+        >>> run._keep_event(state, state.slip, end)
+        >>> begun["fast"] = 0
+        >>> run._keep_event(state, state.slip, end)
+        >>> len(run.events), run.cut_short
+        (3, False)
+        """
         now, thresholds = state.now, self.setting.thresholds
         # A sliding interface never comes to rest.
         slides = now["results"]["all_broken"] and not thresholds.held and slip is state.slip
@@ -296,6 +545,21 @@ class Run:
         return bool(self.events) and not self.events[-1]["settled"]
 
     def _explicit(self, state: RuptureState, count: int, record: StepRecord) -> tuple[int, int]:
+        """At most 3 steps of 0.1 s are left, and at least one is taken.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"explicit_steps": lambda count, *others: (count, Reason.DONE)}
+        >>> plain = FunctionType(Run._explicit.__code__, names)
+        >>> run = SimpleNamespace(medium=SimpleNamespace(step=0.1), _explicit_tables=lambda: None)
+        >>> run.setting = SimpleNamespace(thresholds=SimpleNamespace(end_time=1.0))
+        >>> for time in (0.0, 0.72, 0.7 + 1e-9, 1.0):
+        ...     state = SimpleNamespace(now={"step": {"time": time}})
+        ...     print(plain(run, state, 5, None)[0])
+        5
+        3
+        3
+        1
+        """
         medium, tables = self.medium, self._explicit_tables()
         remaining = self.setting.thresholds.end_time - state.now["step"]["time"]
         if remaining < count * medium.step:
@@ -323,7 +587,23 @@ class Run:
         stepping["calm_steps"], stepping["calm_slip_rate"] = 0, state.slip_rate.max()
 
     def _to_implicit(self, state: RuptureState) -> None:
-        """Phase 3: let implicit steps take over."""
+        """Phase 3: let implicit steps take over.
+
+        >>> from types import FunctionType, SimpleNamespace
+        >>> names = globals() | {"to_implicit": lambda *arguments: None}
+        >>> plain = FunctionType(Run._to_implicit.__code__, names)
+        >>> thresholds = SimpleNamespace(smallest_step=0.3, period_nodes=4)
+        >>> run = SimpleNamespace(medium=SimpleNamespace(grid=None, step=0.1, impedance=2.0))
+        >>> run.setting = SimpleNamespace(thresholds=thresholds)
+        >>> state = RuptureState(*np.zeros((10, 3)), np.ones(1, DIAGNOSTICS))
+        >>> state.slip_rate[:] = 1.0, 2.0, 5.0
+        >>> plain(run, state)
+        >>> stepping = state.now["stepping"]
+        >>> state.past.tolist(), *map(float, stepping[["next_size", "previous_radiated"]])
+        ([1.0, 2.0, 5.0], 0.6, 4.0)
+        >>> int(stepping["two_step"])
+        0
+        """
         to_implicit(self.medium.grid, state, self.medium.step)
         stepping, thresholds = state.now["stepping"], self.setting.thresholds
         state.past[:] = state.slip_rate
