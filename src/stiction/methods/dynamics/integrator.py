@@ -214,7 +214,7 @@ class Run:
         >>> peak = np.array([5.0, 3.5, 6.0, 7.0, 4.0, 9.0, 9.0, 9.0])
         >>> nodes = SimpleNamespace(peak=peak, residual=0.2 * peak, weakening_rate=np.full(8, 2.0))
         >>> nodes.residual_slip, nodes.profile, nodes.initial = 0.4 * peak, np.ones(8), np.zeros(8)
-        >>> history = PiecewiseLinear(np.array([0.0, 2.0]), np.array([0.0, 8.0]))
+        >>> history = PiecewiseLinear(np.array([0.0, 0.5, 2.0]), np.array([0.0, 2.0, 8.0]))
         >>> options = {"held": False, "period_nodes": 8, "front_share": 0.5, "smallest_step": 1e-6}
         >>> thresholds = SimpleNamespace(**options, load_step=1e-3, explicit_only=False)
         >>> setting = SimpleNamespace(nodes=nodes, load=history, scale=history)

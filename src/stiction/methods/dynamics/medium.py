@@ -69,6 +69,17 @@ def prepare_medium(problem: Problem, tolerance: float, courant: float) -> Medium
     """Return the tables for a problem, or raise an `InputError` if no step is stable.
 
     The error names the solid or the tolerance of the memory kernel.
+
+    The error names the solid in mode II.
+
+    >>> import dataclasses, stiction as st
+    >>> problem = st.paper.problem(nodes=256, plane="strain")
+    >>> solid = dataclasses.replace(problem.solid, poisson_ratio=0.495)
+    >>> problem = dataclasses.replace(problem, solid=solid)
+    >>> prepare_medium(problem, 1e-2, 0.5)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: solid.poisson_ratio: elastodynamics in mode II needs nu <= ...
     """
     solid, interface, mode = problem.solid, problem.interface, problem.mode
     if mode == "II" and not SMALLEST_RATIO <= solid.wave_speed_ratio <= LARGEST_RATIO:
@@ -105,6 +116,27 @@ def _grid(problem: Problem, kernels: list[ExponentialSum]) -> Grid:
     On a plane a wave vector has the fraction a = (kx/k)² of mode II and b
     = 1 - a of mode III (P. Geubelle and J. Rice, 1995), in K and in the
     memory (G k/2)[a C_II + b C_III] * V.
+
+    On a line all modes weigh with the single kernel. On a plane there are two
+    kernels, and the first split pairs belong to mode II.
+
+    >>> from types import SimpleNamespace
+    >>> kernels = [ExponentialSum(np.array([p]), np.array([2.0 * p]), 0.0) for p in (1.0, 2.0)]
+    >>> solid = SimpleNamespace(shear_modulus=6.0, shear_wave_speed=1.5)
+    >>> for interface in (Interface(np.pi, 8), Interface((np.pi, 2.0 * np.pi), (8, 8))):
+    ...     symbol = lambda shape: 5.0 * interface.wavenumbers
+    ...     problem = SimpleNamespace(solid=solid, interface=interface)
+    ...     problem.half_spaces = SimpleNamespace(symbol=symbol)
+    ...     grid = _grid(problem, kernels[: 1 + interface.is_plane])
+    ...     print(grid.impedance, round(grid.cell, 6), grid.multiplicity, grid.split, end=" ")
+    ...     print(grid.weights.tolist(), grid.stiffness[:, 1].tolist())
+    ...     print(grid.frequency[:3].tolist(), grid.mode_two[:3].tolist())
+    2.0 0.392699 1 1 [2.0] [10.0, 6.0]
+    [3.0, 6.0, 9.0] [1.0, 1.0, 1.0]
+    2.0 0.308425 2 1 [2.0, 4.0] [5.0, 3.0]
+    [0.0, 1.5, 3.0] [1.0, 0.0, 0.0]
+    >>> grid.frequency.size, grid.stiffness.shape  # kx >= 0: five rows
+    (25, (2, 40))
     """
     solid, interface = problem.solid, problem.interface
     k, share = interface.wavenumbers, interface.in_plane_share
@@ -152,7 +184,28 @@ def largest_step(
 
 
 def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Floats:
-    """Return the matrix of an explicit step for a frictionless mode with kappa = |k| c_s dt."""
+    """Return the matrix of an explicit step for a frictionless mode with kappa = |k| c_s dt.
+
+    Without memory, V* is -K (d + kappa V), the mean rate is (V + V*)/2, and V
+    becomes -K (d + kappa mean).
+
+    >>> nothing = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
+    >>> amplification(0.25, nothing, 2.0)[:2, :2].tolist()
+    [[-0.125, -1.5], [0.0625, 0.75]]
+
+    With s = -1 and w = 1 the memory decays by E = exp(-kappa), and a unit rate
+    adds R = 1 - E to it.
+
+    >>> kernel = ExponentialSum(np.array([-1.0 + 0j]), np.ones(1) + 0j, 0.0)
+    >>> E, K = np.exp(-0.25), 2.0
+    >>> R, columns = 1.0 - E, []
+    >>> for V, d, psi in np.eye(3):
+    ...     mean = 0.5 * (V - K * (d + 0.25 * V) + E * psi + R * V)
+    ...     d = d + 0.25 * mean
+    ...     columns.append([-K * d + E * psi + R * mean, d, E * psi + R * mean])
+    >>> np.allclose(amplification(0.25, kernel, K)[:3, :3], np.transpose(columns))
+    True
+    """
     pairs = kernel.poles.size
     z = kernel.poles * kappa
     decay, gain = np.exp(z), kappa * phi(z)
@@ -170,13 +223,31 @@ def amplification(kappa: float, kernel: ExponentialSum, stiffness: float) -> Flo
 
 
 def _stable(kappa: float, kernel: ExponentialSum, stiffness: float) -> bool:
+    """Return whether no mode grows in an explicit step.
+
+    >>> nothing = ExponentialSum(np.array([-1.0 + 0j]), np.zeros(1) + 0j, 0.0)
+    >>> _stable(0.99, nothing, 2.0), _stable(1.01, nothing, 2.0)
+    (True, False)
+    """
     matrix = amplification(kappa, kernel, stiffness)
     growth = np.abs(np.linalg.eigvals(matrix)).max() - 1.0
     return bool(growth < _MAX_WAVE_GROWTH)
 
 
 def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
-    """Steps 1 and 2: return the largest |k| c_s dt up to which no wave grows."""
+    """Steps 1 and 2: return the largest |k| c_s dt up to which no wave grows.
+
+    Without memory d is multiplied by 1 - x + x²/2 in a step, with x = kappa K,
+    which is at most 1 for x = 2. A growing memory is never stable.
+
+    >>> nothing, growing = (
+    ...     ExponentialSum(np.array([pole + 0j]), np.zeros(1) + 0j, 0.0) for pole in (-1.0, 1.0)
+    ... )
+    >>> print(f"{_largest_kappa(nothing, 2.0):.3f} {_largest_kappa(nothing, 0.8):.3f}")
+    1.000 2.500
+    >>> _largest_kappa(growing, 2.0)
+    0.0
+    """
     # 1. Raise kappa.
     low, high = 0.0, _KAPPA_STEP
     while high < _MAX_KAPPA and _stable(high, kernel, stiffness):
@@ -191,7 +262,14 @@ def _largest_kappa(kernel: ExponentialSum, stiffness: float) -> float:
 
 
 def _mixed(kernels: list[ExponentialSum], share: float) -> ExponentialSum:
-    """Return the kernel for a wave vector on a plane, with the fraction (kx/k)² of mode II."""
+    """Return the kernel for a wave vector on a plane, with the fraction (kx/k)² of mode II.
+
+    >>> kernels = [ExponentialSum(np.array([-1.0]), np.array([8.0]), 0.1)]
+    >>> kernels.append(ExponentialSum(np.array([-2.0, -3.0]), np.array([4.0, 12.0]), 0.3))
+    >>> mixed = _mixed(kernels, 0.25)
+    >>> mixed.poles.tolist(), mixed.weights.tolist(), mixed.error
+    ([-1.0, -2.0, -3.0], [2.0, 3.0, 9.0], 0.3)
+    """
     weights = share * kernels[0].weights, (1.0 - share) * kernels[1].weights
     poles = np.concatenate([kernel.poles for kernel in kernels])
     error = max(kernel.error for kernel in kernels)

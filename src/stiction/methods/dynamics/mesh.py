@@ -104,6 +104,26 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     """Return the mesh for a problem's block.
 
     The step is `courant` times the stability limit.
+
+    >>> import stiction as st
+    >>> blocks = st.Blocks(height=0.03, drive=st.Pusher(height=0.01, width=0.01, side="right"))
+    >>> problem = st.Problem(
+    ...     solid=st.Solid(shear_modulus=1e9, poisson_ratio=0.25, density=1000.0),
+    ...     interface=st.Interface(0.1, 16), friction=st.LinearWeakening(weakening_rate=4e10),
+    ...     specimen=blocks,
+    ... )
+    >>> mesh = make_mesh(problem)
+    >>> print(f"{mesh.mass.sum() / (1000.0 * 0.1 / 16 * 0.03):.6f}")
+    1.000000
+    >>> mesh.push.sum(axis=0).round(6).tolist()
+    [0.0, 1.0]
+    >>> mesh.impedance, round(mesh.attenuation * 25.0 * 0.1 / np.pi, 6), mesh.platen
+    (500000.0, 1000.0, False)
+    >>> bool(mesh.window == np.ceil(2.0 * 0.1 / 1000.0 / mesh.step)), mesh.correction.dtype.name
+    (True, 'float32')
+    >>> thin, c_d = np.diff(mesh.heights).min(), 1000.0 * 3.0**0.5
+    >>> round(make_mesh(problem, 0.45).step / mesh.step, 6), bool(0.0 < mesh.step < 0.9 * thin / c_d)
+    (0.5, True)
     """
     assert problem.specimen is not None
     return _mesh(problem.specimen, problem.interface, problem.solid, problem.mode, courant)
@@ -162,7 +182,17 @@ def _mesh(
 
 
 def row_heights(height: float, spacing: float) -> Array:
-    """Return the heights y of the rows, m. The first two are `spacing` apart."""
+    """Return the heights y of the rows, m. The first two are `spacing` apart.
+
+    The steps 1, 1.08 and 1.08² reach beyond 3 m. All but the first shrink by
+    the same factor.
+
+    >>> row_heights(3.0, 1.0).round(6).tolist(), row_heights(2.0, 1.0).tolist()
+    ([0.0, 1.0, 1.961538, 3.0], [0.0, 1.0, 2.0])
+    >>> steps = np.diff(row_heights(400.0, 1.0))  # at most five times the first
+    >>> print(f"{steps[3] / steps[2]:.6f} {steps[-1] / steps[-2]:.6f} {steps.sum():.6f}")
+    1.080000 1.000000 400.000000
+    """
     numbers = np.arange(int(2.0 * height / spacing) + 2)
     steps = spacing * np.minimum(ROW_RATIO**numbers, MAX_ROW_HEIGHT)
     count = max(int(np.searchsorted(np.cumsum(steps), height * (1.0 - 1e-9))) + 1, 2)
@@ -174,7 +204,32 @@ def row_heights(height: float, spacing: float) -> Array:
 
 
 def _elements(b: Array, a: float, solid: Solid, anti: bool) -> tuple[Array, Array]:
-    """Return the stiffness of elements with heights b, and of the strips at their ends."""
+    """Return the stiffness of elements with heights b, and of the strips at their ends.
+
+    An element with the sides 0.25 and 0.5 has the energies of uniform strains:
+    u_x, v_y, u_y, a rotation, both stretches, and an hourglass mode.
+
+    >>> from types import SimpleNamespace
+    >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)  # c_11 = 6, c_12 = 2
+    >>> a, b, d = 0.25, 0.5, np.zeros((6, 2, 2, 2))  # (case, row, axis, column)
+    >>> d[[0, 4], :, 0, 1], d[[1, 4], 1, 1], d[[2, 3], 1, 0], d[3, :, 1, 1] = a, b, b, -a
+    >>> d[5, :, 0] = [[1.0, -1.0], [-1.0, 1.0]]
+    >>> elements, strips = _elements(np.array([b]), a, solid, False)
+    >>> energy = 0.5 * np.einsum("nrac,racsbd,nsbd->n", d, elements[0], d) / (a * b)
+    >>> energy[:5].round(9).tolist(), round(float(energy[5] * a * b), 6)
+    ([3.0, 3.0, 1.0, 0.0, 8.0], 8.666667)
+    >>> round((6.0 * b / a + 2.0 * a / b) / 24.0 * 4.0**2, 6)
+    8.666667
+    >>> strips.round(6).tolist()  # a/2b times c_11 - c_12²/c_11
+    [[0.0, 1.333333]]
+
+    In mode III there is only u.
+
+    >>> elements, strips = _elements(np.array([b]), a, solid, True)
+    >>> energy = 0.5 * np.einsum("nrac,racsbd,nsbd->n", d, elements[0], d) / (a * b)
+    >>> energy[:5].round(9).tolist(), strips.tolist()
+    ([1.0, 0.0, 1.0, 1.0, 1.0], [[0.5, 0.0]])
+    """
     shear = solid.shear_modulus
     c11 = shear * (1.0 if anti else solid.wave_speed_ratio**2)
     sign, axes = np.array([-1.0, 1.0]), np.eye(2)
@@ -216,6 +271,29 @@ def _stencils(elements: Array, strips: Array) -> Array:
     - at the left end, with a single neighbour, the node itself, and its
       other component. At the right end the other component has the
       opposite sign.
+
+    The rows of minus the stiffness matrix hold the same coefficients.
+
+    >>> from types import SimpleNamespace
+    >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)
+    >>> elements, strips = _elements(np.array([0.5, 0.75]), 0.25, solid, False)
+    >>> mesh = SimpleNamespace(elements=elements, strips=strips)
+    >>> stencils = _stencils(elements, strips)
+    >>> lower, upper = (layer_matrix(mesh, layer, 4).toarray() for layer in (0, 1))
+    >>> K = np.zeros((24, 24))  # u and v at the nodes of three rows
+    >>> K[:16, :16], K[8:, 8:] = lower, K[8:, 8:] + upper
+    >>> K[8:16, 8:16] = lower[8:, 8:] + upper[:8, :8]
+    >>> rows = -K.reshape(3, 2, 4, 3, 2, 4)  # row, axis and node of the force, and of the motion
+    >>> for axis in (0, 1):
+    ...     found = stencils[1, axis]
+    ...     same, other = rows[1, axis][:, :, axis], rows[1, axis][:, :, 1 - axis]
+    ...     print(np.allclose(found[[0, 1, 0]].T, same[1, :, :3], atol=1e-5), end=" ")
+    ...     cross = [-found[2], 0.0 * found[2], found[2]]
+    ...     print(np.allclose(cross, other[1, :, :3].T, atol=1e-5), end=" ")
+    ...     print(np.allclose([found[3], found[0]], same[0, :, :2].T, atol=1e-5), end=" ")
+    ...     print(np.allclose([-found[2], -found[4]], other[3, :, 2:].T, atol=1e-5))
+    True True True True
+    True True True True
     """
     stencils = np.zeros((len(elements) + 1, 2, 5, 3))
     for row, (element, strip) in enumerate(zip(elements, strips, strict=True)):
@@ -234,7 +312,15 @@ def _stencils(elements: Array, strips: Array) -> Array:
 
 
 def _covered(heights: Array, middle: float, width: float) -> Array:
-    """Return each row's fraction of a uniform traction, zero for the interface."""
+    """Return each row's fraction of a uniform traction, zero for the interface.
+
+    The rows have parts from 0 to 0.5, 1.5, 3 and 4 m. A pusher from 0 to 2 m
+    covers the first three, and its force on the interface goes to row 1.
+
+    >>> heights = np.array([0.0, 1.0, 2.0, 4.0])
+    >>> _covered(heights, 1.0, 2.0).tolist(), _covered(heights, 3.5, 2.0).round(6).tolist()
+    ([0.0, 0.75, 0.25, 0.0], [0.0, 0.0, 0.333333, 0.666667])
+    """
     edges = np.concatenate([heights[:1], 0.5 * (heights[1:] + heights[:-1]), heights[-1:]])
     low, high = middle - 0.5 * width, middle + 0.5 * width
     share = np.maximum(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0)
@@ -248,6 +334,23 @@ def _limit(c: float, c_s: float, mesh: Mesh, correction: Array, viscous: float) 
     """Return the largest stable step, s, given the speeds of the fastest waves (c) and shear (c_s).
 
     The step is stable for mesh, viscosity and correction together.
+
+    The fastest element has the squared frequency 4 * 3²/0.25². The stiffest
+    correction adds 2 * 3 * 0.5/0.75. Damping shortens the step.
+
+    >>> from types import SimpleNamespace
+    >>> heights, mass = np.array([0.0, 0.5, 0.75]), np.array([0.75, 9.0, 9.0])
+    >>> mesh = SimpleNamespace(spacing=0.5, heights=heights, mass=mass)
+    >>> frequency = (4.0 * 9.0 / 0.0625 + 4.0) ** 0.5
+    >>> step = _limit(3.0, 2.0, mesh, np.diag([1.0, 3.0, -5.0]), 0.0)
+    >>> print(f"{step * frequency:.6f}")
+    2.000000
+    >>> damped = _limit(3.0, 2.0, mesh, np.diag([1.0, 3.0, -5.0]), 0.02)
+    >>> print(f"{damped / step + 0.01 * frequency - (1.0 + (0.01 * frequency) ** 2) ** 0.5:.6f}")
+    0.000000
+    >>> close = _limit(2.0, 1.9, mesh, np.diag([-1.0, -2.0, -3.0]), 0.0)
+    >>> print(f"{(2.0 / close) ** 2 * 0.0625:.6f} {8.0 / 3.0 * (2.0**2 + 1.9**2):.6f}")
+    20.293333 20.293333
     """
     thin = min(mesh.spacing, float(np.diff(mesh.heights).min()))
     # Bound of the squared frequency of an element, then of the
@@ -263,7 +366,22 @@ def _limit(c: float, c_s: float, mesh: Mesh, correction: Array, viscous: float) 
 
 
 def layer_matrix(mesh: Mesh, layer: int, nodes: int) -> sp.csr_matrix:
-    """Return the stiffness of an element row, for u and v at the lower and then the upper nodes."""
+    """Return the stiffness of an element row, for u and v at the lower and then the upper nodes.
+
+    A stretch along x has the energy of three elements between four columns.
+    A stretch along y also has the energy of two strips.
+
+    >>> from types import SimpleNamespace
+    >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)
+    >>> elements, strips = _elements(np.array([0.7, 0.5]), 0.25, solid, False)
+    >>> K = layer_matrix(SimpleNamespace(elements=elements, strips=strips), 1, 4).toarray()
+    >>> along, up = np.zeros((2, 4, 4))  # (u and v of the lower row, and of the upper row; column)
+    >>> along[[0, 2]], up[3] = 0.25 * np.arange(4), 0.5
+    >>> print(f"{0.5 * along.ravel() @ K @ along.ravel() / (0.25 * 0.5):.6f}")
+    9.000000
+    >>> print(f"{0.5 * up.ravel() @ K @ up.ravel() / (0.25 * 0.5):.6f}")  # 3 * 3 + (6 - 4/6)/2
+    11.666667
+    """
     left, right = np.eye(nodes, nodes - 1), np.eye(nodes, nodes - 1, -1)
     # Neighbouring elements have common nodes. Both matrices select
     # the nodes of a side.
@@ -286,6 +404,24 @@ def condensed(mesh: Mesh, nodes: int) -> tuple[Array, Array, float]:
 
     Motions that are even and odd about the middle of the block are
     independent, which halves the matrices.
+
+    In mode III a dead load shears the block evenly: q is 1, C is G L/H, and a
+    rigid motion has no stiffness.
+
+    >>> from types import SimpleNamespace
+    >>> solid = SimpleNamespace(shear_modulus=2.0, wave_speed_ratio=3.0**0.5)
+    >>> elements, strips = _elements(np.array([0.25, 0.5]), 0.25, solid, True)
+    >>> mesh = SimpleNamespace(
+    ...     spacing=0.25, heights=np.array([0.0, 0.25, 0.75]), elements=elements, strips=strips,
+    ...     anti_plane=True, platen=True, push=np.zeros((3, 2)),
+    ... )
+    >>> static, profile, C = condensed(mesh, 4)
+    >>> profile.round(6).tolist(), round(C * 0.75 / (2.0 * 1.0), 6)
+    ([1.0, 1.0, 1.0, 1.0], 1.0)
+    >>> print(f"{np.abs(static.sum(axis=0)).max():.9f} {np.abs(static - static.T).max():.9f}")
+    0.000000000 0.000000000
+    >>> bool(static.diagonal().min() > 0.0 > static[0, 1])
+    True
     """
     static, force, compliance = np.zeros((nodes, nodes)), np.zeros(nodes), 0.0
     half = np.eye(nodes, nodes // 2)

@@ -147,11 +147,31 @@ def write_scec(
 
 
 def _write_table(path: Path, header: list[str], columns: list[Any], form: str) -> None:
+    """Write columns below the lines of a header.
+
+    >>> import sys
+    >>> columns = [np.array([1.0, 2.0]), np.array([0.5, 7.0])]
+    >>> _write_table(sys.stdout, ["# about", "a b"], columns, "%.1f")
+    # about
+    a b
+    1.0 0.5
+    2.0 7.0
+    """
     np.savetxt(path, np.column_stack(columns), form, header="\n".join(header), comments="")
 
 
 def _file_names(places: list[list[float]], stations: list[str]) -> list[str]:
-    """Return file names with as few decimals as distinguish the places along both axes (m)."""
+    """Return file names with as few decimals as distinguish the places along both axes (m).
+
+    >>> _file_names([[7500.0, 4500.0], [-2000.0, -30.0]], ["a", "b"])
+    ['faultst075dp045.txt', 'faultst-20dp000.txt']
+    >>> _file_names([[7500.0, 4500.0], [7520.0, 4500.0]], ["a", "b"])
+    ['faultst075.0dp045.0.txt', 'faultst075.2dp045.0.txt']
+    >>> _file_names([[7.0, 4.0], [1.0, 4.0], [7.0, 4.0]], ["a", "b", "c"])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    stiction.base.errors.InputError: run: some of the stations a, c share a node, ...
+    """
     for decimals in range(MOST_DECIMALS + 1):
         width = 3 if decimals == 0 else 4 + decimals
         texts = [

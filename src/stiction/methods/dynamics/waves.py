@@ -96,7 +96,16 @@ TOTALS = record(
 
 
 def block_at_rest(mesh: Mesh, slip: Array) -> Waves:
-    """Return a block at rest whose interface has a given slip (m)."""
+    """Return a block at rest whose interface has a given slip (m).
+
+    >>> from types import SimpleNamespace
+    >>> slip = np.array([1.0, 2.0, 5.0])
+    >>> waves = block_at_rest(SimpleNamespace(heights=np.zeros(4)), slip)
+    >>> waves.u.shape, waves.u.dtype.name, waves.slip.tolist(), waves.slip is slip
+    ((4, 3), 'float32', [1.0, 2.0, 5.0], False)
+    >>> waves.arrival.tolist(), float(waves.now["time"]), waves.stress.tolist()
+    ([nan, nan, nan], 0.0, [0.0, 0.0, 0.0])
+    """
     u, v, u_rate, v_rate = np.zeros((4, mesh.heights.size, slip.size), np.float32)
     rate, stress, corrected = np.zeros((3, slip.size))
     arrival, totals = np.full(slip.size, np.nan), np.zeros(1, TOTALS)
@@ -109,6 +118,22 @@ def _force(stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, F
 
     x0, x1 and x2 are the displacements along the axis in the row below,
     the row, and the row above. y0, y1 and y2 are the other components.
+
+    A unit displacement along the axis at node 1 of the row acts with the
+    coefficients 2 and 5. One across the axis acts with 8, and at the ends
+    with 14.
+
+    >>> stencil, zero = np.arange(1.0, 16.0).reshape(5, 3), np.zeros(4)
+    >>> rows, F = np.eye(4), np.zeros(4)
+    >>> for places in ((1, rows[1]), (0, rows[0]), (4, rows[1]), (4, rows[0]), (5, rows[3])):
+    ...     fields = [places[1] if place == places[0] else zero for place in range(6)]
+    ...     _force.py_func(stencil, *fields, F)
+    ...     print(F.tolist())
+    [2.0, 5.0, 2.0, 0.0]
+    [10.0, 1.0, 0.0, 0.0]
+    [8.0, 0.0, -8.0, 0.0]
+    [14.0, -8.0, 0.0, 0.0]
+    [0.0, 0.0, 9.0, -15.0]
     """
     n = F.shape[0]
     # Coefficients in registers: of both neighbours, of the node, and of
@@ -133,7 +158,16 @@ def _force(stencil: Any, x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, F
 
 @jit_inside
 def _move(w: Any, velocity: Any, force: Any, keep: Any, gain: Any, step: Any, lag: Any) -> None:
-    """Step 2: move a row of nodes by a step. `lag` is the viscous time."""
+    """Step 2: move a row of nodes by a step. `lag` is the viscous time.
+
+    The velocity 3 becomes 0.5 * 3 + 2 * 4 = 9.5. The displacement with the
+    viscous time grows by 0.15 * 9.5 - 0.05 * 3.
+
+    >>> w, velocity = np.array([1.0, 0.0]), np.array([3.0, 0.0])
+    >>> _move.py_func(w, velocity, np.array([4.0, -1.0]), 0.5, 2.0, 0.1, 0.05)
+    >>> w.round(9).tolist(), velocity.tolist()
+    ([2.275, -0.3], [9.5, -2.0])
+    """
     for i in range(w.shape[0]):
         before = velocity[i]
         after = keep * before + gain * force[i]
@@ -156,6 +190,37 @@ def _slide(
     """Step 3: move the nodes of the interface.
 
     Return the number of nodes that never slipped.
+
+    Node 0 would move at 0.9 * 0.2 + 0.5 * (1 + 0.5 * 3) m/s without friction.
+    Its strength, 2 Pa, leaves 0.93 m/s. Node 1 sticks, and node 2 stops.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> strength = {"strength_at": lambda sample, slip, i: (2.0, 9.0, 5.0)[i]}
+    >>> plain = FunctionType(_slide.py_func.__code__, globals() | strength)
+    >>> mesh = SimpleNamespace(spacing=0.5, step=0.1, viscous_time=0.02)
+    >>> mesh.correction = np.array([[1.0, 2.0, 4.0], [8.0, 8.0, 8.0], [9.0, 9.0, 9.0]])
+    >>> waves = SimpleNamespace(
+    ...     slip=np.array([0.1, 0.0, 0.5]), slip_rate=np.full(3, 7.0), stress=np.zeros(3),
+    ...     corrected=np.array([1.0, 1.0, 2.0]), arrival=np.full(3, np.nan), u=np.zeros((2, 3)),
+    ...     u_rate=np.array([[0.2, 0.0, 0.4]]), totals=np.zeros(1, TOTALS).view(np.recarray),
+    ... )
+    >>> now = waves.totals[0]
+    >>> now.time, now.fast_slip_rate = 5.0, 1.5
+    >>> start, front, force = np.array([4.0, 4.0, 1.0]), np.full(3, 0.2), np.array([1.0, -1.0, 0.0])
+    >>> int(plain(None, start, front, mesh, waves, force, 0.9, 0.5))  # a node that never slipped
+    1
+    >>> waves.slip.round(6).tolist(), waves.slip_rate.round(6).tolist()
+    ([0.286, 0.0, 0.5], [1.86, 0.0, 0.0])
+    >>> waves.stress.round(6).tolist()
+    [2.0, 1.0, 0.44]
+    >>> waves.arrival.round(6).tolist()  # 5 + 0.1 * 0.1/0.186
+    [5.053763, nan, nan]
+    >>> waves.u[0].round(6).tolist(), waves.u_rate[0].round(6).tolist()
+    ([0.1076, 0.0, -0.008], [0.93, 0.0, 0.0])
+    >>> waves.corrected.round(6).tolist(), round(float(now.friction), 6)  # 0.0565 + 0.0044
+    ([1.186, 1.372, 2.744], 0.0609)
+    >>> [round(float(now[name]), 6) for name in ("peak_rate", "fast_since", "fast_until", "fast")]
+    [1.86, 5.0, 5.0, 1.0]
     """
     dx, step = mesh.spacing, mesh.step
     slip, velocities, u, now = waves.slip, waves.u_rate[0], waves.u[0], waves.totals[0]
@@ -207,7 +272,34 @@ def _slide(
 
 @jit_inside
 def _move_platen(mesh: Mesh, waves: Waves, force: Any) -> None:
-    """Step 4: move the top with its platen and spring, or hold the top."""
+    """Step 4: move the top with its platen and spring, or hold the top.
+
+    Nodes with 2 * 3 kg/m and a platen with 4 kg/m feel 5 N/m, and a spring at
+    0.2 m takes off 2 N/m. In 0.5 s the speed changes from 1 m/s to
+    ((20 + 2.5 - 3) * 1 + 3)/(20 + 2.5 + 3) with the damping.
+
+    >>> from types import SimpleNamespace
+    >>> mesh = SimpleNamespace(step=0.5, stiffness=10.0, drive_mass=4.0, viscous_time=0.25)
+    >>> mesh.mass, mesh.attenuation = np.array([9.0, 3.0]), 1.0
+    >>> waves = SimpleNamespace(u=np.zeros((2, 2)), u_rate=np.zeros((2, 2)))
+    >>> waves.totals = np.zeros(1, TOTALS).view(np.recarray)
+    >>> now = waves.totals[0]
+    >>> now.speed, now.travel = 1.0, 0.2
+    >>> _move_platen.py_func(mesh, waves, np.array([2.0, 3.0]))
+    >>> speed = ((20.0 + 2.5 - 3.0) + 3.0) / (20.0 + 2.5 + 3.0)
+    >>> np.allclose([now.speed, now.travel], [speed, 0.2 + 0.5 * speed])
+    True
+    >>> np.allclose(now.force, -10.0 * now.travel)
+    True
+    >>> np.allclose(waves.u, [[0.0] * 2, [0.2 + 0.75 * speed] * 2])
+    True
+    >>> np.allclose(waves.u_rate, [[0.0] * 2, [speed] * 2])
+    True
+    >>> mesh.stiffness = np.inf  # the drive holds the top
+    >>> _move_platen.py_func(mesh, waves, np.array([2.0, 3.0]))
+    >>> float(now.force), np.allclose(now.speed, speed)
+    (-5.0, True)
+    """
     now, top, step = waves.totals[0], waves.u.shape[0] - 1, mesh.step
     total = 0.0
     for i in range(force.shape[0]):
@@ -241,6 +333,37 @@ def _move_pusher(mesh: Mesh, waves: Waves, gains: Array) -> None:
 
     The force F changes the speed of the pusher from v to v + g F, with
     the mobility g of the pushed nodes.
+
+    The mobility is (0.75² + 0.25²) * 2, and the pushed nodes move at 0.75 * 1 -
+    0.25 * 2. The force keeps the pusher at their speed.
+
+    >>> from types import SimpleNamespace
+    >>> mesh = SimpleNamespace(step=0.5, stiffness=4.0, drive_mass=1.0, viscous_time=0.25)
+    >>> mesh.push, gains = np.array([[0.0, 0.0], [0.75, 0.25]]), np.array([9.0, 2.0])
+    >>> u_rate = np.array([[5.0, 5.0, 5.0], [1.0, 6.0, -2.0]])
+    >>> waves = SimpleNamespace(u=np.zeros((2, 3)), u_rate=u_rate)
+    >>> waves.totals = np.zeros(1, TOTALS).view(np.recarray)
+    >>> now = waves.totals[0]
+    >>> now.speed, now.travel = 0.5, 0.125
+    >>> _move_pusher.py_func(mesh, waves, gains)
+    >>> mobility, a, before = 0.75**2 * 2 + 0.25**2 * 2, 0.5 * 4.0 * 0.5 + 1.0 / 0.5, 0.75 - 0.5
+    >>> force = -(4.0 * 0.125 + a * (before - 0.5)) / (1.0 + a * mobility)
+    >>> np.allclose(now.speed, before + mobility * force), np.allclose(now.force, -4.0 * now.travel)
+    (True, True)
+    >>> np.allclose(now.travel, 0.125 + 0.5 * now.speed)
+    True
+    >>> np.allclose(waves.u_rate[1], [1.0 + 1.5 * force, 6.0, -2.0 + 0.5 * force])
+    True
+    >>> np.allclose(waves.u, [[0.0] * 3, [0.75 * 1.5 * force, 0.0, 0.75 * 0.5 * force]])
+    True
+
+    A rigid machine holds the pusher.
+
+    >>> mesh.stiffness = np.inf
+    >>> _move_pusher.py_func(mesh, waves, gains)
+    >>> held = 0.75 * waves.u_rate[1, 0] + 0.25 * waves.u_rate[1, 2]
+    >>> print(f"{abs(held):.6f} {abs(now.speed):.6f}")
+    0.000000 0.000000
     """
     now, step, last = waves.totals[0], mesh.step, waves.u.shape[1] - 1
     # The pusher moves as the mean of the pushed nodes, weighted by
@@ -279,6 +402,34 @@ def wave_steps(
     If `ends` is true, stop once all nodes have slipped. `start` is the
     stress in the static state minus the initial stress (Pa). `front` is
     the slip (m) at which the front counts as arrived at a node.
+
+    The parts of a step are replaced by their names. Forces on a row are
+    computed before the row below moves. The nodes have all slipped after two
+    steps.
+
+    >>> from types import FunctionType, SimpleNamespace
+    >>> def steps(platen, anti_plane, most, ends):
+    ...     def part(name):
+    ...         return lambda *arguments: called.append(name)
+    ...     def slide(*arguments):
+    ...         called.append("slide")
+    ...         return left.pop(0)
+    ...     called, left = [], [1, 0, 0]
+    ...     parts = "_force", "_move", "_move_platen", "_move_pusher"
+    ...     names = globals() | {name: part(name[1:]) for name in parts} | {"_slide": slide}
+    ...     plain = FunctionType(wave_steps.py_func.__code__, names)
+    ...     mesh = SimpleNamespace(platen=platen, anti_plane=anti_plane, step=0.5, viscous_time=0.0)
+    ...     mesh.attenuation, mesh.mass, mesh.stencils = 0.0, np.ones(3), np.zeros((3, 2, 5, 3))
+    ...     fields = dict(zip(("u", "v", "u_rate", "v_rate"), np.zeros((4, 3, 2)), strict=True))
+    ...     waves = SimpleNamespace(**fields, totals=np.zeros(1, TOTALS).view(np.recarray))
+    ...     taken = plain(None, None, None, mesh, waves, most, ends)
+    ...     return taken, float(waves.totals[0].time), " ".join(called[: len(called) // taken])
+    >>> steps(platen=True, anti_plane=True, most=1, ends=False)
+    (1, 0.5, 'force force slide force move move_platen')
+    >>> steps(platen=False, anti_plane=True, most=3, ends=True)
+    (2, 1.0, 'force force slide force move move move_pusher')
+    >>> steps(platen=True, anti_plane=False, most=3, ends=False)
+    (3, 1.5, 'force force force force slide move force force move move move_platen')
     """
     rows, n = waves.u.shape
     step, lag = np.float32(mesh.step), np.float32(mesh.viscous_time)
