@@ -122,7 +122,8 @@ def make_mesh(problem: Problem, courant: float = 0.9) -> Mesh:
     >>> bool(mesh.window == np.ceil(2.0 * 0.1 / 1000.0 / mesh.step)), mesh.correction.dtype.name
     (True, 'float32')
     >>> thin, c_d = np.diff(mesh.heights).min(), 1000.0 * 3.0**0.5
-    >>> round(make_mesh(problem, 0.45).step / mesh.step, 6), bool(0.0 < mesh.step < 0.9 * thin / c_d)
+    >>> half = make_mesh(problem, 0.45).step / mesh.step
+    >>> round(half, 6), bool(0.0 < mesh.step < 0.9 * thin / c_d)
     (0.5, True)
     """
     assert problem.specimen is not None
