@@ -1,8 +1,8 @@
 """Outputs of public calls, compared with recorded values.
 
 Records are files of JSON with one line for each output. Texts are never recorded: a refusal is
-recorded by the arguments that it names, and a warning by its class; both by the numbers, the names
-and the units in them.
+recorded by the arguments that it names, and a warning by its class; both by the numbers, the names,
+the units, and the words of sense ("earlier", "at least", "not") in them.
 `pytest -n 0 FILE --record` writes them anew and prints what changed.
 """
 
@@ -32,6 +32,13 @@ MAX_WORDS_OF_A_NAME = 3
 """Texts of more words are prose, which is not recorded."""
 NUMBER = r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)"
 NAME = r"'[^' ]*'|(?!scipy)\b[A-Za-z]\w*(?:[._]\w+)+|\b[GMk\u00b5mu]?(?:Pa|N|m)\b"
+SENSE = (
+    r"|\b(?:above|at least|at most|before|below|beyond|after|earlier|fewer|finer|coarser|faster"
+)
+SENSE += (
+    r"|slower|higher|lower|larger|smaller|later|less|more|longer|shorter|stronger|weaker|never"
+)
+SENSE += r"|no|not|only|raise|reduce|with|without|\w+(?:est|normal|bull|ric)|II?I?)\b"
 OF_OTHERS = r"\S+ GiB|numba cannot compile it: .*"
 """Parts of messages that belong to the machine or to another package."""
 
@@ -139,7 +146,7 @@ def figures(text: str, result: Any) -> dict[str, Any]:
     """The numbers and names in messages, in their order, and the numbers that a call returns."""
     text = re.sub(OF_OTHERS, "", text)
     numbers = [float(part.replace(",", "")) for part in re.findall(NUMBER, text)]
-    known, returned = " ".join(re.findall(NAME, text)), []
+    known, returned = " ".join(re.findall(NAME + SENSE, text)), []
     if isinstance(result, xr.DataArray):
         known += repr(result.attrs)
     with contextlib.suppress(TypeError, ValueError):

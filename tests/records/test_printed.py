@@ -206,9 +206,6 @@ def test_commands(name, as_recorded, command, monkeypatch, tmp_path):
         texts[f"{len(texts)} {line}"] = out + errors
     texts["stored run"] = repr(st.open_run("run"))
     for page in sorted(Path().glob("*.html")):
-        body = re.sub(
-            r"<(style|script|pre).*?</\1>|<[^>]+>", " ", page.read_text("utf-8"), flags=re.S
-        )
-        texts[page.name] = html.unescape(body)
+        texts[page.name] = html.unescape(MARKUP.sub(" ", page.read_text("utf-8")))
     texts["all.csv"] = Path("all.csv").read_text("utf-8")
     as_recorded(f"commands, {name}", texts)
