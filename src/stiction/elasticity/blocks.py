@@ -84,7 +84,11 @@ class Pushes(NamedTuple):
     width: float
 
     def edges(self, height: float) -> tuple[float, float]:
-        """Return both edges of the push, m, clipped to the side 0 <= y <= height."""
+        """Return both edges of the push, m, clipped to the side 0 <= y <= height.
+
+        >>> Pushes(("left",), 3.0, 2.0).edges(10.0), Pushes(("left",), 0.5, 2.0).edges(1.25)
+        ((2.0, 4.0), (0.0, 1.25))
+        """
         low, high = self.height - 0.5 * self.width, self.height + 0.5 * self.width
         return max(low, 0.0), min(high, height)
 
@@ -116,6 +120,69 @@ def block_response(
     in plane stress, or `None` for mode III. A platen (no `pushes`) is
     glued to the top and moves along the interface. The top of a pushed
     block lies on rollers, or is free in mode III.
+
+    In mode III below a platen, C is G L/H, and K multiplies the first cosine
+    by (G/2) k coth(k H), up to the error of the lattice:
+
+    >>> response = block_response(2.0, 64, 0.5, 3.0, None, None)
+    >>> cosine = np.cos(np.pi * (np.arange(64) + 0.5) / 64)
+    >>> k = np.pi / 2.0
+    >>> ratio = response.stiffness @ cosine / cosine / (1.5 * k / np.tanh(0.5 * k))
+    >>> round(response.drive_stiffness, 9), bool(np.abs(ratio - 1.0).max() < 1e-4)
+    (12.0, True)
+
+    A platen glued to blocks: K is symmetric, uniform slip causes no stress, and C is a
+    little below G L/H, because the ends are free.
+
+    >>> response = block_response(4.0, 16, 0.5, 3.0, 1.8, None)
+    >>> K = response.stiffness
+    >>> np.allclose(K, K.T), np.allclose(K.sum(axis=0), 0.0, atol=1e-9), response.error < 1e-5
+    (True, True, True)
+    >>> round(float(response.shear.mean()), 9), 0.8 < response.drive_stiffness / 24.0 < 1.0
+    (1.0, True)
+
+    Pushers on both sides load by half each. Their profile is the mean of the
+    profiles of both sides, before each is divided by its own mean.
+
+    >>> left, right, both = (
+    ...     block_response(1.0, 8, 0.5, 3.0, 1.8, Pushes(sides, 0.25, 0.125))
+    ...     for sides in (("left",), ("right",), ("left", "right"))
+    ... )
+    >>> np.allclose(right.shear, left.shear[::-1]), bool(left.shear[0] > left.shear[-1])
+    (True, True)
+    >>> np.allclose(both.shear, 0.5 * (left.shear + right.shear))
+    True
+    >>> both.drive_stiffness > left.drive_stiffness == right.drive_stiffness
+    True
+
+    The file `columns` computes the same block by finite elements. v is
+    free on the interface and zero on the top. u is free on rollers, and a
+    single number below a platen. A force per unit slip stress is S/(2 dx).
+
+    >>> from stiction.elasticity.columns import Body, block, eliminated
+    >>> n, x = 24, (np.arange(24) + 0.5) / 24
+    >>> slip = np.sin(np.pi * x) ** 2 * (1.0 + x)
+    >>> whole = block(Body(0.5, 3.0, 1.8), 1 / n, n, push=(0.1, 0.35))
+    >>> pushes = Pushes(("left",), 0.225, 0.25)
+    >>> platen = np.eye(4 * n + 3)[:, : 2 * n + 2]
+    >>> platen[2 * n + 1 : 3 * n + 1, 2 * n + 1] = 1.0
+    >>> platen[3 * n + 1 :, 2 * n + 1] = 0.0
+    >>> rollers = np.delete(np.eye(4 * n + 3), np.s_[3 * n + 1 : 4 * n + 2], axis=1)
+    >>> for basis, push in (rollers, pushes), (platen, None):
+    ...     matrix = basis.T @ whole @ basis
+    ...     kept = np.arange(len(matrix)) < n
+    ...     kept[-1] = True  # the force of the push, or the travel of the platen
+    ...     S = eliminated(matrix, kept)
+    ...     q, C = S[:n, -1] / S[:n, -1].mean(), S[-1, -1] if push is None else -1 / S[-1, -1]
+    ...     K = 0.5 * n * S[:n, :n]
+    ...     if push is None:  # at a given force the platen moves
+    ...         K -= 0.5 * n * np.outer(S[-1, :n], S[-1, :n]) / C
+    ...     found = block_response(1.0, n, 0.5, 3.0, 1.8, push)
+    ...     off = float(np.abs((K - found.stiffness) @ slip).mean() / np.abs(K @ slip).max())
+    ...     off_q, off_C = float(np.abs(q - found.shear).mean()), float(found.drive_stiffness / C)
+    ...     print(off < 0.015, off_q < 0.015, abs(off_C - 1.0) < 0.01)
+    True True True
+    True True True
     """
     with one_blas_thread():
         response, coarse = (
@@ -237,6 +304,14 @@ def _mean_logarithm(harmonics: Harmonics, low: float, high: float, rtol: float) 
 
     The sum is a double integral of logarithms of y - y' and y + y'. A
     substitution reduces it to a single integral.
+
+    The sum over the first 20,000 harmonics, one by one:
+
+    >>> harmonics = Harmonics(1.0, 0.5, 10.0)
+    >>> k = (np.arange(20_000) + 0.5) * np.pi / 0.5
+    >>> mean = (np.cos(0.1 * k) - np.cos(0.3 * k)) / (0.2 * k)
+    >>> round(_mean_logarithm(harmonics, 0.1, 0.3, 1e-9) / float(np.sum(mean**2 / k)), 6)
+    1.0
     """
     width = high - low
 
@@ -256,6 +331,14 @@ def _of_sides(pushes: Pushes, stress: Array, near: float, far: float) -> tuple[A
 
     `near` and `far` are the displacements at the force and at the same
     height of the other end.
+
+    >>> stress = np.array([4.0, 1.0, 2.0])
+    >>> for sides in (("left",), ("right",), ("left", "right")):
+    ...     profile, travel = _of_sides(Pushes(sides, 1.0, 1.0), stress, 5.0, 2.0)
+    ...     print(profile.tolist(), travel)
+    [4.0, 1.0, 2.0] 5.0
+    [2.0, 1.0, 4.0] 5.0
+    [3.0, 1.0, 3.0] 3.5
     """
     if len(pushes.sides) == 2:
         return 0.5 * (stress + stress[::-1]), 0.5 * (near + far)
@@ -268,6 +351,15 @@ def glued_pressure(length: float, nodes: int, height: float, kappa: float) -> Ar
     With rollers the pressure would be uniform, 1, and the top would
     widen by the fraction (3 - kappa)/(8 G) of its length. Glue prevents
     this through a shear traction without resultant.
+
+    The pressure is symmetric. With kappa = 3, in plane strain without Poisson's
+    effect, it would be uniform.
+
+    >>> pressure = glued_pressure(2.0, 8, 0.5, 1.8)
+    >>> np.allclose(pressure, pressure[::-1]), round(float(pressure.mean()), 9)
+    (True, 1.0)
+    >>> np.allclose(glued_pressure(2.0, 8, 0.5, 3.0), 1.0), bool(np.ptp(pressure) > 0.01)
+    (True, True)
     """
     with one_blas_thread():
         harmonics = Harmonics(length, height, RESOLUTION.max_decay, pressed=True)
@@ -295,6 +387,32 @@ def _anti_plane(
     K has the symbol (G/2) k coth(k H) below a platen, without k = 0 at
     a given force, and (G/2) k tanh(k H) below a free top. A push has
     the same harmonics as in mode II on rollers.
+
+    A push in mode III, as a sum over harmonics that grow towards the pushed end:
+
+    >>> k = (np.arange(20_000) + 0.5) * np.pi / 0.5
+    >>> mean, x = (np.cos(0.1 * k) - np.cos(0.3 * k)) / (0.2 * k), (np.arange(8) + 0.5) / 8
+    >>> grown = np.exp(-np.outer(x, k)) + np.exp(-np.outer(2.0 - x, k))
+    >>> stress = grown @ (mean / -np.expm1(-2.0 * k))
+    >>> near = 4.0 * np.sum(mean**2 / k / np.tanh(k))
+    >>> far = 4.0 * np.sum(mean[:9] ** 2 / k[:9] / np.sinh(k[:9]))
+    >>> found = _anti_plane(1.0, 8, 0.5, 3.0, Pushes(("left",), 0.2, 0.2), RESOLUTION)
+    >>> np.allclose(found.shear, stress / stress.mean(), atol=1e-5)
+    True
+    >>> bool(abs(found.drive_stiffness * near / 3.0 - 1.0) < 1e-6)
+    True
+    >>> both = _anti_plane(1.0, 8, 0.5, 3.0, Pushes(("left", "right"), 0.2, 0.2), RESOLUTION)
+    >>> bool(abs(both.drive_stiffness * 0.5 * (near + far) / 3.0 - 1.0) < 1e-6)
+    True
+    >>> bool(far > 1e-3 * near)
+    True
+
+    Below a free top, K multiplies the first cosine by (G/2) k tanh(k H):
+
+    >>> cosine, K = np.cos(np.pi * x), found.stiffness
+    >>> ratio = K @ cosine / cosine / (1.5 * np.pi * np.tanh(0.5 * np.pi))
+    >>> bool(np.abs(ratio - 1.0).max() < 0.01)
+    True
     """
     spacing = length / nodes
     k = np.pi / length * np.arange(1, nodes)
@@ -332,6 +450,11 @@ def lattice_symbol(angle: Array) -> Array:
     entries vanish at every second distance. A smooth correction, such
     as for a finite block, would make these entries positive. All
     entries of the lattice symbol except the diagonal are negative.
+
+    >>> (lattice_symbol(np.array([0.01, -0.2])) / [0.01, 0.2]).round(2).tolist()
+    [1.0, 1.0]
+    >>> lattice_symbol(np.array([np.pi, np.pi / 3.0])).round(9).tolist()  # s is 1 and 1/2
+    [2.166666667, 1.020833333]
     """
     s = np.abs(np.sin(0.5 * angle))
     return 2.0 * s * (1.0 + LATTICE_CORRECTION * s * s)
@@ -342,6 +465,13 @@ def lattice_entries(count: int) -> Array:
 
     2 s has the entries -1/(pi (j² - 1/4)), and s² has 1/2 at distance 0
     and -1/4 at distance 1.
+
+    The entries are the Fourier coefficients of the symbol:
+
+    >>> angle = (np.arange(4096) + 0.5) * np.pi / 4096
+    >>> cosines = np.cos(np.outer(np.arange(5), angle))
+    >>> np.allclose(lattice_entries(5), cosines @ lattice_symbol(angle) / 4096, atol=1e-6)
+    True
     """
     j = np.arange(-1.0, count + 1.0)
     entries = -1.0 / (np.pi * (j * j - 0.25))
@@ -359,6 +489,27 @@ def stiffness_between_ends(nodes: int, spacing: float, modulus: float) -> Array:
     its mirror images at both ends account for 1/(x + s)².
     The remaining term is averaged over the cells of x and s:
     it is the mixed derivative of (G*/pi) x s/(x + s)².
+
+    Uniform slip causes no stress, and the matrix is symmetric. Far from the
+    ends it is the lattice.
+
+    >>> K = stiffness_between_ends(400, 0.5, 3.0)
+    >>> np.allclose(K, K.T), np.allclose(K, K[::-1, ::-1])
+    (True, True)
+    >>> bool(np.abs(K.sum(axis=1)).max() < 2e-3 * K[0, 0])
+    True
+    >>> np.allclose(K[200, 200:204], 1.5 / 0.5 * lattice_entries(4), atol=1e-4)
+    True
+
+    For two nodes, x s/(x + s)^2 is 1/4 at the edges (1, 1), and 2/9 at (1, 2) and (2, 1).
+    Node 0 has images at the distances 1 and 3, and the pair has two images at the distance 2.
+
+    >>> entries, pair = lattice_entries(4), stiffness_between_ends(2, 2.0, 4.0)
+    >>> corner, far, between = 0.25, 0.25 + 0.25 - 4.0 / 9.0, 2.0 / 9.0 - 0.25
+    >>> on_diagonal = entries[0] + entries[1] + entries[3] - (corner + far) * 2.0 / np.pi
+    >>> off_diagonal = entries[1] + 2.0 * entries[2] - 2.0 * between * 2.0 / np.pi
+    >>> np.allclose(pair, [[on_diagonal, off_diagonal], [off_diagonal, on_diagonal]])
+    True
     """
     entries, i = lattice_entries(2 * nodes), np.arange(nodes)
     mirrored = i[:, None] + i

@@ -77,7 +77,14 @@ Keep: TypeAlias = Callable[[Labels], Mask]
 
 
 class Body(NamedTuple):
-    """A rectangular body: its height (m), G (Pa) and Kolosov's constant of the plane problem."""
+    """A rectangular body: its height (m), G (Pa) and Kolosov's constant of the plane problem.
+
+    With Poisson's ratio 0.25, kappa is 2 and lambda is G in plane strain.
+
+    >>> body = Body(height=0.1, modulus=5.0, kappa=2.0)
+    >>> body.lame, body.longitudinal
+    (5.0, 15.0)
+    """
 
     height: float
     modulus: float
@@ -111,7 +118,11 @@ class Elements(NamedTuple):
 
 
 def graded(length: float, first: float) -> list[float]:
-    """Return sizes of elements, m, that grow along a length from a first size."""
+    """Return sizes of elements, m, that grow along a length from a first size.
+
+    >>> graded(10.0, 1.0), graded(5.5, 1.0), graded(5.6, 1.0), graded(1.5, 1.0)
+    ([1.0, 3.0, 6.0], [1.0, 4.5], [1.0, 3.0, 1.5999999999999996], [1.5])
+    """
     sizes, rest, size = [], length, first
     while rest > MAX_REMAINDER * size:
         sizes.append(size)
@@ -120,7 +131,22 @@ def graded(length: float, first: float) -> list[float]:
 
 
 def elements(height: float, first: float, push: Interval | None = None) -> Elements:
-    """Return elements that are fine at the surface and at both edges of a push (m)."""
+    """Return elements that are fine at the surface and at both edges of a push (m).
+
+    The integrals are exact for polynomials: of 1, of y^2 and of the slope of y^3 times
+    itself, 9 y^4. Places of a push are points.
+
+    >>> points, mass, mixed, slope = elements(2.0, 0.3, (0.5, 1.25))
+    >>> one, y = np.ones(points.size), points
+    >>> np.allclose([one @ mass @ one, y @ mass @ y, y**3 @ slope @ y**3], [2.0, 8 / 3, 9 * 32 / 5])
+    True
+    >>> np.allclose([y**2 @ mixed @ y, y @ mixed @ y**2], [8 / 3, 16 / 3])  # of y^2, and 2 y^2
+    True
+    >>> [round(float(np.abs(points - place).min()), 9) for place in (0.0, 0.5, 1.25, 2.0)]
+    [0.0, 0.0, 0.0, 0.0]
+    >>> float(np.diff(points)[0]) < 0.03, elements(2.0, 0.3, (0.0, 2.0)).points.size
+    (True, 19)
+    """
     # 1. An interval between two fine places is split in the middle.
     sizes: list[float] = []
     fine = [0.0, *(edge for edge in push or () if 0.0 < edge < height)]
@@ -147,6 +173,14 @@ def merge(pieces: list[Piece], keep: Keep) -> Piece:
     """Step 3: add pieces, and eliminate the unknowns that are not kept.
 
     No load acts on them.
+
+    Two springs of 2 and 3 Pa in series have 1.2 Pa.
+
+    >>> first = Piece(np.array([5, 7]), np.array([[2.0, -2.0], [-2.0, 2.0]]))
+    >>> second = Piece(np.array([7, 9]), np.array([[3.0, -3.0], [-3.0, 3.0]]))
+    >>> labels, matrix = merge([first, second], lambda labels: labels != 7)
+    >>> labels.tolist(), matrix.round(9).tolist()
+    ([5, 9], [[1.2, -1.2], [-1.2, 1.2]])
     """
     labels = np.unique(np.concatenate([piece.labels for piece in pieces]))
     total = np.zeros((labels.size, labels.size))
@@ -158,14 +192,60 @@ def merge(pieces: list[Piece], keep: Keep) -> Piece:
 
 
 def eliminated(matrix: Array, kept: Mask) -> Array:
-    """Return the Schur complement of a symmetric matrix on the rows that are kept."""
+    """Return the Schur complement of a symmetric matrix on the rows that are kept.
+
+    >>> matrix = np.array([[4.0, 2.0, 1.0], [2.0, 5.0, 0.0], [1.0, 0.0, 8.0]])
+    >>> eliminated(matrix, np.array([False, True, True])).tolist()  # 5 - 2 2/4, - 2/4, 8 - 1/4
+    [[4.0, -0.5], [-0.5, 7.75]]
+    """
     factor = cholesky(matrix[np.ix_(~kept, ~kept)], lower=True)
     half = solve_triangular(factor, matrix[np.ix_(~kept, kept)], lower=True)
     return matrix[np.ix_(kept, kept)] - half.T @ half
 
 
 class Columns(NamedTuple):
-    """Step 2: the terms of a body. Each is a `Piece` on a line and its neighbours."""
+    """Step 2: the terms of a body. Each is a `Piece` on a line and its neighbours.
+
+    The terms store the energy of simple fields. In a cell of width 0.5 and height 2, u = 3 y
+    and v rising by 1 from edge to edge shear by 3 + 1/0.5 = 5. With G = 5, twice the
+    energy is 5 * 0.5 * 2 * 5^2.
+
+    >>> columns = Columns(elements(2.0, 0.4), Body(2.0, 5.0, 2.0), "free")
+    >>> y, one = columns.across.points, np.ones(columns.across.points.size)
+    >>> def twice_the_energy(piece, *lines):
+    ...     field = np.concatenate(lines)
+    ...     return round(float(field @ piece.matrix @ field), 6)
+    >>> twice_the_energy(columns.cell(1, 0.5), 0.0 * one, 3.0 * y, one)
+    125.0
+
+    Across an edge, u rising by 1 over 0.5 and v = 3 y extend by 2 and 3. Twice the
+    energy is 0.5 * 2 * (15 * 4 + 15 * 9 + 2 * 5 * 2 * 3). With a wall, u falls to zero.
+
+    >>> twice_the_energy(columns.edge(2, 0.5), 0.0 * one, 3.0 * y, one)
+    255.0
+    >>> twice_the_energy(columns.edge(2, 0.5, stop=True), -one, 3.0 * y)
+    255.0
+
+    At a free end, v = 3 y in the half cell has the modulus 4 G (lambda + G)/P.
+
+    >>> twice_the_energy(columns.end(2, 0.5), 3.0 * y)  # 0.25 * 2 * 40/3 * 3^2
+    60.0
+
+    The push acts on u of the first cell. A rigid motion does work 1.
+
+    >>> push = columns.push(0.5, (0.5, 1.25))
+    >>> bool(push.labels[-1] == PUSH), round(float(push.matrix[-1, len(y):-1] @ one), 9)
+    (True, -1.0)
+    >>> round(float(push.matrix[-1, -1]), 9)  # -0.5 * 0.5/(15 * 0.75)
+    -0.022222222
+
+    Points that are held on the far side are left out: all on a fixed side, and v on rollers.
+
+    >>> sizes = [Columns(columns.across, columns.body, far).cell(1, 0.5).labels.size
+    ...     for far in ("free", "fixed", "rollers")]
+    >>> [size - 3 * y.size for size in sizes]
+    [0, -3, -2]
+    """
 
     across: Elements
     body: Body
@@ -219,7 +299,17 @@ class Columns(NamedTuple):
 
 
 def _repeated(period: Piece, count: int, keep: Callable[[int], Keep]) -> Piece:
-    """Step 4: merge the first periods of a body. A period is two lines long."""
+    """Step 4: merge the first periods of a body. A period is two lines long.
+
+    Five springs of 2 Pa in a row have 0.4 Pa.
+
+    >>> spring = Piece(np.array([0, PERIOD]), np.array([[2.0, -2.0], [-2.0, 2.0]]))
+    >>> def keep(length):
+    ...     return lambda labels: np.isin(labels, [0, length * PERIOD])
+    >>> labels, matrix = _repeated(spring, 5, keep)
+    >>> (labels // PERIOD).tolist(), matrix.round(9).tolist()
+    ([0, 5], [[0.4, -0.4], [-0.4, 0.4]])
+    """
     if count == 1:
         return period
     half = _repeated(period, count // 2, keep)
@@ -229,7 +319,15 @@ def _repeated(period: Piece, count: int, keep: Callable[[int], Keep]) -> Piece:
 
 
 def widths_beyond(length: float, first: float) -> list[float]:
-    """Step 5: return the widths, m, of columns over a free length, outwards."""
+    """Step 5: return the widths, m, of columns over a free length, outwards.
+
+    The widths 1.25, 1.5, 1.5 and 1.5 reach beyond 5 m, and are shortened.
+
+    >>> np.array(widths_beyond(5.0, 1.0)).round(4).tolist(), widths_beyond(0.0, 1.0)
+    ([1.087, 1.3043, 1.3043, 1.3043], [])
+    >>> round(5.0 / 5.75 * 1.25, 4), round(5.0 / 5.75 * 1.5, 4)
+    (1.087, 1.3043)
+    """
     widths: list[float] = []
     largest = MAX_COLUMN * length + first
     while sum(widths) < length:
@@ -239,6 +337,11 @@ def widths_beyond(length: float, first: float) -> list[float]:
 
 
 def _on_lines(*kept: int) -> Keep:
+    """Return a choice of labels on some lines.
+
+    >>> _on_lines(3, 5)(np.array([3 * STRIDE + 7, 4 * STRIDE, 5 * STRIDE])).tolist()
+    [True, False, True]
+    """
     return lambda labels: np.isin(labels // STRIDE, kept)
 
 
@@ -273,6 +376,35 @@ def block(
     any. The row for the push holds minus the loads by a unit force. The
     body is longer than the surface in contact by `behind` and `ahead`.
     If it lies on rollers, a frictionless wall holds its leading end.
+
+    The rows are u of 3 cells, v of 4 edges, the same on the far side, and
+    the push. Motions along x and into the body, and a rotation, cause no
+    force, and the push has the resultant 1.
+
+    >>> body = Body(height=1.0, modulus=5.0, kappa=2.0)
+    >>> free = block(body, 0.4, 3, push=(0.25, 0.5))
+    >>> along, into = np.r_[1, 1, 1, 0, 0, 0, 0], np.r_[0, 0, 0, 1, 1, 1, 1]
+    >>> turn = np.r_[0, 0, 0, 0.0, 0.4, 0.8, 1.2]
+    >>> motions = np.array([np.r_[along, along], np.r_[into, into], np.r_[turn, turn - along]])
+    >>> free.shape, np.allclose(free, free.T), np.allclose(free[:14, :14] @ motions.T, 0.0)
+    ((15, 15), True, True)
+    >>> (motions @ free[:14, 14]).round(9).tolist()  # the moment is the height 0.375
+    [-1.0, 0.0, 0.375]
+
+    A longer body is stiffer, and a body with a fixed bottom does not move freely.
+
+    >>> short = block(body, 0.4, 3, far="fixed")
+    >>> long = block(body, 0.4, 3, far="fixed", behind=0.5, ahead=1.0)
+    >>> short.shape, bool(np.linalg.eigvalsh(long - short).min() > -1e-9)
+    ((7, 7), True)
+    >>> bool(along @ long @ along > along @ short @ along > 1.0)
+    True
+
+    The leading end of a body on rollers has a wall. v is held at the bottom.
+
+    >>> rollers = block(body, 0.4, 3, far="rollers", ahead=1.0)
+    >>> bool(np.linalg.eigvalsh(rollers).min() > 0.01), np.allclose(rollers, rollers[::-1, ::-1])
+    (True, False)
     """
     columns = Columns(elements(body.height, FIRST_ELEMENT * cell, push), body, far)
     last, last_point = 2 * n_cells, len(columns.across.points) - 1

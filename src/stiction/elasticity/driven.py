@@ -41,7 +41,22 @@ fraction of the largest."""
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """Two blocks and their machine, as an `Elasticity`. Do not write to its arrays."""
+    """Two blocks and their machine, as an `Elasticity`. Do not write to its arrays.
+
+    >>> K = np.array([[4.0, -1.0, 0.5], [-1.0, 5.0, -2.0], [0.5, -2.0, 6.0]])
+    >>> shear = np.array([1.5, 1.0, 0.5])
+    >>> blocks = Driven(K, shear, np.ones(3), relief=3.0, drive_stiffness=8.0, error=0.1)
+    >>> blocks.positive, Driven(K, shear, shear, 3.0, 8.0, error=0.6).positive
+    (0.125, 0.0)
+    >>> blocks.block([2, 0]).tolist(), float(blocks.entries.rows[5]), blocks.entries.relief
+    ([[6.0, 0.5], [0.5, 4.0]], -2.0, 3.0)
+
+    Slip (2, 1, 4) has the weighted mean (3 + 1 + 2)/3 = 2, and half the slip has 1.
+
+    >>> slip = np.array([[2.0, 1.0, 4.0], [1.0, 0.5, 2.0]])
+    >>> blocks.mean_relief(slip).tolist(), blocks.travel(12.0, slip).tolist()
+    ([6.0, 3.0], [5.0, 4.0])
+    """
 
     stiffness: Array  # (n, n): K, Pa/m
     shear: Array  # (n,): q, with mean 1
@@ -82,6 +97,14 @@ class Driven:
 
 def _unstable(matrix: Array, W: float, begin: int, end: int) -> bool:
     # A Cholesky factor exists only if all eigenvalues of K - W are positive.
+    """The block of the last two nodes has the eigenvalues 1 and 3.
+
+    >>> matrix = np.array([[9.0, 0.0, 0.0], [0.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+    >>> [_unstable(matrix, W, 1, 3) for W in (0.9, 1.1, 3.1)]
+    [False, True, True]
+    >>> _unstable(matrix, 1.1, 0, 2), _unstable(matrix, 2.1, 1, 2)
+    (False, True)
+    """
     block = matrix[begin:end, begin:end].copy()
     block.flat[:: end - begin + 1] -= W
     return bool(scipy.linalg.lapack.dpotrf(block, lower=1, overwrite_a=1)[1] > 0)
@@ -98,6 +121,25 @@ def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
     2. Shorten it from its end as long as it remains unstable, and keep it.
     3. Move on by a fraction of the width, and go to step 1. The last run
        ends with the specimen.
+
+    All runs are compared with a search for the shortest run from each node:
+
+    >>> matrix = np.diag([5.0, 4.0, 6.0, 3.0, 6.0, 4.0])
+    >>> matrix -= 1.5 * (np.eye(6, k=1) + np.eye(6, k=-1))
+    >>> def brute(W):
+    ...     ends = [[b for b in range(a + 1, 7) if _unstable(matrix, W, a, b)] for a in range(6)]
+    ...     return [(a, end[0]) for a, end in enumerate(ends) if end]
+    >>> [shortest_runs(matrix, W) == brute(W) for W in (0.5, 1.5, 2.0, 2.5, 3.5, 4.5, 7.0)]
+    [True, True, True, True, True, True, True]
+    >>> shortest_runs(matrix, 0.5), shortest_runs(matrix, 3.5)
+    ([], [(0, 2), (1, 3), (2, 4), (3, 4), (4, 6)])
+
+    Runs of 64 nodes begin at every second node, and the last run ends with
+    the specimen. A chain of m nodes has the lowest eigenvalue 2 - 2 cos(pi/(m + 1)).
+
+    >>> chain = 2.0 * np.eye(67) - np.eye(67, k=1) - np.eye(67, k=-1)
+    >>> shortest_runs(chain, 1.000001 * (2.0 - 2.0 * np.cos(np.pi / 65)))
+    [(0, 64), (2, 66), (3, 67)]
     """
     n, runs = len(matrix), []
     begin, end, step = 0, 1, 1
@@ -122,6 +164,19 @@ def shortest_runs(matrix: Array, W: float) -> list[tuple[int, int]]:
 
 @lru_cache(maxsize=32)
 def _windows_at(blocks: Driven, weakening_rate: float) -> Windows:
+    """The lowest eigenvector of the last two nodes is (2, 1)/3, for 4 - 2 = 2 Pa/m.
+    The first node needs both.
+
+    >>> matrix = np.array([[9.0, 0.0, 0.0], [0.0, 4.0, -4.0], [0.0, -4.0, 10.0]])
+    >>> blocks = Driven(matrix, np.ones(3), np.ones(3), 0.0, 1.0, 0.0)
+    >>> windows = _windows_at(blocks, 2.5)
+    >>> windows.starts.tolist(), windows.widths.tolist(), windows.modes.round(6).tolist()
+    ([0, 1], [3, 2], [[0.0, 0.666667, 0.333333], [0.666667, 0.333333, 0.0]])
+    >>> windows.weakening_rates.tolist(), blocks.windows(2.5, 9.0).starts.tolist()
+    ([2.5, 2.5], [0, 1])
+    >>> _windows_at(blocks, 1.5).widths.tolist()
+    []
+    """
     matrix = blocks.stiffness
     runs = shortest_runs(matrix, weakening_rate)
     # The weights of a window must be positive. The lowest eigenvector
@@ -155,6 +210,30 @@ def driven(
     If the blocks are `glued` while they are pressed, the pressure is
     not uniform. `machine` is its stiffness per unit
     depth (Pa), for one block, which is half the specimen.
+
+    In mode III below a platen, C is G L/H = 12 Pa, and q is 1. With a machine of
+    4 Pa, the relief is 4/(4 + 12) * 12/(2 L), and K changes by relief/n.
+
+    >>> dead = driven(2.0, 8, 0.5, 3.0, 1.8, True, None, False, 0.0)
+    >>> soft = driven(2.0, 8, 0.5, 3.0, 1.8, True, None, False, 4.0)
+    >>> stiff = driven(2.0, 8, 0.5, 3.0, 1.8, True, None, False, np.inf)
+    >>> dead.relief, round(soft.relief, 9), round(stiff.relief, 9), round(dead.drive_stiffness, 9)
+    (0.0, 0.75, 3.0, 12.0)
+    >>> np.allclose(soft.stiffness - dead.stiffness, 0.75 / 8), dead.pressure.tolist() == 8 * [1.0]
+    (True, True)
+
+    Far from a pusher, q is at least 1e-9 of its largest value. Glue
+    makes the pressure uneven.
+
+    >>> push = Pushes(("left",), 0.1, 0.1)
+    >>> long = driven(20.0, 40, 0.5, 3.0, 1.8, True, push, False, 0.0)
+    >>> round(float(long.shear.min() / long.shear.max()) * 1e9, 6)
+    1.0
+    >>> round(float(long.shear.mean()), 6)
+    1.0
+    >>> glued = driven(2.0, 8, 0.5, 3.0, 1.8, False, None, True, 0.0).pressure
+    >>> np.allclose(glued, glued_pressure(2.0, 8, 0.5, 1.8)), bool(np.ptp(glued) > 0.01)
+    (True, True)
     """
     kind = None if anti_plane else kappa
     response = block_response(length, nodes, height, modulus, kind, pushes)

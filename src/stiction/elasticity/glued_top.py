@@ -61,6 +61,26 @@ class GluedTop:
         in plane stress.
     step : float
         Distance between the points in z.
+
+    The points reach both corners, and dx/dz is the slope of x(z). Far from the corners it
+    is half the height.
+
+    >>> top = GluedTop(Harmonics(4.0, 0.5, 10.0), 3.0, 1.8, 0.25)
+    >>> np.allclose(top.x + top.to_right, 4.0), np.allclose(top.x, top.to_right[::-1])
+    (True, True)
+    >>> np.allclose(np.gradient(top.x, 0.25), top.stretch, atol=0.002)
+    True
+    >>> round(float(top.stretch.max()), 3), round(float(top.step * top.stretch.sum()), 6)
+    (0.25, 4.0)
+
+    A uniform traction t shears a long block by about t/G. A shift U of the top takes
+    a force close to U G L/H, and less because the ends are free.
+
+    >>> shifted = top.solve(np.ones(top.x.size))
+    >>> 0.9 < float(top.step * shifted.sum()) / (3.0 * 4.0 / 0.5) < 1.0
+    True
+    >>> np.allclose(top.compliance, top.compliance.T)
+    True
     """
 
     def __init__(self, harmonics: Harmonics, modulus: float, kappa: float, step: float) -> None:
@@ -129,7 +149,20 @@ class GluedTop:
         return scipy.linalg.solve(self.compliance, displacement, assume_a="sym")
 
     def shear(self, x: Array) -> Array:
-        """Return the shear stress at places on the interface due to unit t at a point, 1/m."""
+        """Return the shear stress at places on the interface due to unit t at a point, 1/m.
+
+        The traction that shifts the top causes a shear stress with the same force on the
+        interface, which is uniform in the middle, and zero near the free ends.
+
+        >>> top = GluedTop(Harmonics(4.0, 0.5, 40.0), 3.0, 1.8, 0.25)
+        >>> x = (np.arange(400) + 0.5) / 100
+        >>> stress = top.step * top.shear(x) @ top.solve(np.ones(top.x.size))
+        >>> force = top.step * top.solve(np.ones(top.x.size)).sum()
+        >>> round(float(stress.mean() * 4.0 / force), 3), np.allclose(stress, stress[::-1])
+        (1.0, True)
+        >>> round(float(stress[200]), 2), bool(stress[0] < 0.3)  # G U/H is 6 Pa
+        (6.0, True)
+        """
         harmonics, kappa = self.harmonics, self.kappa
         # The direct wave, single reflections at both ends, and the remainder.
         apart = np.abs(np.subtract.outer(x, self.x))
@@ -150,6 +183,19 @@ class GluedTop:
         """Return s_yy on the interface of a pressed block due to unit t at a point, 1/m.
 
         The result applies to tractions without a resultant.
+
+        Glue keeps e_xx at zero in the middle of a long block. The same compression then
+        takes P = lambda + 2 G instead of 4 G (lambda + G)/P, so that the pressure is 3.5^2/10 times
+        the pressure with rollers, for lambda = 1.5 G.
+
+        >>> top = GluedTop(Harmonics(8.0, 0.5, 40.0, pressed=True), 1.0, 1.8, 0.25)
+        >>> traction = top.solve(-(3.0 - 1.8) / 16.0 * (top.x - top.to_right))
+        >>> x = np.array([0.05, 3.9, 4.0, 4.1, 7.95])
+        >>> (1.0 - top.step * top.normal(x) @ traction)[1:4].round(3).tolist()
+        [1.225, 1.225, 1.225]
+        >>> ends = (top.normal(x) @ traction)[[0, -1]]
+        >>> np.allclose(ends[0], ends[1]), bool(ends[0] > 0.0)
+        (True, True)
         """
         harmonics, kappa = self.harmonics, self.kappa
         towards = np.subtract.outer(x, self.x)

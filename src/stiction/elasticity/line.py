@@ -66,6 +66,14 @@ def stiffness_column(nodes: int, length: float, modulus: float) -> Array:
     """Return the first column of K, Pa/m, with shape (nodes,), for a period (m) and G* (Pa).
 
     The node count is even.
+
+    The unit pi G*/L is 2 here:
+
+    >>> stiffness_column(4, np.pi, 2.0).round(9).tolist()
+    [2.0, -1.0, 0.0, -1.0]
+    >>> symbol = HalfSpaces((0.4,), (3.0,)).symbol((12,))
+    >>> np.allclose(stiffness_column(12, 0.4, 3.0), np.fft.irfft(symbol, 12))
+    True
     """
     scale = np.pi * modulus / length
     column = np.zeros(nodes)
@@ -88,11 +96,29 @@ class Line:
     positive: float = 0.0
 
     def block(self, nodes: Array) -> Array:
-        """Return K between some nodes, Pa/m."""
+        """Return K between some nodes, Pa/m.
+
+        >>> line_of(HalfSpaces((np.pi,), (2.0,)), 4).block(np.array([0, 1, 3])).round(9).tolist()
+        [[2.0, -1.0, -1.0], [-1.0, 2.0, 0.0], [-1.0, 0.0, 2.0]]
+        """
         return self.entries.column[np.abs(np.subtract.outer(nodes, nodes))]
 
     def windows(self, low: float, high: float) -> Windows:
-        """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first."""
+        """Return the windows for weakening rates from `low` to `high`, Pa/m, narrowest first.
+
+        With the unit 4 Pa/m, a single node is unstable at 4 * 16/4 Pa/m, and two nodes at
+        less:
+
+        >>> line = line_of(HalfSpaces((np.pi,), (4.0,)), 16)
+        >>> windows = line.windows(16.5, 16.5)
+        >>> [part.round(9).tolist() for part in windows]
+        [[16.0], [-1], [1], [[1.0]]]
+        >>> windows = line.windows(10.0, 17.0)
+        >>> windows.widths.tolist(), windows.modes.round(9).tolist()
+        ([1, 2], [[1.0, 0.0], [0.5, 0.5]])
+        >>> np.allclose(windows.weakening_rates[1], 16.0 + line.entries.column[1])
+        True
+        """
         (length,), (modulus,) = self.half_spaces
         unit = np.pi * modulus / length
         return _windows(self.nodes, widths_between(self.nodes, low / unit, high / unit), unit)
@@ -100,7 +126,11 @@ class Line:
 
 @functools.lru_cache(maxsize=4)
 def line_of(half_spaces: HalfSpaces, nodes: int) -> Line:
-    """Return K and the windows of a line."""
+    """Return K and the windows of a line.
+
+    >>> line_of(HalfSpaces((np.pi,), (2.0,)), 4).entries.strip.round(9).tolist()
+    [-1.0, -1.0, -1.0, -1.0, -1.0, -1.0]
+    """
     column = stiffness_column(nodes, half_spaces.lengths[0], half_spaces.moduli[0])
     return Line(half_spaces, nodes, CircularEntries(column, np.tile(column[1::2], 3)))
 
@@ -111,6 +141,20 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
 
     The unit of K is (G*/2)(2 pi/L). The
     eigenvector is positive, with unit sum.
+
+    Two nodes move alike. A wide window uses inverse iteration, and its mode
+    y has K y = W y, close to the continuum with W = 2 lambda_0 n/(pi w).
+
+    >>> value, mode = window_mode(16, 2)
+    >>> column = stiffness_column(16, np.pi, 1.0)
+    >>> mode.round(9).tolist(), round(value, 9) == round(float(column[0] + column[1]), 9)
+    ([0.5, 0.5], True)
+    >>> value, mode = window_mode(1024, 301)
+    >>> block = scipy.linalg.toeplitz(stiffness_column(1024, np.pi, 1.0)[:301])
+    >>> bool(np.abs(block @ mode - value * mode).max() < 1e-9 * mode.max())
+    True
+    >>> round(float(mode.sum()), 9), round(value * np.pi * 301 / 1024 / SMALLEST_EIGENVALUE, 1)
+    (1.0, 2.0)
     """
     column = stiffness_column(nodes, np.pi, 1.0)[:width]
     if width <= MAX_DENSE_WIDTH:
@@ -137,7 +181,15 @@ def window_mode(nodes: int, width: int) -> tuple[float, Array]:
 
 
 def _narrowest(nodes: int, widths: Sequence[int], W: float) -> int:
-    """Step 1: return the index of the first unstable width, or the number of widths."""
+    """Step 1: return the index of the first unstable width, or the number of widths.
+
+    >>> widths = (1, 2, 3, 5, 8, 13)
+    >>> rates = [window_mode(32, width)[0] for width in widths]
+    >>> [_narrowest(32, widths, rate) for rate in rates]  # the rate itself is unstable
+    [0, 1, 2, 3, 4, 5]
+    >>> [_narrowest(32, widths, 0.999 * rate) for rate in rates]
+    [1, 2, 3, 4, 5, 6]
+    """
     # The width in the continuum is off by about a node, or more on a
     # large part of the circle.
     i = min(bisect.bisect_left(widths, _continuous_width(nodes, W)), len(widths) - 1)
@@ -149,7 +201,11 @@ def _narrowest(nodes: int, widths: Sequence[int], W: float) -> int:
 
 
 def _continuous_width(nodes: int, weakening_rate: float) -> int:
-    """Return the node count in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L)."""
+    """Return the node count in h_n = 2 lambda_0 G*/W, for W in units of (G*/2)(2 pi/L).
+
+    >>> _continuous_width(100, 1.0), _continuous_width(100, 0.5), _continuous_width(100, 0.1)
+    (36, 73, 100)
+    """
     return int(min(2.0 * SMALLEST_EIGENVALUE / (np.pi * weakening_rate), 1.0) * nodes)
 
 
@@ -161,6 +217,23 @@ def widths_between(nodes: int, lowest: float, highest: float) -> tuple[int, ...]
     single rate there is a single width, or no width if it would be much
     larger than `MAX_WIDTH`. Otherwise the widths come from a ladder,
     which is the same for all samples.
+
+    A single rate has the narrowest unstable width. Otherwise the ladder 1, 2, ...
+    8, 10, 12, 15, ... is used, up to the first width that is unstable at the lowest rate.
+
+    >>> [width] = widths_between(64, 1.5, 1.5)
+    >>> window_mode(64, width)[0] <= 1.5 < window_mode(64, width - 1)[0]
+    True
+    >>> widths_between(64, 1.5, 4.0)
+    (6, 7, 8, 10, 12, 15)
+    >>> window_mode(64, 12)[0] > 1.5 >= window_mode(64, 15)[0]
+    True
+    >>> window_mode(64, 5)[0] > 4.0 >= window_mode(64, 6)[0]
+    True
+    >>> widths_between(16, 0.01, 4.1)  # less than half of the circle
+    (1, 2, 3, 4, 5, 6, 7)
+    >>> widths_between(10_000, 0.1, 0.1)  # 10,000 nodes and more
+    ()
     """
     widest = min(nodes - 1, MAX_WIDTH)
     widths: Sequence[int] = range(1, widest + 1)

@@ -92,7 +92,11 @@ _FILE_FORMAT = 2  # raise it when the fit or the file layout changes, to ignore 
 
 
 def static_stiffness(mode: str, eta: float) -> float:
-    """Return D(0) = G*/G: 2 (1 - 1/eta^2) in mode II, and 1 in mode III."""
+    """Return D(0) = G*/G: 2 (1 - 1/eta^2) in mode II, and 1 in mode III.
+
+    >>> static_stiffness("II", 2.0), static_stiffness("III", 2.0)
+    (1.5, 1.0)
+    """
     return 1.0 if mode == "III" else 2.0 * (1.0 - 1.0 / eta**2)
 
 
@@ -102,6 +106,21 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
     An arc has about 140 nodes. Only the parts of the transform that are
     odd across an arc contribute: the shear root at |s| = 1 and the
     dilatational root at |s| = eta.
+
+    The Laplace transform of the sum at a real s, sum w/(s - s_p), is (D(0) + s -
+    D(s))/s:
+
+    >>> s, eta = 0.7, 1.8
+    >>> for mode, shear in ("III", np.sqrt(1 + s**2)), ("II", np.sqrt(1 + s**2)):
+    ...     nodes, weights = arc_quadrature(mode, eta)
+    ...     D = shear
+    ...     if mode == "II":
+    ...         D = (2 + s**2) ** 2 - 4 * shear * np.sqrt(1 + s**2 / eta**2)
+    ...         D /= s**2 * shear
+    ...     exact = (static_stiffness(mode, eta) + s - D) / s
+    ...     print(abs((weights / (s - nodes)).real.sum() - exact) < 1e-12, nodes.real.max() < 0.0)
+    True True
+    True True
     """
     # Angles from the upper branch point, and weights, for half an arc.
     t = np.arange(0.0, _RULE_END, _RULE_STEP)
@@ -126,7 +145,15 @@ def arc_quadrature(mode: str, eta: float) -> tuple[Complex, Complex]:
 
 
 def exponential_sum(time: ArrayLike, nodes: Complex, weights: Complex) -> Floats:
-    """Return Re sum_p w_p exp(s_p T) at dimensionless times T with any shape."""
+    """Return Re sum_p w_p exp(s_p T) at dimensionless times T with any shape.
+
+    >>> nodes, weights = np.array([-1.0 + 2.0j, -0.5]), np.array([3.0 - 1.0j, 2.0])
+    >>> T = 0.8
+    >>> decay = np.exp(-T) * (3.0 * np.cos(2.0 * T) + np.sin(2.0 * T)) + 2.0 * np.exp(-0.4)
+    >>> sums = exponential_sum(np.full((2, 1100), T), nodes, weights)  # more than one chunk
+    >>> sums.shape, np.allclose(sums, decay), round(float(exponential_sum(0.0, nodes, weights)), 9)
+    ((2, 1100), True, 5.0)
+    """
     t = np.asarray(time, dtype=np.float64)
     flat, result = t.ravel(), np.empty(t.size)
     for start in range(0, t.size, _TIMES_PER_CHUNK):  # in chunks, to bound memory
@@ -140,6 +167,19 @@ def memory_kernel(time: ArrayLike, mode: str, eta: float) -> Floats:
 
     C(0) = G*/G. The kernel falls so slowly, like T^-1/2 in mode II and
     T^-3/2 in mode III, that it must not be truncated.
+
+    In mode III, C(T) is 1 minus the integral of J1(t)/t:
+
+    >>> from scipy.integrate import quad
+    >>> from scipy.special import j1
+    >>> for T in 0.0, 0.5, 6.0:
+    ...     exact = 1.0 - quad(lambda t: j1(t) / t, 0.0, T)[0]
+    ...     print(abs(float(memory_kernel(T, "III", 1.0)) - exact) < 1e-12)
+    True
+    True
+    True
+    >>> round(float(memory_kernel(0.0, "II", 2.0)), 9)  # C(0) = G*/G
+    1.5
     """
     return exponential_sum(time, *arc_quadrature(mode, eta))
 
@@ -163,7 +203,16 @@ class ExponentialSum:
 
 
 def _sample_times(per_decade: int, cluster: int, seed: int) -> Floats:
-    """Return times on [0, T_MAX], dense at first, with random phases on later scales."""
+    """Return times on [0, T_MAX], dense at first, with random phases on later scales.
+
+    >>> times = _sample_times(5, 3, seed=1)
+    >>> float(times[0]), float(times[-1]), bool((np.diff(times) > 0.0).all())
+    (0.0, 100000.0, True)
+    >>> bool(np.isin(np.linspace(0.0, 8.0, 41), times).all())
+    True
+    >>> bool(np.histogram(times, [9e2, 9e3, 9e4])[0].min() >= 12)  # 5 clusters of 3 in a decade
+    True
+    """
     rng = np.random.default_rng(seed)
     # The kernel oscillates with periods of up to 2 pi, so scatter the
     # times over a period.
@@ -178,6 +227,14 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
     Updates consist only of products, so that small pivots keep their
     relative accuracy.
+
+    >>> s, b = np.array([-1.0 + 2.0j, -0.5, -3.0 + 1.0j]), np.array([1.0 + 1.0j, 2.0, 0.5j])
+    >>> matrix = np.outer(b, b.conj()) / -(s[:, None] + s.conj())
+    >>> factor = _cauchy_cholesky(s, b, 1e-24)
+    >>> np.allclose(factor @ factor.conj().T, matrix), factor.shape
+    (True, (3, 3))
+    >>> _cauchy_cholesky(s, b, 0.5).shape  # the diagonal is 1, 4 and 1/24
+    (3, 1)
     """
     a, columns = b.copy(), []
     diagonal = np.abs(a) ** 2 / (-2.0 * s.real)
@@ -195,7 +252,19 @@ def _cauchy_cholesky(s: Complex, b: Complex, stop: float) -> Complex:
 
 
 def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
-    """Step 2: return the poles of a short model for sum w exp(s T), from balanced truncation."""
+    """Step 2: return the poles of a short model for sum w exp(s T), from balanced truncation.
+
+    A sum of two terms has a short model of two terms, the sum itself. Of a
+    third term with a small weight, little is left.
+
+    >>> s, w = np.array([-1.0 + 2.0j, -0.5 + 0.0j]), np.array([3.0 - 1.0j, 2.0 + 0.0j])
+    >>> poles = balanced_truncation(s, w, 2)
+    >>> np.allclose(np.sort_complex(poles), s)
+    True
+    >>> poles = balanced_truncation(np.append(s, -2.0), np.append(w, 1e-9), 2)
+    >>> np.allclose(np.sort_complex(poles), s, atol=1e-6)
+    True
+    """
     # Equal input and output vectors make both Gramians equal up to
     # conjugation.
     b = np.sqrt(w)
@@ -208,7 +277,24 @@ def balanced_truncation(s: Complex, w: Complex, pairs: int) -> Complex:
 
 
 class _Polish:
-    """Step 3: variable projection. Poles are -exp(a) - `_MIN_DECAY_RATE` + i b."""
+    """Step 3: variable projection. Poles are -exp(a) - `_MIN_DECAY_RATE` + i b.
+
+    Values of a known sum: its weights follow from its poles, and its poles from starts
+    nearby.
+
+    >>> times = np.linspace(0.0, 8.0, 60)
+    >>> poles, weights = np.array([-1.0 + 2.0j, -0.5 + 0.3j]), np.array([3.0 - 1.0j, 2.0 + 0.5j])
+    >>> fit = _Polish(times, exponential_sum(times, poles, weights))
+    >>> _, _, found, residual = fit.project(poles, np.linspace(1.0, 2.0, 60))
+    >>> np.allclose(found, weights), bool(np.abs(residual).max() < 1e-12)
+    (True, True)
+    >>> moved, found = fit.run(poles + [0.1, -0.1 + 0.1j], np.ones(60), 60)
+    >>> np.allclose(moved, poles, atol=1e-6), np.allclose(found, weights, atol=1e-5)
+    (True, True)
+    >>> parameters = np.array([0.0, np.log(0.5), 2.0, 0.3])
+    >>> np.allclose(fit.poles(parameters), poles - _MIN_DECAY / T_MAX)
+    True
+    """
 
     def __init__(self, times: Floats, values: Floats) -> None:
         self.times, self.values = times, values
@@ -266,7 +352,15 @@ class _Polish:
 
 
 def _acceptable(poles: Complex, weights: Complex) -> bool:
-    """Step 5: return whether weights are small, poles decay, and no two terms nearly cancel."""
+    """Step 5: return whether weights are small, poles decay, and no two terms nearly cancel.
+
+    >>> poles, weights = np.array([-1.0 + 2.0j, -0.5]), np.array([3.0, 2.0])
+    >>> _acceptable(poles, weights), _acceptable(poles, 4.0 * weights), _acceptable(-poles, weights)
+    (True, False, False)
+    >>> close = np.array([-1.0 + 2.0j, -1.001 + 2.0j])  # two poles 0.001 apart nearly cancel
+    >>> _acceptable(close, weights), _acceptable(close, 0.3 * weights)
+    (False, True)
+    """
     if np.abs(weights).max() > MAX_WEIGHT or poles.real.max() >= 0.0:
         return False
     # Two close poles with large weights of opposite signs would cancel.
@@ -305,6 +399,12 @@ def fit_exponentials(mode: str, eta: float, tolerance: float) -> ExponentialSum:
 
     `eta` is c_d/c_s. Mode III does not use it. The tolerance is
     absolute, and C(0) = G*/G.
+
+    >>> fit = fit_exponentials("III", 1.0, 1e-2)
+    >>> times = np.linspace(0.0, 30.0, 301)
+    >>> error = np.abs(fit(times) - memory_kernel(times, "III", 1.0)).max()
+    >>> bool(0.0 < error < 1.2 * fit.error < 1.2e-2), bool((np.diff(fit.poles.real) <= 0.0).all())
+    (True, True)
     """
     if not 1e-9 <= tolerance <= 1e-2:
         raise InputError(f"kernel_tolerance: must be between 1e-9 and 0.01, got {tolerance!r}")

@@ -42,11 +42,25 @@ class HalfSpaces(NamedTuple):
     moduli: tuple[float, ...]
 
     def symbol(self, shape: tuple[int, ...]) -> Array:
-        """Return K(k), Pa/m, for the modes of an interface as in ``numpy.fft.rfftn``; read-only."""
+        """Return K(k), Pa/m, for the modes of an interface as in ``numpy.fft.rfftn``; read-only.
+
+        On a line, K(k) is G* k/2. On a plane, wave vectors (2, 0), (0, 4) and (2, 4)
+        per m have 3 * 2/2, 1 * 4/2 and (3/5 * 1 + 4/5) sqrt(20)/2:
+
+        >>> HalfSpaces((np.pi,), (3.0,)).symbol((4,)).round(9).tolist()
+        [0.0, 3.0, 6.0]
+        >>> symbol = HalfSpaces((np.pi, 0.5 * np.pi), (3.0, 1.0)).symbol((4, 6))
+        >>> symbol.shape, symbol[[0, 1, 3, 0, 1], [0, 0, 0, 1, 1]].round(4).tolist()
+        ((4, 4), [0.0, 3.0, 3.0, 2.0, 3.1305])
+        """
         return _symbol(self, shape)
 
     def nucleation_lengths(self, weakening_rate: float) -> tuple[float, ...]:
-        """Return h_n, m, in each direction, for a weakening rate (Pa/m)."""
+        """Return h_n, m, in each direction, for a weakening rate (Pa/m).
+
+        >>> HalfSpaces((1.0, 2.0), (3.0, 5.0)).nucleation_lengths(2.0)  # 0.57889 * 3 and 5
+        (1.7366608255518, 2.894434709253)
+        """
         double = 2.0 * SMALLEST_EIGENVALUE
         return tuple(double * modulus / weakening_rate for modulus in self.moduli)
 

@@ -63,6 +63,9 @@ def on_cells(edges: Array) -> Array:
 
     A cell carries half the forces on its edges, and the whole of the
     force on an edge at an end. Sums are equal.
+
+    >>> on_cells(np.array([1.0, 2.0, 4.0, 3.0])).tolist()  # halves, and whole ends
+    [2.0, 3.0, 5.0]
     """
     cells = 0.5 * (edges[:-1] + edges[1:])
     cells[0] += 0.5 * edges[0]
@@ -85,6 +88,34 @@ def contact_rig(
     by `behind` at the trailing end and by `ahead` at the leading end.
     If its bottom lies on rollers, a frictionless stop holds its leading
     end. The push acts along +x or -x (`towards`).
+
+    A symmetric rig without a push. The push acts as a mean shear on its top. The
+    forces have the resultants 1, and reversing the direction mirrors the rig.
+
+    >>> slider, base = Body(0.5, 5.0, 2.0), Body(1.0, 5.0, 2.0)
+    >>> right = contact_rig(1.2, 3, slider, base, push=(0.1, 0.3), behind=0.4, ahead=0.2)
+    >>> left = contact_rig(
+    ...     1.2, 3, slider, base, push=(0.1, 0.3), behind=0.4, ahead=0.2, towards=-1
+    ... )
+    >>> right.K.shape, np.allclose(right.K, right.K.T), right.C > 0.0
+    ((7, 7), True, True)
+    >>> [round(float(part.sum()), 6) + 0.0 for part in (right.T[:3], right.T[3:])]
+    [1.0, 0.0]
+    >>> [round(float(part.sum()), 6) + 0.0 for part in (right.T_p[:3], right.T_p[3:])]
+    [0.0, -1.0]
+    >>> np.allclose(left.T[:3], right.T[:3][::-1]), np.allclose(left.T[3:], right.T[3:][::-1])
+    (True, True)
+    >>> np.allclose(left.K[:3, 3:], right.K[:3, 3:][::-1, ::-1]), left.C == right.C
+    (True, True)
+    >>> bool(right.T[0] > right.T[2])  # more shear at the trailing end, which is pushed
+    True
+
+    Rigid motions of the slider cause no force on the interface.
+
+    >>> turn = np.r_[0.0, 0.0, 0.0, 0.0, 0.4, 0.8, 1.2]
+    >>> motions = np.array([np.r_[1, 1, 1, 0, 0, 0, 0], np.r_[0, 0, 0, 1, 1, 1, 1], turn])
+    >>> np.allclose(right.K @ motions.T, 0.0, atol=1e-9)
+    True
     """
     cell, order = length / nodes, np.arange(2 * nodes + 1)
     signs = np.repeat([1.0, -1.0], [nodes, nodes + 1])
@@ -110,7 +141,28 @@ def contact_rig(
 
 
 def loaded(block: Array, n: int, pressing: str, tilt: float) -> tuple[Array, Array, float]:
-    """Steps 2 and 3: return S_S, g for the push and for the normal force, and S_gg of the push."""
+    """Steps 2 and 3: return S_S, g for the push and for the normal force, and S_gg of the push.
+
+    Forces on the held interface balance the loads: the shear forces of a push have
+    the sum 1 and no normal force, and a normal force presses with the sum 1.
+
+    >>> body = Body(height=1.0, modulus=5.0, kappa=2.0)
+    >>> pushed, plain = block(body, 0.4, 3, push=(0.25, 0.5)), block(body, 0.4, 3)
+    >>> for whole, pressing, tilt in (pushed, "soft", 0.3), (plain, "soft", 0), (plain, "plate", 0):
+    ...     S, g, S_gg = loaded(whole, 3, pressing, tilt)
+    ...     sums = np.array([g[:3].sum(axis=0), -g[3:].sum(axis=0)]).round(9) + 0.0
+    ...     print(S.shape, sums.tolist(), np.allclose(S, S.T), S_gg < 0.0)
+    (7, 7) [[1.0, 0.0], [0.0, 1.0]] True True
+    (7, 7) [[1.0, 0.0], [0.0, 1.0]] True True
+    (7, 7) [[1.0, 0.0], [0.0, 1.0]] True True
+
+    Moments about the middle: of a push at the height 0.375, and of a tilted pressure, which
+    is tilt L/6.
+
+    >>> _, g, _ = loaded(pushed, 3, "soft", 0.3)
+    >>> ((np.arange(4) - 1.5) * 0.4 @ -g[3:]).round(6).tolist()
+    [0.375, 0.06]
+    """
     size = 2 * n + 1
     whole = np.zeros((2 * size + 2, 2 * size + 2))
     whole[: len(block), : len(block)] = block
