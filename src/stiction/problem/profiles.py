@@ -59,7 +59,20 @@ if TYPE_CHECKING:
 
 
 def named_profiles(given: Any) -> dict[str, Any]:
-    """Return profiles by name, from a mapping, a dataset or the strength alone."""
+    """Return profiles by name, from a mapping, a dataset or the strength alone.
+
+    >>> named_profiles([3.0]), named_profiles({"strength": 1, "initial_stress": 2})
+    ({'strength': [3.0]}, {'strength': 1, 'initial_stress': 2})
+    >>> both = {"friction_coefficient": 1, "strength": 2}
+    >>> for given in (both, {"initial_stress": 1}, {"tau": 1}):
+    ...     try:
+    ...         named_profiles(given)
+    ...     except InputError as error:
+    ...         print(str(error)[:53])
+    profiles: give either strength (Pa) or friction_coeff
+    strength: is missing from the profiles
+    profiles: unknown 'tau' (valid: strength, residual_st
+    """
     if hasattr(given, "marginal") or hasattr(given, "members"):
         raise InputError(
             f"profiles: must be numbers, got a {type(given).__name__}. Pass its sample(interface),"
@@ -80,7 +93,33 @@ def named_profiles(given: Any) -> dict[str, Any]:
 
 
 def placed_sample(problem: Any, profiles: Any, accept: Collection[str] = ()) -> Sample:
-    """Return a sample made from users' data. See `Problem.sample` for the arguments."""
+    """Return a sample made from users' data. See `Problem.sample` for the arguments.
+
+    Coefficients become stresses by the pressure of the problem or of the
+    profiles:
+
+    >>> import stiction as st
+    >>> def sample(profiles, pressure=None):
+    ...     problem = st.Problem(
+    ...         st.Solid(1e9, 0.25, 1200.0), st.Interface(9.0, 64),
+    ...         st.LinearWeakening(weakening_rate=1e9), st.Load(normal_pressure=pressure),
+    ...     )
+    ...     return placed_sample(problem, profiles)
+    >>> coefficients = np.array([[0.4], [0.6]]) * np.ones(64)
+    >>> sample({"friction_coefficient": coefficients}, 5e7).strength[:, 3].round(3).tolist()
+    [20000000.0, 30000000.0]
+    >>> pressed = {"friction_coefficient": coefficients, "normal_pressure": [[5e7], [4e7]]}
+    >>> result = sample(pressed)
+    >>> result.strength[:, 3].round(3).tolist(), result.normal_pressure[:, 3].tolist()
+    ([20000000.0, 24000000.0], [50000000.0, 40000000.0])
+    >>> for wrong in ({"residual_strength": np.ones((3, 1))}, {"weakening_rate": "a"}):
+    ...     try:
+    ...         sample(pressed | wrong)
+    ...     except InputError as error:
+    ...         print(error.problems[-1])
+    residual_strength: must have 1 sample or the 2 of the strength, got 3
+    weakening_rate: must be numbers, got str
+    """
     if isinstance(profiles, Sample):
         return accepted_again(problem, profiles, accept)
     interface = problem.interface
@@ -143,6 +182,18 @@ def at_nodes(key: str, value: Any, interface: Interface, *, missing: bool = Fals
 
     `key` may be dotted. Arrays with a different shape are returned
     unchanged, because the caller checks them.
+
+    >>> import xarray as xr
+    >>> line = Interface(4.0, 8)
+    >>> gaps = xr.DataArray([3.0, 4.0], {"x": [0.5, 0.0]}, ["x"], attrs={"units": "mm"})
+    >>> at_nodes("friction.critical_slip", gaps, line, missing=True)[:3].tolist()
+    [0.004, 0.003, nan]
+    >>> at_nodes("load.profile", [1.0, 2.0], line)
+    array([1., 2.])
+    >>> at_nodes("friction.critical_slip", gaps, line)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: friction.critical_slip: ... (NaN) at 6 of 8 nodes, ...
     """
     quantity = quantity_of(key)
     with prefixed(key):
@@ -157,7 +208,11 @@ def at_nodes(key: str, value: Any, interface: Interface, *, missing: bool = Fals
 
 
 def quantity_of(key: str) -> str:
-    """Return the quantity that the parameter with this name or dotted key holds."""
+    """Return the quantity that the parameter with this name or dotted key holds.
+
+    >>> quantity_of("load.profile"), quantity_of("friction.critical_slip"), quantity_of("strength")
+    ('load_profile', 'critical_slip', 'strength')
+    """
     field = key.rsplit(".", 1)[-1]
     return "load_profile" if field == "profile" else field
 
@@ -299,7 +354,19 @@ def read_profile(
 
 
 def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
-    """Return strengths, Pa, from heights, m. Missing heights give NaN."""
+    """Return strengths, Pa, from heights, m. Missing heights give NaN.
+
+    >>> def strength(heights):
+    ...     heights[:] = 1e6 + 5e11 * np.nan_to_num(heights)
+    ...     return heights
+    >>> heights = np.array([2e-6, np.nan])
+    >>> _mapped(strength, heights).tolist(), heights.tolist()
+    ([2000000.0, nan], [2e-06, nan])
+    >>> _mapped(lambda heights: 3.0, heights)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: ... got an array of shape () for heights of shape (2,)
+    """
     values = as_numbers(strength(heights.copy()))
     if values.shape != heights.shape:
         shapes = f"got an array of shape {values.shape} for heights of shape {heights.shape}"
@@ -310,7 +377,21 @@ def _mapped(strength: Callable[[Any], Any], heights: Array) -> Array:
 
 
 def _in_order(array: Any) -> Any:
-    """Return a profile with rising coordinates, and points on a plane as a map."""
+    """Return a profile with rising coordinates, and points on a plane as a map.
+
+    >>> import xarray as xr
+    >>> def ordered(values, dims, **coords):
+    ...     array = _in_order(xr.DataArray(values, coords, dims))
+    ...     return array.values.tolist(), *[at.values.tolist() for at in array.coords.values()]
+    >>> ordered([1, 2, 3], ["x"], x=[7, 5, 6])
+    ([2, 3, 1], [5, 6, 7])
+    >>> ordered([1, 2, 3], ["row"], x=("row", [7, 5, 7]), y=("row", [9, 9, 8]))
+    ([[nan, 2.0], [3.0, 1.0]], [5, 7], [8, 9])
+    >>> ordered([1, 2, 3], ["x"], x=[7, 5, 7])  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: x repeats: there are two values at 7 m (1 in all). ...
+    """
     if "row" in array.dims:
         array = array.set_index(row=["x", "y"])
     for index in array.indexes.values():
@@ -339,7 +420,15 @@ class ProfileFile(NamedTuple):
 
 
 def profile_in_file(given: Any, field: str, folder: Path) -> Any:
-    """Return the profile named in a study file by its path, or by `file` and reader options."""
+    """Return the profile named in a study file by its path, or by `file` and reader options.
+
+    >>> file = profile_in_file("a.csv", "load.profile", Path("study"))
+    >>> file.path.parts, file.options
+    (('study', 'a.csv'), {'quantity': 'load_profile'})
+    >>> file = profile_in_file({"file": "a.csv", "unit": "MPa"}, "strength", Path("study"))
+    >>> file.options, profile_in_file({"type": "uniform"}, "strength", Path("study"))
+    ({'unit': 'MPa', 'quantity': 'strength'}, {'type': 'uniform'})
+    """
     table = dict(given) if isinstance(given, Mapping) else {"file": given}
     if "file" not in table:
         return given

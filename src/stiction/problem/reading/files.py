@@ -92,7 +92,21 @@ NETCDF = (".nc", ".nc4")
 
 
 def load(path: Path, options: Options) -> Table | xr.Dataset | Array:
-    """Read a file as a table, as variables, or as an .npy array."""
+    r"""Read a file as a table, as variables, or as an .npy array.
+
+    >>> import tempfile
+    >>> path = Path(tempfile.mkdtemp()) / "a.TXT"
+    >>> _ = path.write_text("x;F\n2;1,5\n3;2,5\n")
+    >>> load(path, Options()).source, load(path, Options()).headed, load(path, Options(1)).headed
+    ('a.TXT', True, False)
+    >>> np.save(path.with_suffix(".npy"), [[3], [4]])
+    >>> load(path.with_suffix(".npy"), Options())
+    array([3., 4.])
+    >>> load(Path("a.pdf"), Options())  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must end in .csv, .txt, ... .nc4, got 'a.pdf'. Export...
+    """
     ending = path.suffix.lower()
     if ending in (*TEXT, EXCEL):
         return read_table(path, options)
@@ -122,7 +136,14 @@ def read_table(path: Path, options: Options = Options()) -> Table:  # noqa: B008
 
 
 def _table_of_text(content: bytes, options: Options, source: str) -> Table:
-    """Return the table in a text."""
+    r"""Return the table in a text.
+
+    >>> for encoding in ("utf-8", "utf-16"):
+    ...     table = _table_of_text("x;F (N)\n2;3.5\n".encode(encoding), Options(), "a.csv")
+    ...     print([(c.heading, c.values.tolist()) for c in table.columns], table.source)
+    [('x', [2.0]), ('F (N)', [3.5])] a.csv
+    [('x', [2.0]), ('F (N)', [3.5])] a.csv
+    """
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         content = _text(content).encode()
     if len(content) > LARGE:
@@ -139,7 +160,15 @@ def _table_of_text(content: bytes, options: Options, source: str) -> Table:
 
 
 def _text(data: bytes) -> str:
-    """Decode UTF-8, UTF-16 with a byte order mark, or otherwise the western encoding of Windows."""
+    """Decode UTF-8, UTF-16 with a byte order mark, or otherwise the western encoding of Windows.
+
+    >>> [_text("5 µm".encode(name)) for name in ("utf-8", "utf-8-sig", "utf-16", "cp1252")]
+    ['5 µm', '5 µm', '5 µm', '5 µm']
+    >>> _text(bytes([65, 0]))
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: is not a text file (UTF-8, or UTF-16 with a byte order mark)
+    """
     try:
         wide = data.startswith((b"\xff\xfe", b"\xfe\xff"))
         text = data.decode("utf-16" if wide else "utf-8-sig")
@@ -151,7 +180,23 @@ def _text(data: bytes) -> str:
 
 
 def _lines(text: str, options: Options) -> Grid:
-    """Return the cells of each line of a text, and the comments above them."""
+    r"""Return the cells of each line of a text, and the comments above them.
+
+    Lines are numbered as in the file. Excel writes the line with sep=:
+
+    >>> lines = ["skipped", "## x;F #", "sep=;", "", " 2; 3,5", "# below", '4;"a;b"', "6;c"]
+    >>> grid = _lines("\n".join(lines), Options(skip=1))
+    >>> [(row.number, row.cells) for row in grid.rows], grid.comments, grid.separator
+    ([(5, ['2', '3,5']), (7, ['4', 'a;b']), (8, ['6', 'c'])], ['x;F #'], ';')
+
+    Blanks separate the cells of other lines:
+
+    >>> grid = _lines("7\n 8\n", Options())
+    >>> [row.cells for row in grid.rows], grid.separator
+    ([['7'], ['8']], ' ')
+    >>> [row.cells for row in _lines("x (mm)  F\n1  2\n3 -\n", Options()).rows]
+    [['x (mm)', 'F'], ['1', '2'], ['3', '-']]
+    """
     lines: list[tuple[int, str]] = []
     comments: list[str] = []
     for number, line in enumerate(text.splitlines(), 1):
@@ -181,11 +226,28 @@ def _lines(text: str, options: Options) -> Grid:
 
 
 def _separator(lines: Sequence[str], words: set[str]) -> str:
-    """Return the separator that splits most lines into equally many numbers, times and words.
+    r"""Return the separator that splits most lines into equally many numbers, times and words.
 
     If several separators do, the heading is compared first, and then
     the order of `SEPARATORS`. Blanks separate numbers with decimal
     commas, '0,1 1000,5', but commas '0.1, 1000.5'.
+
+    >>> def separator(*lines):
+    ...     return _separator(lines, {"n/a"})
+    >>> separator("1;2", "3;n/a"), separator("1 2", "3 4"), separator("1\t2", "3\t4")
+    (';', ' ', '\t')
+    >>> separator("0,1 1000,5"), separator("0.1, 1000.5"), separator(";;", "1,5 2")
+    (' ', ',', ' ')
+    >>> separator("1", "2"), separator("a", "b")
+    ('', ' ')
+
+    The heading decides between thousands and columns. One line with dates
+    and words does not count against numbers:
+
+    >>> separator("1 000,5"), separator("a,b", "1 000,5")
+    (' ', ',')
+    >>> separator("a b;c", "2026-01-02 12:30;x", "1;2")
+    ';'
     """
     step = max(1, len(lines) // MAX_LINES_COMPARED)
     sampled = (line[:MAX_LETTERS] for line in (*lines[:END], *lines[END::step]))
@@ -208,6 +270,13 @@ def _separator(lines: Sequence[str], words: set[str]) -> str:
 
 
 def _split(line: str, separator: str, words: set[str]) -> list[str]:
+    """Return the cells of a line, without blanks, quotation marks and empty cells at its end.
+
+    >>> _split(' 1;"a b";; ', ";", set()), _split(";", ";", set()), _split("1 2", "", set())
+    (['1', 'a b'], [''], ['1 2'])
+    >>> _split("1  2 ", " ", set())
+    ['1', '2']
+    """
     if separator == " ":
         return split_at_blanks(line, words)
     cells = [cell.strip(' \t"') for cell in (line.split(separator) if separator else [line])]
@@ -217,8 +286,20 @@ def _split(line: str, separator: str, words: set[str]) -> list[str]:
 
 
 def _check_line(number: int, line: str, separator: str) -> None:
-    """Refuse a line with too many columns or with a long cell."""
-    cells = line.rstrip(separator).split(None if separator == " " else separator)
+    r"""Refuse a line with too many columns or with a long cell.
+
+    >>> for line, separator in (("1;" * 2000, ";"), ("1 " * 2000, " "), ("a" * 1000, "")):
+    ...     _check_line(3, line, separator)
+    >>> for line, separator in (("1;" * 2001, ";"), ("b\t" + "a" * 1001, "\t"), ("a" * 1001, "")):
+    ...     try:
+    ...         _check_line(3, line, separator)
+    ...     except InputError as error:
+    ...         print(str(error)[:56])
+    line 3 has 2001 columns, more than 2000. Write each valu
+    line 3 has a cell of 1001 characters, more than 1000
+    line 3 has a cell of 1001 characters, more than 1000
+    """
+    cells = line.rstrip(separator).split(separator.strip(" ") or None)
     if len(cells) > MAX_COLUMNS:
         raise InputError(
             f"line {number} has {len(cells)} columns, more than {MAX_COLUMNS}. Write each value"
@@ -231,7 +312,27 @@ def _check_line(number: int, line: str, separator: str) -> None:
 
 
 def _large(content: bytes, options: Options, source: str) -> Table | None:
-    """Return a large table if all its lines are alike, and None for any other text."""
+    r"""Return a large table if all its lines are alike, and None for any other text.
+
+    >>> lines = [b"x;F\n", *(b"%d;%d.5\n" % (n, n % 7) for n in range(9000))]
+    >>> table = _large(b"".join(lines), Options(), "a.csv")
+    >>> table.lines[[0, 1, -1]].tolist(), table.lines.size, table.source
+    ([2, 3, 9001], 9000, 'a.csv')
+    >>> x, force = (column.values for column in table.columns)
+    >>> bool((x == np.arange(9000)).all()), bool((force == x % 7 + 0.5).all())
+    (True, True)
+
+    Small texts, remarks and uneven lines are left to the slower reader:
+
+    >>> [_large(b"".join(lines[:5000] + end), Options(), "") for end in ([], [b"# end"])]
+    [None, None]
+    >>> ends = [b"# end"], [b"8\n"], [b"8;a\n"]
+    >>> [_large(b"".join(lines + end), Options(), "") for end in ends]
+    [None, None, None]
+    >>> missing = _large(b"".join([*lines, b"8;Bad\n"]), Options(missing="BAD"), "")
+    >>> missing.columns[1].values[-2:].tolist()
+    [4.5, nan]
+    """
     import pandas as pd
 
     end = content.find(b"\n", HEAD) + 1
@@ -303,7 +404,19 @@ def _sheet(content: bytes, options: Options) -> Grid:
 
 
 def _cells_of(sheet: Any, size: int) -> list[Row]:
-    """Return the cells in a sheet as strings. `size` is the size of the file in bytes."""
+    """Return the cells in a sheet as strings. `size` is the size of the file in bytes.
+
+    >>> from types import SimpleNamespace
+    >>> sheet = SimpleNamespace(reset_dimensions=lambda: None)
+    >>> sheet.iter_rows = lambda **given: iter([(1, None, " a "), (2.5,)])
+    >>> [(row.number, row.cells) for row in _cells_of(sheet, 10)]
+    [(1, ['1', '', 'a']), (2, ['2.5', '', ''])]
+    >>> sheet.iter_rows = lambda **given: iter([(7,) * 2001])
+    >>> _cells_of(sheet, 10)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: has 1 or more rows and 2001 or more columns. ...
+    """
     most = min(MAX_CELLS, max(CELLS_OF_SMALL, CELLS_A_BYTE * size))
     sheet.reset_dimensions()  # the stated size of a sheet need not be true
     rows, width = [], 0
@@ -323,6 +436,19 @@ def _cells_of(sheet: Any, size: int) -> list[Row]:
 
 
 def _read_npy(content: bytes) -> Array:
+    """Return the numbers in an .npy file, without dimensions of length one.
+
+    >>> def read(values):
+    ...     file = io.BytesIO()
+    ...     np.save(file, values)
+    ...     return _read_npy(file.getvalue())
+    >>> read([[3], [4]]), read([True, False]).tolist()
+    (array([3., 4.]), [1.0, 0.0])
+    >>> read(["a"])
+    Traceback (most recent call last):
+    ...
+    stiction.base.errors.InputError: must hold numbers, got <U1
+    """
     with refuse_damage("a .npy file of numbers"):
         array = np.load(io.BytesIO(content), allow_pickle=False)
     if not isinstance(array, np.ndarray) or array.dtype.kind not in "bfiu":
